@@ -1,0 +1,27 @@
+VENV := .venv
+PYTHON ?= python3
+INSTALLED := $(VENV)/.installed
+
+.PHONY: demo test clean
+
+demo: $(INSTALLED)
+	$(VENV)/bin/warpimpact run campaigns/slotted_plate.toml -o slotted.nc --overwrite
+	$(VENV)/bin/warpimpact plot slotted.nc
+
+# The kernel and verification tests run once more in Warp's debug mode, which checks array bounds.
+test: $(INSTALLED)
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/pytest
+	$(VENV)/bin/pytest tests/kernels --warp-mode debug
+
+clean:
+	rm -rf $(VENV) build slotted.nc slotted_*.png
+
+# Editable, so that the modules of kernels/ and campaigns/ are found inside the package from the checkout, too.
+$(INSTALLED): pyproject.toml Makefile
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/pip install --quiet --upgrade pip
+	$(VENV)/bin/pip install --quiet --editable '.[dev]'
+	touch $@

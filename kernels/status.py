@@ -1,0 +1,36 @@
+"""How a shot ended: the codes kernels write and the sentences people read."""
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Outcome of one shot; codes from UNFINISHED on are failures of the computation, not of the plate."""
+
+    PERFORATED = 0
+    ARRESTED = 1
+    RICOCHETED = 2
+    MISSED = 3
+    UNFINISHED = 4
+    LEFT_WINDOW = 5
+    NOT_FINITE = 6
+
+    @property
+    def sentence(self) -> str:
+        """What happened, for a person."""
+        return _SENTENCES[self]
+
+    @property
+    def failed(self) -> bool:
+        """Whether the computation, rather than the core, came to its end."""
+        return self >= Status.UNFINISHED
+
+
+_SENTENCES = {
+    Status.PERFORATED: "The core touched the plate and left it through the rear face.",
+    Status.ARRESTED: "The core came to rest in the plate.",
+    Status.RICOCHETED: "The core touched the plate and left it through the front face.",
+    Status.MISSED: "The core passed without touching material.",
+    Status.UNFINISHED: "The core was still in the plate when the step limit was reached.",
+    Status.LEFT_WINDOW: "The core left the largest window of the plate that memory allows.",
+    Status.NOT_FINITE: "The motion stopped being finite.",
+}

@@ -1,0 +1,135 @@
+"""Cores: shapes, and masses and moments against closed forms."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore, ProfileCore
+
+PAPER = {"coefficients": [3.0e-4, 0.24, -5.29], "length": "27.86 mm"}
+
+
+def test_the_papers_core_weighs_four_grams() -> None:
+    core = PolynomialCore(**PAPER, density=7850)
+    mass, centre_of_mass, axial, transverse = core.mass_properties
+    assert mass == pytest.approx(4.0e-3, abs=5e-7)  # MODEL §2, to the digits given there
+    assert centre_of_mass == pytest.approx(18.05e-3, abs=5e-6)
+    assert axial == pytest.approx(1.50e-8, abs=5e-11)
+    assert transverse == pytest.approx(1.65e-7, abs=5e-10)
+    assert core.max_radius == pytest.approx(3.0e-4 + 0.24**2 / (4 * 5.29), rel=1e-14)  # r at its vertex
+
+
+def test_a_cone_has_the_moments_of_a_cone() -> None:
+    d, h, m = 6e-3, 20e-3, 2e-3
+    got = ConeCore(diameter=d, length=h, mass=m).mass_properties
+    # Solid cone: centroid ¾h behind the tip, I_a = 3/10 m a², I_t = 3/20 m a² + 3/80 m h².
+    a = d / 2
+    expected = (m, 0.75 * h, 0.3 * m * a**2, 0.15 * m * a**2 + 0.0375 * m * h**2)
+    assert got == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_shank_is_integrated_beside_its_nose() -> None:
+    a, nose, shank, density = 3e-3, 10e-3, 15e-3, 7850.0
+    core = ConeCore(diameter=2 * a, length=nose + shank, cone_length=nose, density=density)
+    volume = np.pi * a**2 * (nose / 3 + shank)
+    moment = np.pi * a**2 * (nose / 3 * 0.75 * nose + shank * (nose + shank / 2))
+    assert core.mass_properties.mass == pytest.approx(density * volume, rel=1e-12)
+    assert core.mass_properties.centre_of_mass == pytest.approx(moment / volume, rel=1e-12)
+    assert core.breaks == (nose,)
+
+
+def test_half_a_calibre_is_a_hemisphere() -> None:
+    a = 3e-3
+    core = OgiveCore(diameter=2 * a, crh=0.5, length=a, density=1000.0)
+    # Solid hemisphere: V = 2/3 π a³, centroid 3/8 a from its flat face, I_a = 2/5 m a², I_t = 83/320 m a².
+    m = 1000.0 * 2 / 3 * np.pi * a**3
+    expected = (m, 5 / 8 * a, 0.4 * m * a**2, 83 / 320 * m * a**2)
+    assert core.mass_properties == pytest.approx(expected, rel=1e-12)
+
+
+def test_an_ogive_meets_its_shank_tangentially() -> None:
+    core = OgiveCore(diameter="6.17 mm", crh=3, length="27 mm", mass="5.25 g")
+    (shoulder,) = core.breaks
+    assert shoulder == pytest.approx(6.17e-3 * np.sqrt(2.75), rel=1e-14)
+    step = 1e-6
+    tip, before, at, after = core.radius(np.array([0.0, shoulder - step, shoulder, shoulder + step]))
+    assert tip == pytest.approx(0.0, abs=1e-17)
+    assert at == after == pytest.approx(core.max_radius, rel=1e-14)
+    # Next to the shoulder r falls by δ²/2R, R = 3 calibres.
+    assert at - before == pytest.approx(step**2 / (2 * 3 * 6.17e-3), rel=1e-3)
+
+
+def test_a_profile_from_a_file_is_that_of_its_numbers(tmp_path: Path) -> None:
+    (tmp_path / "cone.csv").write_text("s, r\n0, 0\n0.01, 0.003\n\n0.02, 0.003\n")
+    from_file = ProfileCore(file=tmp_path / "cone.csv", density=7850)
+    assert from_file == ProfileCore(s=[0, "10 mm", 0.02], r=[0, 0.003, 0.003], density=7850)
+    cone = ConeCore(diameter=6e-3, length=20e-3, cone_length=10e-3, density=7850)
+    assert from_file.mass_properties == pytest.approx(cone.mass_properties, rel=1e-12)
+    assert (from_file.length, from_file.max_radius, from_file.breaks) == (0.02, 0.003, (0.01,))
+
+
+def test_overrides_replace_what_the_shape_gives() -> None:
+    plain = PolynomialCore(**PAPER, mass="4 g").mass_properties
+    own = PolynomialCore(**PAPER, mass="4 g", centre_of_mass="17 mm", inertia_axial=1e-8).mass_properties
+    assert own == plain._replace(centre_of_mass=17e-3, inertia_axial=1e-8)
+
+
+@pytest.mark.parametrize(
+    "core",
+    [
+        PolynomialCore(**PAPER, mass="4 g"),
+        OgiveCore(diameter="6.17 mm", crh=3, length="27 mm", mass="5.25 g"),
+        ConeCore(diameter="6 mm", length="20 mm", mass="2 g"),
+    ],
+)
+def test_the_bounding_radius_holds_every_point(core: Core) -> None:
+    s = np.random.default_rng(1).uniform(0, core.length, 5000)
+    distance = np.hypot(s - core.mass_properties.centre_of_mass, core.radius(s))
+    assert distance.max() <= core.bounding_radius
+    assert core.bounding_radius < distance.max() * 1.01
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ({"coefficients": [-1e-5, 0.24]}, "radius of -1e-05 m at s = 0 m"),
+        ({"coefficients": [1e-3, -0.2, 5.0]}, "radius of -0.001 m at s = 0.02 m"),  # dips between its ends
+        ({"coefficients": [0.0]}, "radius of 0 m"),
+        ({"length": "60 mm"}, "radius of -0.004344 m at s = 0.06 m"),
+        ({"mass": None}, "got neither of mass and density"),
+        ({"density": 7850}, "got both of mass and density"),
+        ({"centre_of_mass": "30 mm"}, "got centre_of_mass = 0.03 m, but it must lie between nose and base"),
+        ({"inertia_axial": 0}, "greater than 0"),
+        ({"mass": "-4 g"}, "greater than 0"),
+    ],
+)
+def test_an_impossible_core_is_refused(values: dict[str, object], complaint: str) -> None:
+    with pytest.raises(ValidationError, match=complaint):
+        PolynomialCore(**{**PAPER, "mass": "4 g", **values})
+
+
+@pytest.mark.parametrize(
+    ("table", "complaint"),
+    [
+        ("s,radius\n0,1e-3\n", 'line 1: got "s,radius", but the header must be s,r'),
+        ("s,r\n", "has no rows"),
+        ("s,r\n0,1e-3\n1e-2,abc\n", 'line 3: r: got "abc", but it must be a finite number'),
+        ("s,r\n0,1e-3\n1e-2,inf\n", 'line 3: r: got "inf"'),
+        ("s,r\n0,1e-3,5\n", 'line 2: got "0,1e-3,5", but a row has 2'),
+        ("s,r\n1e-3,1e-3\n2e-3,1e-3\n", "first station must be 0"),
+        ("s,r\n0,1e-3\n0,2e-3\n", "stations must increase"),
+        ("s,r\n0,1e-3\n1e-3,0\n2e-3,1e-3\n", "got r = 0 m in row 2"),
+        ("s,r\n0,0\n1e-3,0\n", "got r = 0 m in every row"),
+    ],
+)
+def test_a_bad_profile_is_refused(tmp_path: Path, table: str, complaint: str) -> None:
+    (tmp_path / "profile.csv").write_text(table)
+    with pytest.raises(ValidationError, match=complaint):
+        ProfileCore(file=tmp_path / "profile.csv", density=7850)
+
+
+def test_a_core_shorter_than_its_nose_is_refused() -> None:
+    with pytest.raises(ValidationError, match=r"at least as long as its nose, 0\.0102318 m"):
+        OgiveCore(diameter="6.17 mm", crh=3, length="10 mm", mass="5 g")

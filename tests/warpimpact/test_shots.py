@@ -1,0 +1,127 @@
+"""Shots: where they hit, and that every shot depends on the seed and its own number only."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from warpimpact.scene import CirclePattern, Hits, Impact, Plate, make_shots
+
+PERIOD = (16e-3, 8e-3)
+SOLID = Plate(thickness="4 mm", resistance=1e9)
+
+
+def _points(**hits: object) -> np.ndarray:
+    return np.column_stack(Hits(**hits).points(PERIOD))
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "random"])
+@pytest.mark.parametrize("count", [1, 5, 64, 100])
+def test_fewer_hits_are_the_first_of_more(sampling: str, count: int) -> None:
+    many = _points(sampling=sampling, count=1000, seed=3)
+    assert np.array_equal(_points(sampling=sampling, count=count, seed=3), many[:count])
+    assert not np.array_equal(_points(sampling=sampling, count=count, seed=4), many[:count])
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "random", "grid"])
+def test_hits_fill_the_cell_around_the_origin(sampling: str) -> None:
+    points = _points(sampling=sampling, count=8192, seed=1) / PERIOD
+    assert ((points >= -0.5) & (points < 0.5)).all()
+    in_quarters = np.histogram2d(*points.T, bins=2, range=[[-0.5, 0.5]] * 2)[0]
+    # Independent draws: 2048 ± 39; the others are even by construction.
+    assert in_quarters == pytest.approx(2048, abs=160 if sampling == "random" else 0)
+
+
+def test_sobol_points_are_a_net() -> None:
+    points = _points(sampling="sobol", count=1024, seed=7) / PERIOD
+    strips = np.histogram2d(*points.T, bins=32, range=[[-0.5, 0.5]] * 2)[0]
+    assert (strips == 1).all()  # a (0, 10, 2)-net: one point in each of 32 × 32 cells
+
+
+@pytest.mark.parametrize(("count", "shape"), [(2, (2, 1)), (128, (16, 8)), (130, (16, 8)), (1, (1, 1))])
+def test_a_grid_has_nearly_square_cells(count: int, shape: tuple[int, int]) -> None:
+    points = _points(sampling="grid", count=count)
+    y, z = np.unique(points[:, 0]), np.unique(points[:, 1])
+    assert (len(y), len(z)) == shape
+    assert len(points) == len(y) * len(z)
+    assert y == pytest.approx(-y[::-1], abs=1e-18)
+    assert y[0] == pytest.approx(PERIOD[0] * (0.5 / shape[0] - 0.5), rel=1e-14)
+
+
+def test_a_list_gives_its_hits(tmp_path: Path) -> None:
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.00185,0\n-0.1,3.5e-3\n")
+    points = _points(sampling="list", file=tmp_path / "hits.csv")
+    assert points.tolist() == [[0.00185, 0.0], [-0.1, 0.0035]]
+
+
+@pytest.mark.parametrize(
+    ("row", "complaint"),
+    [
+        ("0.1,x", 'hits.csv, line 3: hit_z: got "x", but it must be a finite number'),
+        ("nan,0", 'hits.csv, line 3: hit_y: got "nan", but it must be a finite number'),
+        ("0.1", 'hits.csv, line 3: got "0.1", but a row has 2 finite numbers'),
+    ],
+)
+def test_a_bad_row_is_named(tmp_path: Path, row: str, complaint: str) -> None:
+    (tmp_path / "hits.csv").write_text(f"hit_y,hit_z\n0,0\n{row}\n0,0\n")
+    with pytest.raises(ValidationError, match=complaint):
+        Hits(sampling="list", file=tmp_path / "hits.csv")
+
+
+@pytest.mark.parametrize(
+    ("hits", "complaint"),
+    [
+        ({}, 'got sampling = "sobol" without count'),
+        ({"sampling": "list"}, 'got sampling = "list" without file'),
+        ({"sampling": "list", "file": __file__, "count": 3}, "got count beside"),
+        ({"sampling": "list", "file": __file__, "seed": 3}, "got seed beside"),
+        ({"count": 3, "file": __file__}, "got file beside"),
+        ({"count": 0}, "greater than or equal to 1"),
+        ({"count": 1.5}, "valid integer"),
+        ({"count": True}, "valid integer"),
+        ({"count": 3, "seed": -1}, "greater than or equal to 0"),
+        ({"sampling": "sobel", "count": 3}, "'sobol', 'grid', 'random' or 'list'"),
+    ],
+)
+def test_incomplete_or_contradictory_hits_are_refused(hits: dict[str, object], complaint: str) -> None:
+    with pytest.raises(ValidationError, match=complaint):
+        Hits(**hits)
+
+
+def test_all_shots_arrive_alike() -> None:
+    impact = Impact(velocity="825 m/s", obliquity="20 deg", azimuth="90 deg", pitch=-0.1, yaw=0.2, spin="1e4 rad/s")
+    shots = make_shots(impact, Hits(count=10), SOLID)
+    assert len(shots) == 10
+    for field, value in impact:
+        assert np.array_equal(getattr(shots, field), np.full(10, value))
+    assert impact.obliquity == pytest.approx(math.radians(20), rel=1e-14)
+
+
+def test_a_slice_of_shots_is_shots() -> None:
+    shots = make_shots(Impact(velocity=825), Hits(count=10), SOLID)
+    assert len(shots[2:5]) == 3
+    assert np.array_equal(shots[2:5].hit_z, shots.hit_z[2:5])
+
+
+def test_shots_cover_the_cell_or_a_smaller_plate() -> None:
+    holes = CirclePattern(diameter="5 mm", spacing=["10 mm", "12 mm"])
+    hits = Hits(sampling="grid", count=10000)
+
+    def extent(size: object) -> tuple[float, float]:
+        shots = make_shots(Impact(velocity=825), hits, Plate(thickness=1, resistance=1, pattern=holes, size=size))
+        return np.ptp(shots.hit_y), np.ptp(shots.hit_z)
+
+    # A grid of cell centres spans its cell but for one grid cell, about a hundredth.
+    assert extent(None) == pytest.approx((10e-3, 12e-3), rel=0.02)
+    assert extent(["100 mm", "6 mm"]) == pytest.approx((10e-3, 6e-3), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("velocity", 0), ("obliquity", "90 deg"), ("obliquity", -0.1), ("pitch", "90 deg"), ("yaw", "-90 deg")],
+)
+def test_an_impossible_impact_is_refused(field: str, value: object) -> None:
+    with pytest.raises(ValidationError, match=f"{field}\n  Input should be"):
+        Impact(**{"velocity": 825, field: value})

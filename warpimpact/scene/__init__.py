@@ -1,0 +1,42 @@
+"""What is shot at what: immutable, validated, in SI units and radians."""
+
+from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
+from .interaction import Interaction
+from .numerics import Numerics
+from .patterns import (
+    AnyPattern,
+    CirclePattern,
+    LatticePattern,
+    MaskPattern,
+    NoPattern,
+    Pattern,
+    SlotPattern,
+    TrianglePattern,
+)
+from .plate import Plate
+from .shots import Hits, Impact, Shots, make_shots
+
+__all__ = [
+    "AnyCore",
+    "AnyPattern",
+    "CirclePattern",
+    "ConeCore",
+    "Core",
+    "Hits",
+    "Impact",
+    "Interaction",
+    "LatticePattern",
+    "MaskPattern",
+    "MassProperties",
+    "NoPattern",
+    "Numerics",
+    "OgiveCore",
+    "Pattern",
+    "Plate",
+    "PolynomialCore",
+    "ProfileCore",
+    "Shots",
+    "SlotPattern",
+    "TrianglePattern",
+    "make_shots",
+]

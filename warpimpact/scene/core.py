@@ -1,0 +1,298 @@
+"""Cores: rigid bodies of revolution r(s), s from the nose tip (MODEL §2)."""
+
+from abc import ABC, abstractmethod
+from functools import cached_property
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from pydantic import Field, ValidationInfo, model_validator
+
+from .files import input_file, read_table
+from .model import Array, Model
+from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass
+
+# Gauss–Legendre on 32 nodes is exact to degree 63: r⁴ of any polynomial core up to degree 15.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+_OUTLINE_STATIONS = 1001  # per smooth stretch of the profile
+
+
+class MassProperties(NamedTuple):
+    """What the motion needs to know of a core.
+
+    Attributes:
+        mass: [kg]
+        centre_of_mass: distance behind the nose tip [m].
+        inertia_axial: about the axis [kg m²].
+        inertia_transverse: about any transverse line through the centre of mass [kg m²].
+    """
+
+    mass: float
+    centre_of_mass: float
+    inertia_axial: float
+    inertia_transverse: float
+
+
+class Core(Model, ABC):
+    """A rigid, homogeneous body of revolution, closed by discs at nose and base.
+
+    Exactly one of `mass` [kg] and `density` [kg/m³] is given. `centre_of_mass` (from the nose tip [m]),
+    `inertia_axial` and `inertia_transverse` [kg m²] follow from the shape; each can be overridden.
+    """
+
+    mass: PositiveMass | None = None
+    density: PositiveDensity | None = None
+    centre_of_mass: Length | None = None
+    inertia_axial: PositiveInertia | None = None
+    inertia_transverse: PositiveInertia | None = None
+
+    if TYPE_CHECKING:  # a field of the drawn cores, a property of the tabulated one
+
+        @property
+        def length(self) -> float:
+            """From nose tip to base [m]."""
+
+    @property
+    @abstractmethod
+    def max_radius(self) -> float:
+        """Largest radius [m]."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Stations within (0, length) where the profile is not smooth [m], ascending."""
+        return ()
+
+    @abstractmethod
+    def radius(self, s: Array) -> Array:
+        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
+
+    @model_validator(mode="after")
+    def _weighs_something(self) -> Self:
+        if (self.mass is None) == (self.density is None):
+            given = "neither" if self.mass is None else "both"
+            raise ValueError(f"got {given} of mass and density, but exactly one of them must be given")
+        return self
+
+    @model_validator(mode="after")
+    def _centre_of_mass_inside(self) -> Self:
+        if self.centre_of_mass is not None and not 0 < self.centre_of_mass < self.length:
+            raise ValueError(
+                f"got centre_of_mass = {self.centre_of_mass:g} m, "
+                f"but it must lie between nose and base, 0 to {self.length:g} m"
+            )
+        return self
+
+    @cached_property
+    def mass_properties(self) -> MassProperties:
+        """Integrals over the solid of revolution, with the overrides in place.
+
+        The transverse moment is that of the homogeneous body about its own centroid, also where
+        `centre_of_mass` is overridden.
+        """
+        s, weight = self._quadrature()
+        area = np.pi * self.radius(s) ** 2 * weight
+        volume = area.sum()
+        centroid = (area * s).sum() / volume
+        axial = (area * self.radius(s) ** 2).sum() / 2
+        transverse = axial / 2 + (area * (s - centroid) ** 2).sum()
+        density = self.density if self.mass is None else self.mass / volume
+        return MassProperties(
+            mass=float(density * volume),
+            centre_of_mass=float(_first_given(self.centre_of_mass, centroid)),
+            inertia_axial=float(_first_given(self.inertia_axial, density * axial)),
+            inertia_transverse=float(_first_given(self.inertia_transverse, density * transverse)),
+        )
+
+    @cached_property
+    def bounding_radius(self) -> float:
+        """Largest distance of a surface point from the centre of mass [m]."""
+        s = np.concatenate([np.linspace(a, b, _OUTLINE_STATIONS) for a, b in self._stretches()])
+        return float(np.hypot(s - self.mass_properties.centre_of_mass, self.radius(s)).max())
+
+    def _stretches(self) -> list[tuple[float, float]]:
+        return list(pairwise((0.0, *self.breaks, self.length)))
+
+    def _quadrature(self) -> tuple[Array, Array]:
+        """Stations [m] and weights [m] of a Gauss–Legendre rule on every smooth stretch; both (n,)."""
+        start, end = np.array(self._stretches()).T[..., None]
+        half = (end - start) / 2
+        return (start + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
+
+
+class PolynomialCore(Core):
+    """r(s) = Σ coefficients[i] sⁱ, in metres: the paper's core is [3.0e-4, 0.24, -5.29]."""
+
+    shape: Literal["polynomial"] = "polynomial"
+    coefficients: tuple[Number, ...] = Field(min_length=1, max_length=16)
+    length: PositiveLength
+
+    @model_validator(mode="after")
+    def _radius_positive(self) -> Self:
+        s = np.array([*self._extremes(), 0.0, self.length])
+        r = self._polynomial(s)
+        if r.min() < 0 or r.max() <= 0 or (r[:-2] <= 0).any():  # 0 is allowed at nose and base only
+            raise ValueError(
+                f"got coefficients with a radius of {r.min():g} m at s = {s[r.argmin()]:g} m, "
+                f"but the radius must be positive from nose to base, 0 to {self.length:g} m"
+            )
+        return self
+
+    @property
+    def max_radius(self) -> float:
+        """Largest radius [m]."""
+        return float(self.radius(np.array([0.0, self.length, *self._extremes()])).max())
+
+    def radius(self, s: Array) -> Array:
+        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
+        return np.maximum(self._polynomial(s), 0.0)
+
+    @property
+    def _polynomial(self) -> Polynomial:
+        return Polynomial(self.coefficients)
+
+    def _extremes(self) -> Array:
+        roots = self._polynomial.deriv().roots()
+        real = roots.real[np.isreal(roots)]
+        return real[(real > 0) & (real < self.length)]
+
+
+class OgiveCore(Core):
+    """Tangent ogive nose of `crh` calibres radius, then a cylindrical shank of `diameter` up to `length`."""
+
+    shape: Literal["ogive"] = "ogive"
+    diameter: PositiveLength
+    crh: Annotated[Number, Field(ge=0.5)]
+    length: PositiveLength
+
+    @model_validator(mode="after")
+    def _holds_its_nose(self) -> Self:
+        _check_nose(self.nose_length, self.length)
+        return self
+
+    @property
+    def nose_length(self) -> float:
+        """From tip to shoulder [m]: √(R² − (R − d/2)²) with R = crh·d."""
+        return float(self.diameter * np.sqrt(self.crh - 0.25))
+
+    @property
+    def max_radius(self) -> float:
+        """Largest radius [m]."""
+        return self.diameter / 2
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The shoulder, where a shank follows; curvature jumps there, the slope does not [m]."""
+        return (self.nose_length,) if self.nose_length < self.length else ()
+
+    def radius(self, s: Array) -> Array:
+        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
+        curvature_radius = self.crh * self.diameter
+        to_shoulder = np.maximum(self.nose_length - s, 0.0)
+        arc = np.sqrt(np.maximum(curvature_radius**2 - to_shoulder**2, 0.0))
+        return np.maximum(arc - curvature_radius + self.diameter / 2, 0.0)
+
+
+class ConeCore(Core):
+    """Sharp cone of `cone_length` (by default all of `length`), then a cylindrical shank of `diameter`."""
+
+    shape: Literal["cone"] = "cone"
+    diameter: PositiveLength
+    length: PositiveLength
+    cone_length: PositiveLength | None = None
+
+    @model_validator(mode="after")
+    def _holds_its_nose(self) -> Self:
+        _check_nose(self._shoulder, self.length)
+        return self
+
+    @property
+    def max_radius(self) -> float:
+        """Largest radius [m]."""
+        return self.diameter / 2
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The shoulder, where a shank follows [m]."""
+        return (self._shoulder,) if self._shoulder < self.length else ()
+
+    def radius(self, s: Array) -> Array:
+        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
+        return self.diameter / 2 * np.minimum(np.asarray(s) / self._shoulder, 1.0)
+
+    @property
+    def _shoulder(self) -> float:
+        return self.length if self.cone_length is None else self.cone_length
+
+
+class ProfileCore(Core):
+    """Straight between tabulated stations `s` and radii `r` [m], from s = 0 at the nose to the base.
+
+    Both may come from `file`, a CSV file with the header s,r in metres.
+    """
+
+    shape: Literal["profile"] = "profile"
+    s: tuple[Length, ...] = Field(min_length=2)
+    r: tuple[Length, ...] = Field(min_length=2)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _table_from_file(cls, values: Any, info: ValidationInfo) -> Any:
+        if not isinstance(values, dict) or "file" not in values:
+            return values
+        if "s" in values or "r" in values:
+            raise ValueError("got file beside s or r, but a profile is given either by file or by s and r")
+        s, r = read_table(input_file(values["file"], info), ("s", "r")).T
+        rest = {key: value for key, value in values.items() if key != "file"}
+        return rest | {"s": s.tolist(), "r": r.tolist()}
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [*super()._keys(), "file"]
+
+    @model_validator(mode="after")
+    def _is_a_profile(self) -> Self:
+        if len(self.s) != len(self.r):
+            raise ValueError(f"got {len(self.s)} stations s and {len(self.r)} radii r, which must be pairs")
+        if self.s[0] != 0:
+            raise ValueError(f"got s = {self.s[0]:g} m for the nose tip, but the first station must be 0")
+        for row, (before, after) in enumerate(pairwise(self.s), start=2):
+            if after <= before:
+                raise ValueError(f"got s = {after:g} m in row {row}, but stations must increase")
+        for row, r in enumerate(self.r, start=1):
+            if r < 0 or (r == 0 and 1 < row < len(self.r)):
+                raise ValueError(f"got r = {r:g} m in row {row}, but r must be positive, or 0 at an end")
+        if not any(self.r):
+            raise ValueError("got r = 0 m in every row, but r must be positive between the ends")
+        return self
+
+    @property
+    def length(self) -> float:
+        """From nose tip to base [m]."""
+        return self.s[-1]
+
+    @property
+    def max_radius(self) -> float:
+        """Largest radius [m]."""
+        return max(self.r)
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """The stations between nose and base [m]."""
+        return self.s[1:-1]
+
+    def radius(self, s: Array) -> Array:
+        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
+        return np.interp(s, self.s, self.r)
+
+
+AnyCore = Annotated[PolynomialCore | OgiveCore | ConeCore | ProfileCore, Field(discriminator="shape")]
+
+
+def _check_nose(nose: float, length: float) -> None:
+    if nose > length * (1 + 1e-12):  # a nose as long as the core may round to a little more
+        raise ValueError(f"got length = {length:g} m, but the core must be at least as long as its nose, {nose:g} m")
+
+
+def _first_given(override: float | None, computed: float) -> float:
+    return computed if override is None else override

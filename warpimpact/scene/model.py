@@ -1,0 +1,31 @@
+"""What the models of a scene have in common."""
+
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, model_validator
+
+Array = NDArray[np.float64]
+
+
+class Model(BaseModel):
+    """A validated, immutable value; a misspelt field is an error that says what may have been meant."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _knows_every_key(cls, values: Any) -> Any:
+        allowed = cls._keys()
+        unknown = [key for key in values if key not in allowed] if isinstance(values, dict) else []
+        if unknown:
+            meant = get_close_matches(unknown[0], allowed, n=1)
+            hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(allowed)}"
+            raise ValueError(f'got the unknown key "{unknown[0]}"; {hint}')
+        return values
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return list(cls.model_fields)

@@ -1,0 +1,122 @@
+"""Quantities: a number is SI, a string carries its unit; inside there are only SI floats."""
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+from numbers import Real
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+_NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """Reader of one physical quantity.
+
+    Attributes:
+        name: what a person calls it, with its article.
+        unit: SI unit of the float that comes out; empty for a plain number.
+        example: a string that is accepted.
+    """
+
+    name: str
+    unit: str
+    example: str
+
+    def __call__(self, value: object) -> float:
+        """SI value of a number or of a string with a unit; ValueError says what is allowed."""
+        if isinstance(value, str):
+            number = self._from_text(value)
+        elif isinstance(value, Real) and not isinstance(value, bool):
+            number = _float(value)
+        else:
+            raise self._error(value, f"which is not {self.name}")
+        if not math.isfinite(number):
+            raise self._error(value, "which is not finite")
+        return number
+
+    def _from_text(self, text: str) -> float:
+        match = _NUMBER_AND_UNIT.fullmatch(text)
+        if match is None:
+            raise self._error(text, f"which is not {self.name}")
+        number, unit = float(match[1]), (match[2] or "").strip()
+        if not unit and self.unit:
+            raise self._error(text, "which has no unit")
+        return number * self._to_si(text, unit) if unit else number
+
+    def _to_si(self, text: str, unit: str) -> float:
+        try:
+            return _factor(unit, self.unit)
+        except LookupError:
+            raise self._error(text, f'whose unit "{unit}" is unknown') from None
+        except ValueError:
+            raise self._error(text, f"which is not {self.name}") from None
+
+    def _error(self, value: object, complaint: str) -> ValueError:
+        in_unit = f" in {self.unit}" if self.unit else ""
+        return ValueError(
+            f'got {quoted(value)}, {complaint}; give a number{in_unit} or a string such as "{self.example}"'
+        )
+
+
+def _float(value: Real) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # of an integer with more than 308 digits
+        return math.inf
+
+
+@cache
+def _registry() -> Any:
+    import pint  # a third of a second, needed only where a string carries a unit
+
+    return pint.UnitRegistry()
+
+
+@cache
+def _factor(unit: str, si_unit: str) -> float:
+    """Factor from `unit` to `si_unit`; LookupError for an unknown unit, ValueError for another kind."""
+    import pint
+
+    try:
+        parsed = _registry().parse_units(unit)
+    except Exception as error:  # pint's parser lets tokenizer, syntax, type and value errors through
+        raise LookupError(unit) from error
+    try:
+        return float(_registry().Quantity(1.0, parsed).to(si_unit).magnitude)
+    except pint.DimensionalityError:
+        raise ValueError(unit) from None
+
+
+def quoted(value: object) -> str:
+    """A value as the person wrote it: TOML and JSON agree on everything that gets here, save dates."""
+    return json.dumps(value, ensure_ascii=False, default=str)
+
+
+def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
+    return BeforeValidator(_Quantity(name, unit, example))
+
+
+Number = Annotated[float, _quantity("a number", "", "0.05")]
+Length = Annotated[float, _quantity("a length", "m", "4 mm")]
+Mass = Annotated[float, _quantity("a mass", "kg", "4 g")]
+Time = Annotated[float, _quantity("a time", "s", "1 us")]
+Stress = Annotated[float, _quantity("a stress", "Pa", "2600 MPa")]
+Density = Annotated[float, _quantity("a density", "kg/m^3", "7850 kg/m^3")]
+Speed = Annotated[float, _quantity("a speed", "m/s", "825 m/s")]
+Angle = Annotated[float, _quantity("an angle", "rad", "20 deg")]
+AngularVelocity = Annotated[float, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
+Inertia = Annotated[float, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]
+
+PositiveLength = Annotated[Length, Field(gt=0)]
+PositiveMass = Annotated[Mass, Field(gt=0)]
+PositiveTime = Annotated[Time, Field(gt=0)]
+PositiveDensity = Annotated[Density, Field(gt=0)]
+PositiveSpeed = Annotated[Speed, Field(gt=0)]
+PositiveInertia = Annotated[Inertia, Field(gt=0)]
+NonNegativeNumber = Annotated[Number, Field(ge=0)]
+NonNegativeStress = Annotated[Stress, Field(ge=0)]
