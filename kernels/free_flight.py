@@ -1,0 +1,112 @@
+"""Torque-free flight behind the plate: what a shot looks like when it passes the stand-offs (MODEL.md §1)."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import march as march_stage
+from . import rigid_body
+from .status import Status
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """The free-flight kernel and the struct it fills, for one variant."""
+    real, vec3 = variant.real, variant.vec3
+    zero, undefined = real(0.0), real(wp.nan)
+    motion = rigid_body.build(variant)
+    marching = march_stage.build(variant)
+    Body, Shots, Contact = motion.Body, marching.Shots, marching.Outcomes
+    line_of_flight = marching.line_of_flight
+    angular_velocity = motion.angular_velocity
+    turned = motion.turned
+    PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
+    MISSED, UNFINISHED = wp.constant(int(Status.MISSED)), wp.constant(int(Status.UNFINISHED))
+    iterations = wp.constant(64)
+
+    @wp.struct
+    class Report:
+        """What is told of each shot; [shots] or [shots × stand-offs], SI and radians, NaN where it does not exist."""
+
+        residual_velocity: wp.array(dtype=real)
+        deflection: wp.array(dtype=real)
+        angular_velocity: wp.array(dtype=vec3)
+        energy_loss: wp.array(dtype=real)
+        contact_duration: wp.array(dtype=real)
+        tilt: wp.array2d(dtype=real)
+        pitch: wp.array2d(dtype=real)
+        yaw: wp.array2d(dtype=real)
+        total_yaw: wp.array2d(dtype=real)
+
+    @wp.func
+    def angle_between(a: vec3, b: vec3):
+        return wp.atan2(wp.length(wp.cross(a, b)), wp.dot(a, b))
+
+    @wp.func
+    def axis_at(body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real):
+        """Axis when the point `ahead` of the centre of mass has gone `distance` along x.
+
+        The point's own swing enters the time of flight: a fixed-point iteration, which converges while the swing is
+        slower than the flight; without a lever it is exact at once.
+        """
+        then = axis
+        for _ in range(iterations):
+            time = (distance - ahead * then[0]) / velocity
+            then = turned(body, axis, momentum, time)
+            if ahead == zero:
+                break
+        return then
+
+    @wp.func
+    def report_standoff(report: Report, shot: wp.int32, standoff: wp.int32, axis: vec3, flight: vec3, velocity: vec3):
+        report.tilt[shot, standoff] = angle_between(axis, flight)
+        report.pitch[shot, standoff] = wp.atan2(axis[2], axis[0])
+        report.yaw[shot, standoff] = wp.atan2(axis[1], axis[0])
+        report.total_yaw[shot, standoff] = angle_between(axis, velocity)
+
+    def free_flight(
+        # inputs
+        body: Body,
+        shots: Shots,
+        contact: Contact,
+        standoff_planes: wp.array(dtype=real),
+        ahead: real,
+        # outputs
+        report: Report,
+    ):
+        """Report one shot per thread.
+
+        `standoff_planes` are x [m] of the stand-offs; `ahead` [m] tells which point of the axis has to pass
+        them, from the centre of mass towards the nose.
+        """
+        shot = wp.tid()
+        status = contact.status[shot]
+        direction = line_of_flight(shots.obliquity[shot], shots.azimuth[shot])
+        flight = vec3(real(direction[0]), real(direction[1]), real(direction[2]))
+        velocity, axis = contact.velocity[shot], contact.axis[shot]
+        momentum = contact.angular_momentum[shot]
+        failed = status >= UNFINISHED
+        moves = not failed and status != ARRESTED
+        passes = status == PERFORATED or (status == MISSED and velocity[0] > zero)
+        nothing = vec3(undefined, undefined, undefined)
+
+        report.residual_velocity[shot] = wp.where(moves, wp.length(velocity), wp.where(failed, undefined, zero))
+        report.deflection[shot] = wp.where(moves, angle_between(velocity, flight), undefined)
+        omega = angular_velocity(body, axis, momentum)
+        report.angular_velocity[shot] = wp.where(moves, omega, wp.where(failed, nothing, vec3()))
+        report.energy_loss[shot] = wp.where(failed, undefined, contact.energy_loss[shot])
+        report.contact_duration[shot] = wp.where(failed, undefined, contact.contact_duration[shot])
+        for k in range(standoff_planes.shape[0]):
+            if passes:
+                distance = standoff_planes[k] - contact.position[shot][0]
+                then = axis_at(body, axis, momentum, ahead, velocity[0], distance)
+                report_standoff(report, shot, k, then, flight, velocity)
+            else:
+                report.tilt[shot, k] = undefined
+                report.pitch[shot, k] = undefined
+                report.yaw[shot, k] = undefined
+                report.total_yaw[shot, k] = undefined
+
+    return SimpleNamespace(kernel=variant.kernel(free_flight), Report=Report)

@@ -1,0 +1,243 @@
+"""The march of a core through the plate, from the first touch of the front face to the end of contact."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import contact, core_surface, interaction, nodal, plate_grid, rigid_body
+from .status import Status
+from .variant import Variant
+
+TRACE_COLUMNS = 20
+"""Numbers per traced step: time, position, attitude (x, y, z, w), velocity, angular momentum, mean force and moment."""
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """The march kernel and the structs it takes, for one variant."""
+    real, vec3, quat = variant.real, variant.vec3, variant.quat
+    zero, half = real(0.0), real(0.5)
+    still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
+    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
+    contacts = contact.build(variant)
+    scheme = nodal.build(variant) if variant.nodal else contacts
+    Surface, Pose, Plate, Fields, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Fields, laws.Law
+    Body, State, Load = motion.Body, motion.State, motion.Load
+    Footprint = contacts.Footprint
+    PERFORATED, ARRESTED, RICOCHETED = (
+        wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
+    )
+    MISSED, UNFINISHED, LEFT_WINDOW, NOT_FINITE = (
+        wp.constant(int(s)) for s in (Status.MISSED, Status.UNFINISHED, Status.LEFT_WINDOW, Status.NOT_FINITE)
+    )
+    RUNNING = wp.constant(-1)
+
+    @wp.struct
+    class Shots:
+        """What hits where: float64 arrays of shape [shots]; metres, m/s, radians, rad/s (MODEL.md §1)."""
+
+        hit_y: wp.array(dtype=wp.float64)
+        hit_z: wp.array(dtype=wp.float64)
+        velocity: wp.array(dtype=wp.float64)
+        obliquity: wp.array(dtype=wp.float64)
+        azimuth: wp.array(dtype=wp.float64)
+        pitch: wp.array(dtype=wp.float64)
+        yaw: wp.array(dtype=wp.float64)
+        spin: wp.array(dtype=wp.float64)
+
+    @wp.struct
+    class Outcomes:
+        """How each shot's contact ended: arrays of shape [shots]; position relative to the hit point."""
+
+        status: wp.array(dtype=wp.int32)
+        steps: wp.array(dtype=wp.int32)
+        contact_duration: wp.array(dtype=real)
+        energy_loss: wp.array(dtype=real)
+        position: wp.array(dtype=vec3)
+        axis: wp.array(dtype=vec3)
+        velocity: wp.array(dtype=vec3)
+        angular_momentum: wp.array(dtype=vec3)
+
+    @wp.struct
+    class Pace:
+        """The time step [s], or if that is 0 the way per step [m] at impact velocity; and the way [m], at impact
+        velocity, after which a shot that has not ended is given up. `rows` of the trace belong to each shot."""
+
+        time_step: wp.float64
+        way: wp.float64
+        longest_way: wp.float64
+        rows: wp.int32
+
+    @wp.func
+    def line_of_flight(obliquity: wp.float64, azimuth: wp.float64):
+        sine = wp.sin(obliquity)
+        return wp.vec3d(wp.cos(obliquity), sine * wp.cos(azimuth), sine * wp.sin(azimuth))
+
+    @wp.func
+    def attitude_of(axis: wp.vec3d):
+        """The shortest turn that takes the plate normal to the axis (axis_x > 0)."""
+        return wp.normalize(wp.quatd(wp.float64(0.0), -axis[2], axis[1], wp.float64(1.0) + axis[0]))
+
+    @wp.func
+    def foremost(surface: Surface, pose: Pose):
+        """How far the core reaches ahead of its centre of mass along x [m]."""
+        front = -surface.bounding_radius
+        for index in range(surface.rings):
+            ring = surfaces.ring_at(surface, pose, index, zero)
+            rim = ring.radius + wp.abs(ring.half_radial)
+            ahead = (ring.station * pose.axis[0]) + rim * surfaces.broadside(pose)
+            front = wp.max(front, ahead + wp.abs(ring.half_axial * pose.axis[0]))
+        return front
+
+    @wp.func
+    def launch_state(surface: Surface, body: Body, shots: Shots, shot: wp.int32):
+        """State with the foremost point at the front face, the centre of mass on the line through the hit."""
+        flight = line_of_flight(shots.obliquity[shot], shots.azimuth[shot])
+        yaw = wp.atan2(flight[1], flight[0]) + shots.yaw[shot]
+        pitch = wp.atan2(flight[2], flight[0]) + shots.pitch[shot]
+        axis = wp.normalize(wp.vec3d(wp.float64(1.0), wp.tan(yaw), wp.tan(pitch)))
+        turn = attitude_of(axis)
+        speed = shots.velocity[shot]
+        direction = vec3(real(flight[0]), real(flight[1]), real(flight[2]))
+        state = State()
+        state.attitude = quat(real(turn[0]), real(turn[1]), real(turn[2]), real(turn[3]))
+        state.velocity = real(speed) * direction
+        state.angular_momentum = (body.inertia_axial * real(shots.spin[shot])) * motion.axis_of(state.attitude)
+        pose = surfaces.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())
+        state.position = (-foremost(surface, pose) / direction[0]) * direction
+        return state
+
+    @wp.func
+    def ended(
+        surface: Surface,
+        body: Body,
+        state: State,
+        pose: Pose,
+        found: Footprint,
+        touched: wp.bool,
+        initial_energy: real,
+        thickness: real,
+    ):
+        """The status a core has reached, or RUNNING.
+
+        A core clear of the slab is gone once it moves away faster than its own rotation can bring any part of it back.
+        """
+        status = RUNNING
+        energy = motion.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
+        along = wp.dot(state.angular_momentum, pose.axis)
+        about_axis = half * along * along / body.inertia_axial
+        turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, pose.axis))
+        leaving = wp.abs(state.velocity[0])
+        beyond = wp.max(state.position[0] - thickness, -state.position[0])
+        gone = leaving > turning or beyond > surface.bounding_radius
+        if not wp.isfinite(energy):
+            status = NOT_FINITE
+        elif found.rear > thickness and state.velocity[0] > zero and gone:
+            status = wp.where(touched, PERFORATED, MISSED)
+        elif found.front < zero and state.velocity[0] < zero and gone:
+            status = wp.where(touched, RICOCHETED, MISSED)
+        elif touched and energy - about_axis < still * initial_energy:
+            status = ARRESTED
+        elif not found.inside:
+            status = LEFT_WINDOW
+        return status
+
+    @wp.func
+    def write_vec3(trace: wp.array2d(dtype=real), row: wp.int32, column: wp.int32, value: vec3):
+        for k in range(3):
+            trace[row, column + k] = value[k]
+
+    @wp.func
+    def record(trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, load: Load):
+        """One traced step, in the order of TRACE_COLUMNS: the state after its kick, and the load that made it."""
+        trace[row, 0] = time
+        write_vec3(trace, row, 1, state.position)
+        for k in range(4):
+            trace[row, 4 + k] = state.attitude[k]
+        write_vec3(trace, row, 8, state.velocity)
+        write_vec3(trace, row, 11, state.angular_momentum)
+        write_vec3(trace, row, 14, load.force)
+        write_vec3(trace, row, 17, load.moment)
+
+    def march(
+        # inputs
+        first: wp.int32,
+        slots: wp.int32,
+        order: wp.array(dtype=wp.int32),
+        surface: Surface,
+        body: Body,
+        plate: Plate,
+        law: Law,
+        shots: Shots,
+        pace: Pace,
+        # scratch
+        fields: Fields,
+        # outputs
+        outcomes: Outcomes,
+        trace: wp.array2d(dtype=real),
+    ):
+        """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots."""
+        shot = order[first + wp.tid()]
+        speed = shots.velocity[shot]
+        dt = real(pace.time_step)
+        if dt == zero:
+            dt = real(pace.way / speed)
+        max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
+        law.onset = wp.min(law.onset_jump * dt, law.onset_limit * real(speed))
+        window = grid.open_window(plate, fields, wp.tid() % slots, shots.hit_y[shot], shots.hit_z[shot])
+        state = launch_state(surface, body, shots, shot)
+        axis = motion.axis_of(state.attitude)
+        initial_energy = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+        # Positions are those of mid-step from here on: kicks at mid-step, exact drifts between them.
+        state = motion.drift(body, state, half * dt)
+        status = int(RUNNING)
+        touched = bool(False)
+        contact_steps = int(0)
+        step = int(0)
+        while status == RUNNING and step < max_steps:
+            omega = motion.angular_velocity(body, motion.axis_of(state.attitude), state.angular_momentum)
+            pose = surfaces.pose_of(surface, state.position, state.attitude, state.velocity, omega)
+            found = contacts.footprint_of(surface, plate, fields, window, pose, dt)
+            status = ended(surface, body, state, pose, found, touched, initial_energy, plate.thickness)
+            if status == RUNNING:
+                load = Load()
+                if found.last_ring >= 0:
+                    load = scheme.load_on(surface, plate, law, fields, window, found, pose, dt)
+                    if load.touching:
+                        touched = True
+                        contact_steps += 1
+                        state = motion.kick(body, state, load, dt)
+                if wp.static(variant.traced):
+                    dv = state.velocity - pose.velocity
+                    dw = motion.angular_velocity(body, pose.axis, state.angular_momentum) - omega
+                    mean = motion.mean_load(load, dv, dw)
+                    record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, mean)
+                state = motion.drift(body, state, dt)
+                step += 1
+        if status == RUNNING:
+            status = UNFINISHED
+        axis = motion.axis_of(state.attitude)
+        outcomes.status[shot] = status
+        outcomes.steps[shot] = step
+        outcomes.contact_duration[shot] = real(contact_steps) * dt
+        outcomes.energy_loss[shot] = initial_energy - motion.kinetic_energy(
+            body, axis, state.velocity, state.angular_momentum
+        )
+        outcomes.position[shot] = state.position
+        outcomes.axis[shot] = axis
+        outcomes.velocity[shot] = state.velocity
+        outcomes.angular_momentum[shot] = state.angular_momentum
+
+    return SimpleNamespace(
+        kernel=variant.kernel(march),
+        line_of_flight=line_of_flight,
+        Surface=Surface,
+        Body=Body,
+        Plate=Plate,
+        Fields=Fields,
+        Law=Law,
+        Shots=Shots,
+        Outcomes=Outcomes,
+        Pace=Pace,
+    )

@@ -1,0 +1,102 @@
+"""The paper's literal scheme (its eqs. 4 to 6): points, nearest nodes, β once per node and step.
+
+Kept because the published rows came from it. It has no limit in the time step or the grid (MODEL.md §4),
+has no condition on the direction of motion and may feed energy into the core.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import contact, core_surface, interaction, plate_grid, rigid_body
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of a literal step's load for one variant."""
+    real, vec3 = variant.real, variant.vec3
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
+    Surface, Pose, Plate, Fields = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Fields
+    Window, Law, Load = grid.Window, laws.Law, motion.Load
+    Footprint = contact.build(variant).Footprint
+
+    @wp.func
+    def outward_of(surface: Surface, pose: Pose, index: wp.int32):
+        return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
+
+    @wp.func
+    def node_under(fields: Fields, window: Window, point: vec3):
+        """Index of the nearest node."""
+        row = wp.int32(wp.floor((point[1] - window.y0) * window.per_y + half))
+        column = wp.int32(wp.floor((point[2] - window.z0) * window.per_z + half))
+        return window.home + row * fields.cells_z + column
+
+    @wp.func
+    def total_load(
+        surface: Surface, plate: Plate, law: Law, fields: Fields, window: Window, found: Footprint, pose: Pose, dt: real
+    ):
+        """Σ Y (−n + η t) dS over the points in the slab, t the meridian tangent towards the base."""
+        load = Load()
+        for index in range(found.first_ring, found.last_ring + 1):
+            ring = surfaces.ring_at(surface, pose, index, dt)
+            for j in range(surface.around):
+                outward = outward_of(surface, pose, j)
+                arm = ring.station * pose.axis + ring.radius * outward
+                point = pose.position + arm
+                if point[0] >= zero and point[0] <= plate.thickness:
+                    node = node_under(fields, window, point)
+                    normal = ring.normal_axial * pose.axis + ring.normal_radial * outward
+                    tangent = ring.normal_axial * outward - ring.normal_radial * pose.axis
+                    resistance = law.a0 * fields.material[node]
+                    force = (resistance * ring.area) * (law.friction * tangent - normal)
+                    load.touching = load.touching or fields.material[node] > zero
+                    load.force += force
+                    load.moment += wp.cross(arm, force)
+                    if wp.static(variant.degrades):
+                        fields.gain[node] = one
+        return load
+
+    @wp.func
+    def degrade(
+        surface: Surface,
+        plate: Plate,
+        fields: Fields,
+        window: Window,
+        found: Footprint,
+        pose: Pose,
+        factor: real,
+        dt: real,
+    ):
+        """Multiply every node that was touched in this step by β, once however many points share it (eq. 6)."""
+        for index in range(found.first_ring, found.last_ring + 1):
+            ring = surfaces.ring_at(surface, pose, index, dt)
+            for j in range(surface.around):
+                arm = ring.station * pose.axis + ring.radius * outward_of(surface, pose, j)
+                point = pose.position + arm
+                if point[0] >= zero and point[0] <= plate.thickness:
+                    node = node_under(fields, window, point)
+                    if fields.gain[node] > zero:
+                        fields.material[node] = fields.material[node] * factor
+                        fields.gain[node] = zero
+
+    @wp.func
+    def load_on(
+        surface: Surface,
+        plate: Plate,
+        law: Law,
+        fields: Fields,
+        window: Window,
+        found: Footprint,
+        pose: Pose,
+        dt: real,
+    ):
+        """The load over one step; touched nodes weaken. `law.decay_rate` carries β itself here."""
+        load = total_load(surface, plate, law, fields, window, found, pose, dt)
+        if wp.static(variant.degrades):
+            degrade(surface, plate, fields, window, found, pose, law.decay_rate, dt)
+        return load
+
+    return SimpleNamespace(load_on=load_on)

@@ -1,0 +1,172 @@
+"""Motion of a rigid body of revolution (MODEL.md §5; the paper's eqs. 1 and 3).
+
+The state carries the angular momentum in the plate frame rather than the angular velocity: between contacts
+it is constant, so a drift is exact for any time step and the rotational energy cannot creep.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the motion for one variant."""
+    real, vec3, mat33, quat = variant.real, variant.vec3, variant.mat33, variant.quat
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    tiny_angle = real(1.0e-4)
+
+    @wp.struct
+    class Body:
+        """Mass [kg] and principal moments of inertia [kg m²] of a core."""
+
+        mass: real
+        inertia_axial: real
+        inertia_transverse: real
+
+    @wp.struct
+    class State:
+        """Plate frame, origin at the hit point on the front face; SI."""
+
+        position: vec3
+        attitude: quat
+        velocity: vec3
+        angular_momentum: vec3
+
+    @wp.struct
+    class Load:
+        """Force [N], moment about the centre of mass [N m], and their resistance to a change of velocity.
+
+        The damping blocks are −∂(force, moment)/∂(velocity, angular velocity); `damped` tells whether they
+        are not all zero, and `touching` whether any surface touched material at all.
+        """
+
+        force: vec3
+        moment: vec3
+        damping_vv: mat33
+        damping_vw: mat33
+        damping_ww: mat33
+        damped: wp.bool
+        touching: wp.bool
+
+    @wp.func
+    def axis_of(attitude: quat):
+        """Unit vector along the core towards its nose."""
+        return wp.quat_rotate(attitude, vec3(one, zero, zero))
+
+    @wp.func
+    def angular_velocity(body: Body, axis: vec3, angular_momentum: vec3):
+        """ω = I⁻¹ L in the plate frame, I = I_t 1 + (I_a − I_t) a aᵀ."""
+        along = wp.dot(angular_momentum, axis) * axis
+        return along / body.inertia_axial + (angular_momentum - along) / body.inertia_transverse
+
+    @wp.func
+    def angular_momentum(body: Body, axis: vec3, omega: vec3):
+        """L = I ω in the plate frame."""
+        along = wp.dot(omega, axis) * axis
+        return body.inertia_axial * along + body.inertia_transverse * (omega - along)
+
+    @wp.func
+    def kinetic_energy(body: Body, axis: vec3, velocity: vec3, momentum: vec3):
+        """Translation and rotation [J]."""
+        omega = angular_velocity(body, axis, momentum)
+        return half * (body.mass * wp.dot(velocity, velocity) + wp.dot(momentum, omega))
+
+    @wp.func
+    def rotation(vector: vec3):
+        """Unit quaternion that turns by |vector| [rad] about it."""
+        angle = wp.length(vector)
+        scale = half
+        if angle > tiny_angle:
+            scale = wp.sin(half * angle) / angle
+        return quat(scale * vector[0], scale * vector[1], scale * vector[2], wp.cos(half * angle))
+
+    @wp.func
+    def own_rate(body: Body, axis: vec3, momentum: vec3):
+        """Rate about the axis within the precession: (L·a)(1/I_a − 1/I_t) [rad/s]."""
+        return wp.dot(momentum, axis) * (one / body.inertia_axial - one / body.inertia_transverse)
+
+    @wp.func
+    def turned(body: Body, axis: vec3, momentum: vec3, time: real):
+        """The axis after torque-free motion over a time: it precesses about L at |L|/I_t."""
+        return wp.quat_rotate(rotation((time / body.inertia_transverse) * momentum), axis)
+
+    @wp.func
+    def drift(body: Body, state: State, dt: real):
+        """Torque-free motion over dt, exact for any dt (the symmetric top)."""
+        momentum = state.angular_momentum
+        own = own_rate(body, axis_of(state.attitude), momentum)
+        precession = rotation((dt / body.inertia_transverse) * momentum)
+        roll = rotation(vec3(dt * own, zero, zero))
+        moved = State()
+        moved.position = state.position + dt * state.velocity
+        moved.attitude = wp.normalize(precession * state.attitude * roll)
+        moved.velocity = state.velocity
+        moved.angular_momentum = momentum
+        return moved
+
+    @wp.func
+    def velocity_change(body: Body, axis: vec3, load: Load, dt: real):
+        """Solve (M + dt D) Δu = dt F for Δu = (Δv, Δω): linearly implicit in the damping D."""
+        dv = (dt / body.mass) * load.force
+        dw = dt * angular_velocity(body, axis, load.moment)
+        if load.damped:
+            identity = wp.identity(3, dtype=real)
+            inertia = body.inertia_transverse * identity + (body.inertia_axial - body.inertia_transverse) * wp.outer(
+                axis, axis
+            )
+            vv = wp.inverse(body.mass * identity + dt * load.damping_vv)
+            vw = dt * load.damping_vw
+            schur = inertia + dt * load.damping_ww - wp.transpose(vw) * vv * vw
+            dw = wp.inverse(schur) * (dt * (load.moment - wp.transpose(load.damping_vw) * (vv * (dt * load.force))))
+            dv = vv * (dt * load.force - vw * dw)
+        return dv, dw
+
+    @wp.func
+    def kick(body: Body, state: State, load: Load, dt: real):
+        """Change the velocities by the load over dt, never raising the kinetic energy.
+
+        Every surface element takes power from the core, so the continuous energy cannot grow; where a finite
+        step would overshoot (a core coming to rest), the impulse is scaled back to the least energy
+        along its direction.
+        """
+        axis = axis_of(state.attitude)
+        omega = angular_velocity(body, axis, state.angular_momentum)
+        dv, dw = velocity_change(body, axis, load, dt)
+        dl = angular_momentum(body, axis, dw)
+        slope = body.mass * wp.dot(dv, state.velocity) + wp.dot(dl, omega)
+        curvature = body.mass * wp.dot(dv, dv) + wp.dot(dl, dw)
+        scale = one
+        if slope + curvature > zero:
+            scale = wp.max(zero, -slope / curvature)
+        kicked = State()
+        kicked.position = state.position
+        kicked.attitude = state.attitude
+        kicked.velocity = state.velocity + scale * dv
+        kicked.angular_momentum = state.angular_momentum + scale * dl
+        return kicked
+
+    @wp.func
+    def mean_load(load: Load, dv: vec3, dw: vec3):
+        """Force and moment averaged over a step that changed the velocities by (dv, dw): F − D Δu."""
+        mean = Load()
+        mean.force = load.force - load.damping_vv * dv - load.damping_vw * dw
+        mean.moment = load.moment - wp.transpose(load.damping_vw) * dv - load.damping_ww * dw
+        return mean
+
+    return SimpleNamespace(
+        Body=Body,
+        State=State,
+        Load=Load,
+        axis_of=axis_of,
+        angular_velocity=angular_velocity,
+        angular_momentum=angular_momentum,
+        kinetic_energy=kinetic_energy,
+        turned=turned,
+        drift=drift,
+        kick=kick,
+        mean_load=mean_load,
+    )

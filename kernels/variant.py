@@ -1,0 +1,57 @@
+"""What distinguishes one build of the kernels from another."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Any
+
+import warp as wp
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One specialisation of the device code; what a scene leaves out is not compiled.
+
+    Attributes:
+        double: float64 instead of float32.
+        nodal: the paper's literal scheme instead of the consistent law.
+        degrades: the plate weakens (β < 1).
+        rubs: there is friction (η > 0).
+        rate_dependent: the normal stress depends on the normal velocity (a1 or a2 > 0).
+        traced: the state after every step is recorded.
+    """
+
+    double: bool = False
+    nodal: bool = False
+    degrades: bool = True
+    rubs: bool = True
+    rate_dependent: bool = False
+    traced: bool = False
+
+    @property
+    def real(self) -> Any:
+        """The floating-point type of positions, velocities and fields."""
+        return wp.float64 if self.double else wp.float32
+
+    @cached_property
+    def vec3(self) -> Any:
+        return wp.types.vector(3, self.real)
+
+    @cached_property
+    def mat33(self) -> Any:
+        return wp.types.matrix((3, 3), self.real)
+
+    @cached_property
+    def quat(self) -> Any:
+        return wp.types.quaternion(self.real)
+
+    @property
+    def name(self) -> str:
+        """A legal identifier, unique to the variant."""
+        return "_".join(["variant", *(field.name for field in fields(self) if getattr(self, field.name))])
+
+    def kernel(self, function: Callable[..., None]) -> wp.Kernel:
+        """The launchable kernel of a device function, in a module of its own: what is not launched is not compiled."""
+        module = wp.get_module(f"{function.__module__}.{self.name}")
+        module.options["enable_backward"] = False
+        return wp.Kernel(function, key=function.__name__, module=module)

@@ -1,0 +1,233 @@
+"""From a scene to the arrays that the kernels read: rings of the core, tile of the plate, filter, time step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import psutil
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from warpimpact.scene import Core, Numerics, Plate
+
+Array = NDArray[np.float64]
+
+SUBSAMPLES = 16
+"""Points per cell and direction behind a material fraction."""
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """Numbers behind a named fidelity; lengths scale with the scene (MODEL.md §4's table)."""
+
+    patches_axial: int
+    patches_around: int
+    cells_per_length: float
+    """Cells per degradation length ℓ."""
+    travel: float
+    """Way per time step at impact velocity, as a share of the thickness of the plate, or of SLENDER times the
+    core's length where the plate is thicker than that."""
+    double: bool = False
+
+
+SLENDER = 1.0 / 7.0
+
+FIDELITIES = {
+    "draft": Fidelity(16, 32, 1.0, 0.2),
+    "standard": Fidelity(32, 64, 3.0, 0.2),
+    "reference": Fidelity(96, 192, 8.0, 0.05),
+}
+NODAL: dict[str, Any] = {
+    "patches_axial": 36,
+    "patches_around": 36,
+    "grid_spacing": 1.0e-5,
+    "time_step": 1.0e-6,
+}
+"""The paper's own resolution; its time step is the one that meets its rows (MODEL.md §4)."""
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Numerics with every choice made: SI. The time step is fixed, or follows from the way per step."""
+
+    nodal: bool
+    time_step: float | None
+    way: float
+    patches_axial: int
+    patches_around: int
+    grid_spacing: float
+    double: bool
+
+
+def resolve(numerics: Numerics, core: Core, plate: Plate) -> Resolution:
+    """Fill in what the numerics leave to fidelity and scheme."""
+    fidelity = FIDELITIES[numerics.fidelity]
+    defaults: dict[str, Any] = {
+        "time_step": None,
+        "patches_axial": fidelity.patches_axial,
+        "patches_around": fidelity.patches_around,
+        "grid_spacing": plate.degradation_length / fidelity.cells_per_length,
+    }
+    if numerics.scheme == "nodal":
+        defaults = NODAL
+    given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
+    return Resolution(
+        nodal=numerics.scheme == "nodal",
+        double=fidelity.double if numerics.precision is None else numerics.precision == "double",
+        way=fidelity.travel * min(plate.thickness, SLENDER * core.length),
+        **(defaults | given),
+    )
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Rings of patches from nose to base; arrays of shape [rings], SI (see kernels/core_surface.py)."""
+
+    station: Array
+    radius: Array
+    area_axial: Array
+    area_radial: Array
+    half_axial: Array
+    half_radial: Array
+
+
+def rings_of(core: Core, axial: int, around: int, *, discs: bool = True) -> Rings:
+    """Divide a core's surface into `axial` rings of the profile, and rings of the discs that close it.
+
+    Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the closed
+    surface sum to zero and the work of a straight shot is exact (MODEL.md §6.1).
+    """
+    stations = _stations(core, axial)
+    widest = core.length / axial
+    parts = [_profile_rings(core, stations)]
+    if discs:
+        nose, base = (float(r) for r in core.radius(np.array([0.0, core.length])))
+        parts = [
+            _disc_rings(0.0, nose, widest, facing=1.0),
+            *parts,
+            _disc_rings(core.length, base, widest, facing=-1.0),
+        ]
+    s, r, axial_area, radial_area, half_s, half_r = (np.concatenate(column) for column in zip(*parts, strict=True))
+    sector = 2.0 * np.pi / around
+    chord = 2.0 * np.sin(0.5 * sector)
+    return Rings(
+        station=core.mass_properties.centre_of_mass - s,
+        radius=r,
+        area_axial=axial_area * sector,
+        area_radial=radial_area * chord,
+        half_axial=-half_s,
+        half_radial=half_r,
+    )
+
+
+def _stations(core: Core, count: int) -> Array:
+    """Edges of the profile's rings: even, with every jump of the slope on an edge."""
+    knots = np.array([0.0, *core.breaks, core.length])
+    spans = np.diff(knots)
+    shares = np.maximum(1, np.round(count * spans / core.length)).astype(int)
+    edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
+    return np.append(np.concatenate(edges), core.length)
+
+
+def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
+    """Station, radius, ∫ r dr and ∫ r ds (per radian), half extents, of the rings between edges."""
+    low, high = edges[:-1], edges[1:]
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    inside = core.radius(middle[:, None] + half[:, None] * nodes)
+    r_low, r_high = core.radius(low), core.radius(high)
+    lateral = (inside * weights).sum(axis=1) * half
+    return middle, core.radius(middle), 0.5 * (r_high**2 - r_low**2), lateral, half, 0.5 * (r_high - r_low)
+
+
+def _disc_rings(station: float, radius: float, widest: float, *, facing: float) -> tuple[Array, ...]:
+    """The same of a disc that faces along the axis (+1 towards the nose)."""
+    count = int(np.ceil(radius / widest)) if radius > 0.0 else 0
+    edges = np.linspace(0.0, radius, count + 1)
+    low, high = edges[:-1], edges[1:]
+    nothing = np.zeros(count)
+    return (
+        np.full(count, station),
+        0.5 * (low + high),
+        facing * 0.5 * (high**2 - low**2),
+        nothing,
+        nothing,
+        0.5 * (high - low),
+    )
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One period of the pristine plate: material fractions, shape [cells_y, cells_z], cells of dy × dz [m]."""
+
+    material: Array
+    dy: float
+    dz: float
+
+
+def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
+    """Material fraction of every cell of one period; cell (0, 0) has its corner at the origin.
+
+    Cells are at most `spacing` wide and fit the period. `sharp` takes each cell's centre alone, as the
+    literal scheme does.
+
+    Raises:
+        MemoryError: the tile does not fit; the message is for a person.
+    """
+    period_y, period_z = plate.pattern.period
+    count_y, count_z = (max(1, int(np.ceil(p / spacing - 1e-9))) for p in (period_y, period_z))
+    dy, dz = period_y / count_y, period_z / count_z
+    needed, free = 2 * 8 * count_y * count_z, psutil.virtual_memory().available
+    if needed > free:
+        raise MemoryError(
+            f"numerics.grid_spacing: got {spacing:g} m, but the plate's period of {period_y:g} m x {period_z:g} m would "
+            f"take {needed / 2**30:.3g} GiB at that spacing, of {free / 2**30:.3g} GiB free"
+        )
+    samples = 1 if sharp else SUBSAMPLES
+    within = (np.arange(samples) + 0.5) / samples
+    y = (np.arange(count_y)[:, None] + within).reshape(-1) * dy
+    z = (np.arange(count_z)[:, None] + within).reshape(-1) * dz
+    material = np.empty((count_y, count_z))
+    for row in range(count_y):
+        solid = ~plate.pattern.is_hole(y[row * samples : (row + 1) * samples, None], z[None, :])
+        material[row] = solid.reshape(samples, count_z, samples).mean(axis=(0, 2))
+    return Tile(material, dy, dz)
+
+
+def tent_taps(length: float, cell: float) -> Array:
+    """Weights of the discrete filter that, after bilinear scattering, acts as the tent K of half-width ℓ.
+
+    For ℓ a multiple of the cell it is K itself at the nodes; else its half-width is adjusted so
+    that mass and second moment, ℓ²/6, stay exact. With ℓ below the cell nothing is left to filter.
+    """
+    if length <= cell * (1.0 + 1e-9):
+        return np.ones(1)
+
+    def taps(half_width: float) -> tuple[Array, Array]:
+        reach = int(np.ceil(half_width / cell - 1e-9)) - 1
+        offsets = cell * np.arange(-reach, reach + 1, dtype=np.float64)
+        weights: Array = np.asarray(1.0 - np.abs(offsets) / half_width)
+        return weights / weights.sum(), offsets
+
+    def excess(half_width: float) -> float:
+        weights, offsets = taps(half_width)
+        return float(weights @ offsets**2 + cell**2 / 6.0 - length**2 / 6.0)
+
+    ratio = length / cell
+    if abs(ratio - round(ratio)) < 1e-6:
+        return taps(round(ratio) * cell)[0]
+    return taps(brentq(excess, cell * 1.0001, length + cell))[0]
+
+
+ONSET = 0.1
+"""Onset speed of contact in units of what full contact of a wall as deep as the plate does in one step."""
+LARGEST_ONSET = 0.02
+"""Bound of the onset speed, as a share of the impact velocity."""
+
+
+def onset_jump(core: Core, plate: Plate, static_stress: float) -> float:
+    """Onset speed of contact per time step [m/s²]; positive, also for a plate without resistance."""
+    wall = 2.0 * core.max_radius * min(plate.thickness, core.length)
+    return max(ONSET * static_stress * wall / core.mass_properties.mass, 1.0)

@@ -1,0 +1,426 @@
+"""Arrays of shots in, arrays of outcomes out: device, windows, memory and threads."""
+
+from __future__ import annotations
+
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields
+from queue import SimpleQueue
+from typing import Any
+
+import numpy as np
+import psutil
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact import discretisation
+from warpimpact.kernels import free_flight, march
+from warpimpact.kernels.status import Status
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+Progress1 = Callable[[int], None]
+
+CPU_CHUNK = 32
+"""Shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
+CUDA_CHUNK = 65536
+MAX_DOUBLINGS = 6
+"""How often a shot that leaves its window is computed again in one twice as wide."""
+STEP_ALLOWANCE = 200
+"""How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+MEMORY_SHARE = 0.5
+"""Share of the free memory that scratch may take."""
+
+
+class DeviceError(RuntimeError):
+    """The device asked for is not there, or too small for the task; the message is for a person."""
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """How the shots ended: SI and radians, NaN where a value does not exist.
+
+    Attributes:
+        status: codes of `Status`, shape [shots].
+        residual_velocity: speed after contact [m/s], shape [shots]; 0 for an arrested core.
+        deflection: angle between residual velocity and line of fire [rad], shape [shots].
+        angular_velocity: after contact, plate frame [rad/s], shape [shots, 3].
+        energy_loss: kinetic energy lost [J], shape [shots].
+        contact_duration: time in contact [s], shape [shots].
+        tilt: angle between core axis and line of fire [rad], shape [shots, stand-offs]; likewise
+        pitch, yaw: projected angles of the axis [rad], and
+        total_yaw: angle between core axis and residual velocity [rad].
+    """
+
+    status: NDArray[np.int8]
+    residual_velocity: Array
+    deflection: Array
+    angular_velocity: Array
+    energy_loss: Array
+    contact_duration: Array
+    tilt: Array
+    pitch: Array
+    yaw: Array
+    total_yaw: Array
+
+
+def simulate(
+    core: Core,
+    plate: Plate,
+    shots: Shots,
+    *,
+    interaction: Interaction | None = None,
+    numerics: Numerics | None = None,
+    standoffs: Sequence[float] = (),
+    standoff_point: str = "centre_of_mass",
+    device: str = "auto",
+    progress: Progress | None = None,
+) -> Outcomes:
+    """Compute every shot on its own copy of the plate (MODEL.md §§1–5).
+
+    Args:
+        standoffs: distances behind the rear face [m], shape [stand-offs]; at least the core's bounding radius.
+        standoff_point: which point has to pass them: "centre_of_mass" or "nose".
+        device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
+        progress: called with (shots done, shots) as they come.
+
+    Raises:
+        DeviceError: the device is absent or out of memory.
+    """
+    task = _Task(core, plate, interaction or Interaction(), numerics or Numerics(), shots, find_device(device))
+    contact = task.march(progress or (lambda done, total: None))
+    return task.report(contact, np.asarray(standoffs, dtype=float), standoff_point)
+
+
+def trace(
+    core: Core,
+    plate: Plate,
+    shots: Shots,
+    *,
+    interaction: Interaction | None = None,
+    numerics: Numerics | None = None,
+) -> list[Array]:
+    """Histories of shots on the CPU: one array [steps, TRACE_COLUMNS] per shot (kernels/march.py)."""
+    task = _Task(
+        core,
+        plate,
+        interaction or Interaction(),
+        numerics or Numerics(),
+        shots,
+        find_device("cpu"),
+        traced=True,
+    )
+    contact = task.march(lambda done, total: None)
+    rows = task.history.numpy().reshape(len(shots), task.pace.rows, march.TRACE_COLUMNS)
+    return [row[:steps] for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
+
+
+def find_device(name: str) -> Any:
+    """The Warp device of a name; "auto" takes CUDA where there is one."""
+    _quieten()
+    if name == "auto":
+        return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
+    try:
+        return wp.get_device(name)
+    except (ValueError, RuntimeError):
+        present = ", ".join(str(d) for d in wp.get_devices())
+        raise DeviceError(f'device: got "{name}", which this machine lacks; allowed: auto, {present}') from None
+
+
+def _quieten() -> None:
+    """Start Warp without its banner, and without its word that there is no CUDA driver.
+
+    That word is no concern of who asked for no GPU, and Warp's native code writes it straight to file
+    descriptor 2; everything else written there is passed on.
+    """
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as aside:
+        os.dup2(aside.fileno(), 2)
+        try:
+            wp.init()
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            aside.seek(0)
+            for line in aside:
+                if b"find or load the NVIDIA CUDA driver" not in line:
+                    os.write(2, line)
+
+
+class _Task:
+    """One scene on one device, ready to march."""
+
+    def __init__(
+        self,
+        core: Core,
+        plate: Plate,
+        interaction: Interaction,
+        numerics: Numerics,
+        shots: Shots,
+        device: Any,
+        *,
+        traced: bool = False,
+    ) -> None:
+        self.core, self.plate, self.shots, self.device = core, plate, shots, device
+        self.resolution = discretisation.resolve(numerics, core, plate)
+        a0, a1, a2 = interaction.coefficients(plate)
+        self.variant = Variant(
+            double=self.resolution.double,
+            nodal=self.resolution.nodal,
+            degrades=plate.degradation < 1.0,
+            rubs=plate.shear_coefficient > 0.0,
+            rate_dependent=a1 > 0.0 or a2 > 0.0,
+            traced=traced,
+        )
+        self.stage = march.build(self.variant)
+        self.real = np.float64 if self.resolution.double else np.float32
+        self.tile = discretisation.tile_of(plate, self.resolution.grid_spacing, sharp=self.resolution.nodal)
+        self.surface = self._surface()
+        self.body = self._body()
+        self.device_plate = self._plate()
+        self.law = self._law(a0, a1, a2)
+        self.device_shots = self._shots()
+        self.pace = self._pace()
+        rows = len(shots) * self.pace.rows if traced else 0
+        self.history = wp.empty((rows, march.TRACE_COLUMNS), dtype=self.variant.real, device=device)
+
+    def _array(self, values: NDArray[Any], dtype: Any = None) -> Any:
+        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.variant.real, device=self.device)
+
+    def _surface(self) -> Any:
+        r = self.resolution
+        rings = discretisation.rings_of(self.core, r.patches_axial, r.patches_around, discs=not r.nodal)
+        azimuth = (np.arange(r.patches_around) + 0.5) * (2.0 * np.pi / r.patches_around)
+        surface = self.stage.Surface()
+        for name in ("station", "radius", "half_axial", "half_radial"):
+            setattr(surface, name, self._array(getattr(rings, name)))
+        area = np.hypot(rings.area_axial, rings.area_radial)
+        surface.area = self._array(area)
+        surface.normal_axial = self._array(rings.area_axial / area)
+        surface.normal_radial = self._array(rings.area_radial / area)
+        surface.cosine, surface.sine = self._array(np.cos(azimuth)), self._array(np.sin(azimuth))
+        surface.rings, surface.around = len(rings.station), r.patches_around
+        surface.bounding_radius = self.core.bounding_radius
+        return surface
+
+    def _body(self) -> Any:
+        properties, body = self.core.mass_properties, self.stage.Body()
+        body.mass = properties.mass
+        body.inertia_axial = properties.inertia_axial
+        body.inertia_transverse = properties.inertia_transverse
+        return body
+
+    def _plate(self) -> Any:
+        plate, tile = self.stage.Plate(), self.tile
+        plate.tile = self._array(tile.material.reshape(-1))
+        plate.tile_y, plate.tile_z = tile.material.shape
+        plate.dy, plate.dz = tile.dy, tile.dz
+        size = self.plate.size or (math.inf, math.inf)
+        plate.half_y, plate.half_z = 0.5 * size[0], 0.5 * size[1]
+        plate.thickness = self.plate.thickness
+        length = 0.0 if self.resolution.nodal else self.plate.degradation_length
+        taps_y, taps_z = (discretisation.tent_taps(length, cell) for cell in (tile.dy, tile.dz))
+        plate.taps_y, plate.taps_z = self._array(taps_y), self._array(taps_z)
+        plate.reach_y, plate.reach_z = len(taps_y) // 2, len(taps_z) // 2
+        return plate
+
+    def _law(self, a0: float, a1: float, a2: float) -> Any:
+        law, plate = self.stage.Law(), self.plate
+        law.a0, law.a1, law.a2 = a0, a1, a2
+        law.friction = plate.shear_coefficient
+        law.onset_jump = discretisation.onset_jump(self.core, plate, a0)
+        law.onset_limit = discretisation.LARGEST_ONSET
+        if self.resolution.nodal:
+            law.decay_rate = plate.degradation
+        else:
+            # β = 0 takes all resistance at the first touch: a rate beyond any exposure, yet finite (0 × it is 0).
+            fastest = 1.0e30
+            log = math.log(plate.degradation) if plate.degradation > 0.0 else -fastest
+            law.decay_rate = max(log / plate.degradation_interval, -fastest)
+        return law
+
+    def _shots(self) -> Any:
+        shots = self.stage.Shots()
+        for field in fields(self.shots):
+            setattr(shots, field.name, self._array(getattr(self.shots, field.name), dtype=wp.float64))
+        return shots
+
+    def _pace(self) -> Any:
+        pace, passage = self.stage.Pace(), self.plate.thickness + 2.0 * self.core.bounding_radius
+        pace.time_step = self.resolution.time_step or 0.0
+        pace.way = self.resolution.way
+        pace.longest_way = STEP_ALLOWANCE * passage
+        shortest = min(pace.way, self.shots.velocity.min() * (self.resolution.time_step or math.inf))
+        pace.rows = math.ceil(pace.longest_way / shortest) + 1
+        return pace
+
+    def march(self, progress: Progress) -> Any:
+        """March all shots; those that leave their window again in wider ones."""
+        count = len(self.shots)
+        outcomes = self._empty(self.stage.Outcomes, (count,))
+        cells = self._window_cells()
+        pending = np.arange(count)
+        for _ in range(MAX_DOUBLINGS):
+            self._march_some(pending, cells, outcomes, _after(count - len(pending), count, progress))
+            pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
+            if not len(pending) or not self._fits(2 * cells[0], 2 * cells[1]):
+                break
+            cells = (2 * cells[0], 2 * cells[1])
+        progress(count, count)
+        return outcomes
+
+    def report(self, contact: Any, standoffs: Array, standoff_point: str) -> Outcomes:
+        """Free flight to the stand-offs, and everything back on the host."""
+        count = len(self.shots)
+        flight = free_flight.build(self.variant)
+        report = self._empty(flight.Report, (count,), (count, len(standoffs)))
+        ahead = self.core.mass_properties.centre_of_mass if standoff_point == "nose" else 0.0
+        planes = self._array(self.plate.thickness + standoffs)
+        wp.launch(
+            flight.kernel,
+            count,
+            inputs=[self.body, self.device_shots, contact, planes, ahead],
+            outputs=[report],
+            device=self.device,
+        )
+        values = {f.name: _host(getattr(report, f.name)) for f in fields(Outcomes) if f.name != "status"}
+        return Outcomes(status=contact.status.numpy().astype(np.int8), **values)
+
+    def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
+        """A struct of arrays, each of the shape that has its number of dimensions."""
+        filled = struct()
+        for name, variable in struct.vars.items():
+            array = variable.type
+            shape = shapes[array.ndim - 1]
+            setattr(filled, name, wp.empty(shape, dtype=array.dtype, device=self.device))
+        return filled
+
+    def _window_cells(self) -> tuple[int, int]:
+        """Cells of a window that holds the footprint of a core that keeps its attitude through the plate."""
+        shots, plate = self.shots, self.plate
+        steepest = float(shots.obliquity.max())
+        turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
+        half = (
+            1.3 * self.core.max_radius / math.cos(steepest)
+            + plate.thickness * math.tan(steepest)
+            + self.core.bounding_radius * turned
+            + plate.degradation_length
+        )
+        reach = max(self.device_plate.reach_y, self.device_plate.reach_z)
+        cells_y, cells_z = (2 * (math.ceil(half / cell) + reach + 3) for cell in (self.tile.dy, self.tile.dz))
+        return cells_y, cells_z
+
+    def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
+        arrays = 1 if not self.variant.degrades else 2 if self.resolution.nodal else 4
+        return arrays * cells_y * cells_z * np.dtype(self.real).itemsize
+
+    def _slots(self, cells_y: int, cells_z: int) -> int:
+        """Slots of scratch that the device's free memory and 32-bit indices allow."""
+        free = psutil.virtual_memory().available if self.device.is_cpu else self.device.free_memory
+        wanted = _threads() if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
+        affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
+        return min(wanted, affordable, (2**31 - 1) // (cells_y * cells_z))
+
+    def _fits(self, cells_y: int, cells_z: int) -> bool:
+        return self._slots(cells_y, cells_z) > 0
+
+    def _fields(self, slots: int, cells_y: int, cells_z: int) -> Any:
+        scratch = self.stage.Fields()
+        scratch.cells_y, scratch.cells_z = cells_y, cells_z
+        size, degrades, nodal = slots * cells_y * cells_z, self.variant.degrades, self.resolution.nodal
+        needed = {
+            "material": True,
+            "gain": degrades,
+            "exposure": degrades and not nodal,
+            "filtered": degrades and not nodal,
+        }
+        for name, used in needed.items():
+            setattr(scratch, name, wp.empty(size if used else 0, dtype=self.variant.real, device=self.device))
+        return scratch
+
+    def _march_some(self, which: NDArray[np.int64], cells: tuple[int, int], outcomes: Any, progress: Progress1) -> None:
+        """March the shots of the given indices in windows of one size."""
+        slots = self._slots(*cells)
+        if slots < 1:
+            need = self._slot_bytes(*cells) / 2**20
+            raise DeviceError(f"device: {self.device} lacks the {need:.0f} MiB that one window of the plate takes")
+        self.stage.kernel.module.load(self.device)
+        order = self._array(which, dtype=wp.int32)
+
+        def launch(scratch: Any, slots: int, first: int, count: int) -> int:
+            wp.launch(
+                self.stage.kernel,
+                count,
+                inputs=[
+                    first,
+                    slots,
+                    order,
+                    self.surface,
+                    self.body,
+                    self.device_plate,
+                    self.law,
+                    self.device_shots,
+                    self.pace,
+                    scratch,
+                ],
+                outputs=[outcomes, self.history],
+                device=self.device,
+            )
+            return count
+
+        if self.device.is_cpu:
+            self._on_threads(launch, slots, cells, len(which), progress)
+        else:
+            scratch = self._fields(slots, *cells)
+            for first, count in _chunks(len(which), slots):
+                launch(scratch, slots, first, count)
+                wp.synchronize_device(self.device)
+                progress(first + count)
+
+    def _on_threads(
+        self, launch: Callable[..., int], slots: int, cells: tuple[int, int], total: int, progress: Progress1
+    ) -> None:
+        """Share chunks out over threads, each with one slot: a CPU launch runs its shots one after another on
+        the calling thread, without the interpreter lock."""
+        idle = SimpleQueue[Any]()
+        for _ in range(slots):
+            idle.put(self._fields(1, *cells))
+
+        def work(chunk: tuple[int, int]) -> int:
+            scratch = idle.get()
+            try:
+                return launch(scratch, 1, *chunk)
+            finally:
+                idle.put(scratch)
+
+        done = 0
+        with ThreadPoolExecutor(slots) as pool:
+            for count in pool.map(work, _chunks(total, CPU_CHUNK)):
+                done += count
+                progress(done)
+
+
+def _after(finished: int, total: int, progress: Progress) -> Progress1:
+    """Progress of what comes after the shots already finished."""
+    return lambda done: progress(finished + done, total)
+
+
+def _chunks(total: int, size: int) -> Iterator[tuple[int, int]]:
+    """(first, count) of consecutive chunks."""
+    return ((first, min(size, total - first)) for first in range(0, total, size))
+
+
+def _threads() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _host(array: Any) -> Array:
+    values: Array = array.numpy().astype(np.float64)
+    return values
