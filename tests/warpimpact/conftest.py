@@ -1,0 +1,82 @@
+"""Results made by hand: shots and outcomes whose values a test knows."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import results
+from warpimpact.kernels.status import Status
+
+STANDOFFS = np.array([0.05, 0.13])
+PERIOD = (16e-3, 8e-3)
+SQUARE_HOLE = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0], [-2.0, -2.0]]) * 1e-3
+
+ResultMaker = Callable[..., xarray.Dataset]
+
+
+def scattered_hits(count: int) -> np.ndarray:
+    """Hit points over the unit cell [m], shape (count, 2)."""
+    return (np.random.default_rng(5).random((count, 2)) - 0.5) * PERIOD
+
+
+def shots_at(hits: np.ndarray) -> SimpleNamespace:
+    n = len(hits)
+    return SimpleNamespace(
+        hit_y=hits[:, 0],
+        hit_z=hits[:, 1],
+        velocity=np.full(n, 825.0),
+        obliquity=np.full(n, np.pi / 6),
+        azimuth=np.full(n, np.pi / 2),
+        pitch=np.full(n, -np.pi / 180),
+        yaw=np.full(n, np.pi / 90),
+        spin=np.full(n, 1.7e4),
+    )
+
+
+def outcomes_of(status: np.ndarray) -> SimpleNamespace:
+    """Outcomes with NaN for what a status does not have; values differ from hit to hit."""
+    n = len(status)
+    ramp = np.linspace(0.1, 1.0, n)
+    moves = np.isin(status, [Status.PERFORATED, Status.MISSED, Status.RICOCHETED])
+    behind = np.isin(status, [Status.PERFORATED, Status.MISSED])[:, None]
+    angles = np.where(behind, ramp[:, None] * [0.5, 1.5], np.nan)
+    return SimpleNamespace(
+        status=status.astype(np.int8),
+        residual_velocity=np.where(moves, 700.0 + 100.0 * ramp, 0.0),
+        deflection=np.where(moves, 0.1 * ramp, np.nan),
+        angular_velocity=np.stack([0.0 * ramp, 1e3 * ramp, -2e3 * ramp], axis=-1),
+        energy_loss=400.0 * ramp,
+        contact_duration=5e-5 * ramp,
+        tilt=angles,
+        pitch=angles - 0.2,
+        yaw=0.2 - angles,
+        total_yaw=angles,
+    )
+
+
+@pytest.fixture
+def make_result() -> ResultMaker:
+    """A function of status (or of a count of perforating hits) that builds the Dataset."""
+
+    def make(status: Any = 4, hits: np.ndarray | None = None, outlines: Any = (SQUARE_HOLE,)) -> xarray.Dataset:
+        status = np.zeros(status, np.int8) if np.ndim(status) == 0 else np.asarray(status)
+        hits = scattered_hits(len(status)) if hits is None else hits
+        return results.to_dataset(
+            shots_at(hits),
+            outcomes_of(status),
+            standoffs=STANDOFFS,
+            outlines=outlines,
+            period=PERIOD,
+            attributes={
+                "title": "a test",
+                "history": "2026-01-01T00:00:00Z",
+                "campaign": "[core]\n",
+                "seed": 7,
+            },
+        )
+
+    return make

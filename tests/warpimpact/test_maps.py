@@ -1,0 +1,286 @@
+"""Maps, rendered: the right colour at the right place, to scale, with axes that say what is shown."""
+
+import io
+import warnings
+
+import numpy as np
+import pytest
+from matplotlib import colormaps
+from matplotlib.colors import to_rgb
+from PIL import Image
+
+from warpimpact.kernels.status import Status
+from warpimpact.plotting import hit_map, maps, overview, save_maps, status_map
+
+MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
+GREY = (0.62, 0.62, 0.62)
+
+
+@pytest.fixture
+def covered(make_result):
+    """Enough hits of four statuses to cover the cell, with a hole in its middle."""
+    return make_result(np.tile(MIXED, 128))
+
+
+@pytest.fixture
+def perforated(make_result):
+    return make_result(512)
+
+
+class Picture:
+    """A figure as a person sees it: colours at points of its first map [mm]."""
+
+    def __init__(self, figure):
+        buffer = io.BytesIO()
+        figure.savefig(buffer, dpi=figure.dpi)
+        self.pixels = np.asarray(Image.open(buffer).convert("RGB")) / 255.0
+        self.axes = figure.axes[0]
+
+    def colour(self, y, z):
+        column, row = self.axes.transData.transform((y, z))
+        return self.pixels[len(self.pixels) - 1 - int(row), int(column)]
+
+
+def legend_texts(axes):
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def nearest_hit(dataset, y, z):
+    """Brute force: the hit nearest to a point [m] of the periodic plate."""
+    period = dataset.attrs["plate_period"]
+    offset = np.stack([dataset["hit_y"] - y, dataset["hit_z"] - z], axis=-1)
+    return np.argmin(np.hypot(*(offset - period * np.round(offset / period)).T))
+
+
+def clear_points(dataset, count):
+    """Pixel centres [m] well away from the outline of the hole: (y, z) pairs."""
+    columns, rows = np.random.default_rng(2).integers([400, 200], size=(count, 2)).T
+    y, z = (columns + 0.5) / 400 * 16e-3 - 8e-3, (rows + 0.5) / 200 * 8e-3 - 4e-3
+    clear = np.abs(np.maximum(np.abs(y), np.abs(z)) - 2e-3) > 0.3e-3
+    return list(zip(y[clear], z[clear], strict=True))
+
+
+def test_every_pixel_has_the_value_of_the_nearest_hit_across_the_edges(perforated):
+    image = hit_map(perforated, "energy_loss").axes[0].images[0].get_array()
+    assert image.shape == (200, 400)
+    columns, rows = np.meshgrid([0, 1, 57, 200, 398, 399], [0, 3, 100, 199])
+    for column, row in zip(columns.flat, rows.flat, strict=True):
+        y, z = (column + 0.5) / 400 * 16e-3 - 8e-3, (row + 0.5) / 200 * 8e-3 - 4e-3
+        assert image[row, column] == perforated["energy_loss"].values[nearest_hit(perforated, y, z)]
+
+
+def test_rendered_colours_are_those_of_the_colour_bar(perforated):
+    figure = hit_map(perforated, "energy_loss")
+    picture, norm = Picture(figure), figure.axes[0].images[0].norm
+    points = clear_points(perforated, 40)
+    matches = 0
+    for y, z in points:
+        value = perforated["energy_loss"].values[nearest_hit(perforated, y, z)]
+        expected = colormaps["viridis"](norm(value))[:3]
+        matches += np.allclose(picture.colour(y * 1e3, z * 1e3), expected, atol=0.02)
+    assert matches >= 0.9 * len(points)  # a screen pixel on a seam may take the neighbour's colour
+    assert (norm.vmin, norm.vmax) == pytest.approx((40.0, 400.0))
+
+
+@pytest.mark.parametrize("variable", ["residual_velocity", "deflection", "tilt"])
+def test_hits_that_did_not_pass_the_plate_are_grey(covered, variable):
+    figure = hit_map(covered, variable)
+    picture = Picture(figure)
+    points = clear_points(covered, 60)
+    status = covered["status"].values[[nearest_hit(covered, y, z) for y, z in points]]
+    grey = [np.allclose(picture.colour(y * 1e3, z * 1e3), GREY, atol=0.01) for y, z in points]
+    stopped = np.isin(status, [Status.ARRESTED, Status.RICOCHETED])
+    assert np.mean(grey == stopped) >= 0.9
+    assert legend_texts(figure.axes[0]) == ["arrested, ricocheted", "edge of hole"]
+
+
+def test_no_grey_entry_when_every_hit_has_a_value(perforated):
+    assert legend_texts(hit_map(perforated, "tilt").axes[0]) == ["edge of hole"]
+
+
+def test_map_is_to_scale_in_millimetres(perforated):
+    figure = hit_map(perforated, "residual_velocity")
+    axes, _ = figure.axes
+    figure.draw_without_rendering()
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("hit y [mm]", "hit z [mm]")
+    np.testing.assert_allclose([*axes.get_xlim(), *axes.get_ylim()], [-8.0, 8.0, -4.0, 4.0])
+    np.testing.assert_allclose(axes.images[0].get_extent(), [-8.0, 8.0, -4.0, 4.0])
+    origin, right, up = axes.transData.transform([(0, 0), (1, 0), (0, 1)])
+    assert right[0] - origin[0] == pytest.approx(up[1] - origin[1])
+    assert axes.get_aspect() == 1.0
+
+
+@pytest.mark.parametrize(
+    ("variable", "label"),
+    [
+        ("residual_velocity", "residual velocity [m/s]"),
+        ("tilt", "tilt [°]"),
+        ("energy_loss", "energy loss [J]"),
+        ("contact_duration", "contact duration [µs]"),
+    ],
+)
+def test_colour_bar_states_quantity_and_unit(perforated, variable, label):
+    assert hit_map(perforated, variable).axes[1].get_ylabel() == label
+
+
+def test_contact_duration_is_drawn_in_microseconds(perforated):
+    norm = hit_map(perforated, "contact_duration").axes[0].images[0].norm
+    assert (norm.vmin, norm.vmax) == pytest.approx((5.0, 50.0))
+
+
+def test_titles_name_campaign_quantity_and_shots(perforated):
+    figure = hit_map(perforated, "tilt", 0.05)
+    assert figure.get_suptitle() == "a test"
+    assert figure.axes[0].get_title() == "tilt, 50 mm behind the plate\nangle between core axis and line of fire"
+    assert figure.get_supxlabel() == "512 hits, 825 m/s, obliquity 30°; seen from behind the plate"
+
+
+def test_standoff_is_the_largest_unless_given(perforated):
+    last, first = hit_map(perforated, "tilt"), hit_map(perforated, "tilt", 0.05)
+    assert last.axes[0].images[0].norm.vmax == pytest.approx(np.degrees(1.5))
+    assert first.axes[0].images[0].norm.vmax == pytest.approx(np.degrees(0.5))
+
+
+@pytest.mark.parametrize("variable", ["pitch", "yaw"])
+def test_signed_angles_have_a_neutral_zero(perforated, variable):
+    norm = hit_map(perforated, variable).axes[0].images[0].norm
+    assert norm.vmax == pytest.approx(np.degrees(1.3))
+    assert norm.vmin == -norm.vmax
+
+
+@pytest.mark.parametrize("variable", ["energy_loss", "yaw"])
+def test_hole_outline_is_white_between_black_on_any_colour(perforated, variable):
+    figure = hit_map(perforated, variable)
+    (line,) = figure.axes[0].lines
+    np.testing.assert_allclose(line.get_xdata(), perforated["outline_y"] * 1e3)
+    np.testing.assert_allclose(line.get_ydata(), perforated["outline_z"] * 1e3)
+    figure.set_dpi(400)
+    picture = Picture(figure)
+    for z in np.linspace(-1.5, 1.5, 9):
+        across = [picture.colour(y, z).mean() for y in np.linspace(1.93, 2.07, 41)]
+        assert max(across[15:26]) > 0.95
+        assert min(across[:15]) < 0.05
+        assert min(across[26:]) < 0.05
+
+
+def test_solid_plate_has_no_outline(make_result):
+    axes = hit_map(make_result(512, outlines=()), "tilt").axes[0]
+    assert len(axes.lines) == 0
+    assert axes.get_legend() is None
+
+
+def test_few_hits_are_points(make_result):
+    dataset = make_result(np.tile(MIXED, 10))
+    figure = hit_map(dataset, "residual_velocity")
+    axes = figure.axes[0]
+    assert len(axes.images) == 0
+    (points,) = axes.collections
+    np.testing.assert_allclose(points.get_offsets(), np.stack([dataset["hit_y"], dataset["hit_z"]], -1) * 1e3)
+    expected = np.where(np.isin(dataset["status"], [0, 3]), dataset["residual_velocity"], np.nan)
+    np.testing.assert_array_equal(np.ma.filled(points.get_array(), np.nan), expected)
+    picture = Picture(figure)
+    stopped = np.flatnonzero(np.isnan(expected))
+    colours = [picture.colour(*points.get_offsets()[hit]) for hit in stopped]
+    assert np.mean(np.isclose(colours, GREY, atol=0.01).all(axis=1)) > 0.7  # some lie under other points
+
+
+def test_hits_that_leave_gaps_are_points(make_result):
+    line = np.stack([np.linspace(-7e-3, 7e-3, 200), np.zeros(200)], axis=-1)
+    axes = hit_map(make_result(200, hits=line), "tilt").axes[0]
+    assert len(axes.images) == 0
+    assert len(axes.collections[0].get_offsets()) == 200
+
+
+def test_hits_outside_the_cell_stay_in_view(make_result):
+    hits = np.random.default_rng(1).uniform(-0.011, 0.012, (500, 2))
+    axes = hit_map(make_result(500, hits=hits), "tilt").axes[0]
+    assert len(axes.images) == 0
+    np.testing.assert_allclose(axes.get_xlim(), [hits[:, 0].min() * 1e3, hits[:, 0].max() * 1e3])
+    np.testing.assert_allclose(axes.get_ylim(), [hits[:, 1].min() * 1e3, hits[:, 1].max() * 1e3])
+
+
+def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered):
+    figure = status_map(covered)
+    entries = figure.axes[0].get_legend()
+    assert legend_texts(figure.axes[0]) == [
+        "perforated 25.0%",
+        "arrested 25.0%",
+        "ricocheted 25.0%",
+        "missed 25.0%",
+        "edge of hole",
+    ]
+    colours = [patch.get_facecolor()[:3] for patch in entries.get_patches()]
+    picture = Picture(figure)
+    points = clear_points(covered, 60)
+    matches = [
+        np.allclose(
+            picture.colour(y * 1e3, z * 1e3),
+            colours[covered["status"].values[nearest_hit(covered, y, z)]],
+            atol=0.01,
+        )
+        for y, z in points
+    ]
+    assert np.mean(matches) >= 0.9
+
+
+def test_every_status_has_its_own_colour():
+    assert len({to_rgb(colour) for colour in maps._STATUS_COLOURS}) == len(Status)
+
+
+def test_overview_shows_four_aligned_maps(covered):
+    figure = overview(covered)
+    titles = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
+    assert titles == ["residual velocity", "deflection", "tilt, 130 mm behind the plate", "status"]
+    boxes = [axes.get_position().bounds for axes in figure.axes if axes.get_title()]
+    np.testing.assert_allclose([box[2:] for box in boxes], [boxes[0][2:]] * 4)
+    assert boxes[0][0] == boxes[2][0]
+    assert boxes[2][1] == boxes[3][1]
+
+
+@pytest.mark.parametrize("status", [Status.PERFORATED, Status.ARRESTED, Status.NOT_FINITE])
+def test_uniform_results_draw_without_complaint(make_result, status):
+    dataset = make_result([status] * 100)
+    dataset["residual_velocity"][:] = 764.0
+    dataset["tilt"][:] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        picture = Picture(overview(dataset))
+    assert np.allclose(picture.colour(5.0, 3.0), GREY, atol=0.01) == (status != Status.PERFORATED)
+
+
+def test_no_colour_bar_without_values(make_result):
+    assert len(hit_map(make_result([Status.ARRESTED] * 100), "tilt").axes) == 1
+
+
+def test_rounding_is_not_drawn_as_a_pattern(make_result):
+    dataset = make_result(100)
+    dataset["residual_velocity"][:] = 764.0 + 1e-10 * np.arange(100)
+    norm = hit_map(dataset, "residual_velocity").axes[0].images[0].norm
+    assert norm.vmin < 760.0 or norm.vmin == norm.vmax
+
+
+@pytest.mark.parametrize("variable", ["status", "angular_velocity", "outline_y", "hit_y", "velocity"])
+def test_what_cannot_be_mapped_is_named(perforated, variable):
+    with pytest.raises(ValueError, match=f'"{variable}" cannot be mapped; choose one of .*residual_velocity'):
+        hit_map(perforated, variable)
+
+
+def test_an_absent_standoff_is_named(perforated):
+    with pytest.raises(ValueError, match=r"no stand-off of 0\.2 m; it has 0\.05, 0\.13 m"):
+        hit_map(perforated, "tilt", 0.2)
+
+
+def test_save_maps_writes_one_png_per_map(covered, tmp_path):
+    paths = save_maps(covered, tmp_path / "maps", "plate")
+    assert [path.name for path in paths] == [
+        "plate_overview.png",
+        "plate_status.png",
+        "plate_residual_velocity.png",
+        "plate_deflection.png",
+        "plate_tilt_50mm.png",
+        "plate_tilt_130mm.png",
+    ]
+    for path in paths:
+        with Image.open(path) as image:
+            assert image.format == "PNG"
+            assert np.asarray(image.convert("L")).std() > 10.0

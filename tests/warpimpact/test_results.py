@@ -1,0 +1,210 @@
+"""The Dataset contract, and files that are whole or not there."""
+
+import dataclasses
+import os
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import results
+from warpimpact.kernels.status import Status
+from warpimpact.scene import Shots
+from warpimpact.simulate import Outcomes
+
+CONTRACT = {
+    "hit_y": (("hit",), "m"),
+    "hit_z": (("hit",), "m"),
+    "standoff": (("standoff",), "m"),
+    "axis": (("axis",), "1"),
+    "impact_velocity": (("hit",), "m s-1"),
+    "obliquity": (("hit",), "degree"),
+    "azimuth": (("hit",), "degree"),
+    "impact_pitch": (("hit",), "degree"),
+    "impact_yaw": (("hit",), "degree"),
+    "spin": (("hit",), "rad s-1"),
+    "status": (("hit",), "1"),
+    "residual_velocity": (("hit",), "m s-1"),
+    "deflection": (("hit",), "degree"),
+    "angular_velocity": (("hit", "axis"), "rad s-1"),
+    "energy_loss": (("hit",), "J"),
+    "contact_duration": (("hit",), "s"),
+    "tilt": (("hit", "standoff"), "degree"),
+    "pitch": (("hit", "standoff"), "degree"),
+    "yaw": (("hit", "standoff"), "degree"),
+    "total_yaw": (("hit", "standoff"), "degree"),
+    "outline_y": (("vertex",), "m"),
+    "outline_z": (("vertex",), "m"),
+}
+
+
+def test_variables_are_those_of_the_contract(make_result):
+    dataset = make_result()
+    assert {name: (array.dims, array.attrs["units"]) for name, array in dataset.variables.items()} == CONTRACT
+    assert set(dataset.coords) == {"hit_y", "hit_z", "standoff", "axis"}
+    assert all(array.attrs["long_name"] for array in dataset.variables.values())
+    assert dataset["axis"].values.tolist() == ["x", "y", "z"]
+
+
+def test_numbers_are_double_and_status_is_a_byte(make_result):
+    dataset = make_result()
+    types = {name: array.dtype for name, array in dataset.variables.items() if name not in {"status", "axis"}}
+    assert set(types.values()) == {np.dtype(np.float64)}
+    assert dataset["status"].dtype == np.int8
+
+
+def test_angles_become_degrees_and_the_rest_stays_si(make_result):
+    dataset = make_result()
+    np.testing.assert_allclose(dataset["obliquity"], 30.0, rtol=1e-15)
+    np.testing.assert_allclose(dataset["azimuth"], 90.0, rtol=1e-15)
+    np.testing.assert_allclose(dataset["impact_pitch"], -1.0, rtol=1e-15)
+    np.testing.assert_allclose(dataset["impact_yaw"], 2.0, rtol=1e-15)
+    np.testing.assert_allclose(dataset["deflection"][-1], np.degrees(0.1), rtol=1e-15)
+    np.testing.assert_allclose(dataset["tilt"][-1], np.degrees([0.5, 1.5]), rtol=1e-15)
+    assert dataset["spin"].values.tolist() == [1.7e4] * 4
+    assert dataset["impact_velocity"].values.tolist() == [825.0] * 4
+    assert dataset["angular_velocity"].values[-1].tolist() == [0.0, 1e3, -2e3]
+
+
+def test_what_does_not_exist_stays_nan_in_the_file(make_result, tmp_path):
+    path = tmp_path / "out.nc"
+    results.write(make_result([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]), path)
+    with xarray.open_dataset(path) as file:
+        for name in ("tilt", "pitch", "yaw", "total_yaw"):
+            assert np.isnan(file[name].values).all(axis=1).tolist() == [False, True, True, False]
+        assert np.isnan(file["deflection"].values).tolist() == [False, True, False, False]
+
+
+def test_status_carries_its_flags(make_result, tmp_path):
+    path = tmp_path / "out.nc"
+    results.write(make_result(), path)
+    with netCDF4.Dataset(path) as file:
+        attributes = file["status"].__dict__
+    assert attributes["flag_values"].dtype == np.int8
+    assert attributes["flag_values"].tolist() == [status.value for status in Status]
+    meanings = attributes["flag_meanings"].split()
+    assert meanings[:4] == ["perforated", "arrested", "ricocheted", "missed"]
+    assert len(meanings) == len(Status)
+
+
+def test_status_codes_reads_the_flags(make_result):
+    codes = results.status_codes(make_result())
+    assert codes["arrested"] == Status.ARRESTED
+    assert codes["not_finite"] == Status.NOT_FINITE
+    assert len(codes) == len(Status)
+
+
+def test_attributes_follow_cf_and_carry_the_run(make_result):
+    attributes = make_result().attrs
+    assert attributes["Conventions"] == "CF-1.11"
+    assert {"title", "source", "history", "references", "comment"} <= attributes.keys()
+    assert attributes["campaign"] == "[core]\n"
+    assert attributes["seed"] == 7
+    np.testing.assert_array_equal(attributes["plate_period"], [16e-3, 8e-3])
+
+
+def test_outlines_are_separated_by_nan(make_result):
+    first, second = np.array([[0.0, 1.0], [2.0, 3.0]]), np.array([[4.0, 5.0]])
+    dataset = make_result(outlines=[first, second])
+    np.testing.assert_array_equal(dataset["outline_y"], [0.0, 2.0, np.nan, 4.0])
+    np.testing.assert_array_equal(dataset["outline_z"], [1.0, 3.0, np.nan, 5.0])
+
+
+@pytest.mark.parametrize("outlines", [(), (np.zeros((3, 2)),)])
+def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, outlines):
+    dataset = make_result([Status.PERFORATED, Status.ARRESTED], outlines=outlines)
+    path = tmp_path / "out.nc"
+    results.write(dataset, path)
+    with xarray.open_dataset(path) as file:
+        xarray.testing.assert_identical(file.load(), dataset)
+    xarray.testing.assert_identical(results.read(path), dataset)
+
+
+def test_coordinates_have_no_fill_value(make_result, tmp_path):
+    path = tmp_path / "out.nc"
+    results.write(make_result(), path)
+    with netCDF4.Dataset(path) as file:
+        assert not any("_FillValue" in file[name].ncattrs() for name in ("hit_y", "hit_z", "standoff", "axis"))
+
+
+def test_write_replaces_an_existing_file(make_result, tmp_path):
+    path = tmp_path / "out.nc"
+    path.write_text("old")
+    results.write(make_result(3), path)
+    assert results.read(path).sizes["hit"] == 3
+    assert os.listdir(tmp_path) == ["out.nc"]
+
+
+def break_off(error: BaseException):
+    """A writer that stops half-way, as a full disk or an impatient user makes it."""
+
+    def to_netcdf(self, path, **_):
+        Path(path).write_bytes(b"half a file")
+        raise error
+
+    return to_netcdf
+
+
+@pytest.mark.parametrize(
+    ("error", "raised"),
+    [
+        (OSError("disk full"), results.OutputError),
+        (RuntimeError("NetCDF: HDF error"), results.OutputError),
+        (KeyboardInterrupt(), KeyboardInterrupt),
+    ],
+)
+@pytest.mark.parametrize("before", [{}, {"out.nc": "old"}])
+def test_breaking_off_leaves_the_folder_as_it_was(make_result, tmp_path, monkeypatch, error, raised, before):
+    for name, text in before.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr(xarray.Dataset, "to_netcdf", break_off(error))
+    with pytest.raises(raised):
+        results.write(make_result(), tmp_path / "out.nc")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
+
+
+def test_failure_inside_netcdf_leaves_nothing_behind(make_result, tmp_path):
+    dataset = make_result().assign_attrs(campaign={"not": "an attribute"})
+    with pytest.raises(TypeError):
+        results.write(dataset, tmp_path / "out.nc")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
+    path = tmp_path / "out.nc"
+    path.mkdir()
+    with pytest.raises(results.OutputError, match=r"out\.nc: cannot be written"):
+        results.write(make_result(), path)
+    assert os.listdir(tmp_path) == ["out.nc"]
+
+
+def test_absent_folder_is_an_output_error(make_result, tmp_path):
+    with pytest.raises(results.OutputError, match="cannot be written"):
+        results.write(make_result(), tmp_path / "absent" / "out.nc")
+
+
+def test_reading_an_absent_file_says_so(tmp_path):
+    with pytest.raises(results.ResultError, match=r"absent\.nc: cannot be read"):
+        results.read(tmp_path / "absent.nc")
+
+
+def test_reading_a_text_file_says_so(tmp_path):
+    path = tmp_path / "notes.nc"
+    path.write_text("not netCDF")
+    with pytest.raises(results.ResultError, match=r"notes\.nc: cannot be read"):
+        results.read(path)
+
+
+def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
+    path = tmp_path / "other.nc"
+    make_result().drop_vars("tilt").to_netcdf(path)
+    with pytest.raises(results.ResultError, match='not a warpimpact result, it has no variable "tilt"'):
+        results.read(path)
+
+
+def test_every_field_of_shots_and_outcomes_has_a_variable():
+    shot_names = {name.removeprefix("impact_") for name in results.SHOT_VARIABLES} | {"hit_y", "hit_z"}
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names
+    assert {field.name for field in dataclasses.fields(Outcomes)} == set(results.OUTCOME_VARIABLES)

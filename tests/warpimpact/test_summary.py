@@ -1,0 +1,66 @@
+"""Summary numbers against values computed by hand."""
+
+import numpy as np
+import pytest
+
+from warpimpact.analysis.summary import passed, summary, summary_text
+from warpimpact.kernels.status import Status
+
+MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED, Status.UNFINISHED]
+
+
+@pytest.fixture
+def mixed(make_result):
+    dataset = make_result(MIXED)
+    dataset["residual_velocity"][:] = [700.0, 0.0, 300.0, 800.0, np.nan]
+    dataset["deflection"][:] = [3.0, np.nan, 120.0, 1.0, np.nan]
+    dataset["tilt"][:] = [[10.0, 40.0], [np.nan] * 2, [np.nan] * 2, [0.0, np.nan], [np.nan] * 2]
+    return dataset
+
+
+def test_counts_every_status(mixed):
+    assert summary(mixed).counts == {
+        "perforated": 1,
+        "arrested": 1,
+        "ricocheted": 1,
+        "missed": 1,
+        "unfinished": 1,
+        "left_window": 0,
+        "not_finite": 0,
+    }
+
+
+def test_passed_means_perforated_or_missed(mixed):
+    assert passed(mixed).tolist() == [True, False, False, True, False]
+
+
+def test_spreads_count_only_what_passed_the_plate(mixed):
+    result = summary(mixed)
+    velocity, deflection = result.residual_velocity, result.deflection
+    assert (velocity.count, velocity.mean, velocity.standard_deviation) == (2, 750.0, 50.0)
+    assert (deflection.count, deflection.mean, deflection.standard_deviation) == (2, 2.0, 1.0)
+
+
+def test_tilt_is_summarised_for_each_standoff_over_what_exists(mixed):
+    tilt = summary(mixed).tilt
+    assert list(tilt) == [0.05, 0.13]
+    assert (tilt[0.05].count, tilt[0.05].mean, tilt[0.05].standard_deviation) == (2, 5.0, 5.0)
+    assert (tilt[0.13].count, tilt[0.13].mean, tilt[0.13].standard_deviation) == (1, 40.0, 0.0)
+
+
+def test_text_states_the_numbers_with_their_units(mixed):
+    lines = [line.split() for line in summary_text(mixed).splitlines()]
+    assert ["perforated", "1", "20.0%"] in lines
+    assert ["unfinished", "1", "20.0%"] in lines
+    assert ["residual", "velocity", "750.0", "±", "50.0", "m/s"] in lines
+    assert ["tilt", "at", "50", "mm", "5.0", "±", "5.0", "°"] in lines
+    assert "left window" not in summary_text(mixed)
+
+
+def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result):
+    dataset = make_result([Status.ARRESTED] * 3)
+    velocity = summary(dataset).residual_velocity
+    assert velocity.count == 0
+    assert np.isnan(velocity.mean)
+    assert "no core behind the plate" in summary_text(dataset)
+    assert "nan" not in summary_text(dataset)

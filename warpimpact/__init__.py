@@ -1,0 +1,67 @@
+"""Hit maps of hard bullet cores against perforated armour plates.
+
+A name is imported when it is first used, so that ``import warpimpact`` and ``warpimpact --help`` are quick.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .campaign.campaign import Campaign
+    from .campaign.run import run
+    from .scene import (
+        CirclePattern,
+        ConeCore,
+        Core,
+        Hits,
+        Impact,
+        Interaction,
+        MaskPattern,
+        NoPattern,
+        Numerics,
+        OgiveCore,
+        Plate,
+        PolynomialCore,
+        ProfileCore,
+        Shots,
+        SlotPattern,
+        TrianglePattern,
+        make_shots,
+    )
+
+    __version__: str
+
+__all__ = [
+    "Campaign",
+    "CirclePattern",
+    "ConeCore",
+    "Core",
+    "Hits",
+    "Impact",
+    "Interaction",
+    "MaskPattern",
+    "NoPattern",
+    "Numerics",
+    "OgiveCore",
+    "Plate",
+    "PolynomialCore",
+    "ProfileCore",
+    "Shots",
+    "SlotPattern",
+    "TrianglePattern",
+    "__version__",
+    "make_shots",
+    "run",
+]
+
+_HOMES = {"Campaign": ".campaign.campaign", "run": ".campaign.run"}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("warpimpact")
+    if name in __all__:
+        return getattr(import_module(_HOMES.get(name, ".scene"), __name__), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

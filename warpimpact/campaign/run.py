@@ -1,0 +1,113 @@
+"""From a campaign to its Dataset."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import fields
+from datetime import UTC, datetime
+
+import numpy as np
+import psutil
+import warp
+import xarray
+
+import warpimpact
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.discretisation import Resolution, resolve
+from warpimpact.results import to_dataset
+from warpimpact.scene import Shots, make_shots
+from warpimpact.simulate import Outcomes, Progress, find_device, simulate
+
+BATCH = 2**18
+"""Shots per call of `simulate`, so that what the device holds does not grow with the campaign."""
+
+
+def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None = None) -> xarray.Dataset:
+    """Compute every hit of a campaign.
+
+    Args:
+        device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
+        progress: called with (hits done, hits) as they come.
+
+    Returns:
+        The Dataset of results.py, one entry per hit.
+
+    Raises:
+        DeviceError: the device is absent or out of memory.
+        MemoryError: the results do not fit into memory; the message is for a person.
+    """
+    chosen = find_device(device)
+    _check_memory(campaign)
+    shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
+    begin = time.perf_counter()
+    outcomes = _in_batches(campaign, shots, str(chosen), progress or (lambda done, total: None))
+    elapsed = time.perf_counter() - begin
+    period = campaign.plate.sampled_cell
+    return to_dataset(
+        shots,
+        outcomes,
+        standoffs=np.array(campaign.output.standoffs),
+        outlines=campaign.plate.pattern.outlines(*((-0.5 * side, 0.5 * side) for side in period)),
+        period=period,
+        attributes={
+            "title": campaign.title,
+            "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+            "campaign": campaign.text,
+            "warpimpact_version": warpimpact.__version__,
+            "warp_version": warp.__version__,
+            "device": f"{chosen.alias} ({chosen.name})",
+            "seed": campaign.hits.seed,
+            "standoff_point": campaign.output.standoff_point,
+            "open_area": campaign.plate.open_area,
+            "areal_density": campaign.plate.areal_density,
+            "numerics": _numerics(campaign),
+            "compute_time": elapsed,
+            "hits_per_second": len(shots) / elapsed,
+        },
+    )
+
+
+def _check_memory(campaign: Campaign) -> None:
+    """Refuse a campaign whose results cannot be held, before it starts."""
+    numbers = len(fields(Shots)) + 8 + 4 * len(campaign.output.standoffs)
+    copies = 3  # outcomes by batch, joined, and in the Dataset's units
+    needed = copies * numbers * 8 * (campaign.hits.count or 0)
+    free = psutil.virtual_memory().available
+    if needed > free:
+        raise MemoryError(
+            f"hits.count: got {campaign.hits.count}, whose results take {needed / 2**30:.3g} GiB, "
+            f"but {free / 2**30:.3g} GiB are free; at most {(campaign.hits.count or 0) * free // needed} hits fit"
+        )
+
+
+def _in_batches(campaign: Campaign, shots: Shots, device: str, progress: Progress) -> Outcomes:
+    parts = [
+        simulate(
+            campaign.core,
+            campaign.plate,
+            shots[first : first + BATCH],
+            interaction=campaign.interaction,
+            numerics=campaign.numerics,
+            standoffs=list(campaign.output.standoffs),
+            standoff_point=campaign.output.standoff_point,
+            device=device,
+            progress=lambda done, _, first=first: progress(first + done, len(shots)),  # type: ignore[misc]
+        )
+        for first in range(0, len(shots), BATCH)
+    ]
+    return Outcomes(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Outcomes)})
+
+
+def _numerics(campaign: Campaign) -> str:
+    """The numerics in force, every choice made, as one line."""
+    resolution = resolve(campaign.numerics, campaign.core, campaign.plate)
+    step = resolution.time_step or resolution.way / campaign.impact.velocity
+    return (
+        f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, time_step {step:.4g} s, "
+        f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
+        f"grid_spacing {resolution.grid_spacing:.4g} m, precision {_precision(resolution)}"
+    )
+
+
+def _precision(resolution: Resolution) -> str:
+    return "double" if resolution.double else "single"

@@ -1,0 +1,190 @@
+"""The warpimpact command."""
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from . import __version__
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; returns the exit code, 2 after a mistake that the user can put right."""
+    arguments = _parser().parse_args(argv)
+    try:
+        arguments.command(arguments)
+    except KeyboardInterrupt:
+        print("warpimpact: interrupted", file=sys.stderr)
+        return 130
+    except _mistakes() as error:
+        print(f"warpimpact: error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _mistakes() -> tuple[type[Exception], ...]:
+    """Errors whose message is for the user; imported once there is an error, to keep `--help` quick."""
+    from .campaign.campaign import CampaignError
+    from .results import OutputError, ResultError
+    from .simulate import DeviceError
+
+    return CampaignError, OutputError, ResultError, DeviceError
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="warpimpact",
+        description="Hit maps of hard bullet cores against perforated armour plates.",
+        epilog="example: warpimpact run campaigns/slotted_plate.toml && warpimpact plot slotted_plate.nc",
+    )
+    parser.add_argument("--version", action="version", version=f"warpimpact {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    _add_run(commands)
+    _add_plot(commands)
+    _add_validate(commands)
+    return parser
+
+
+def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "run",
+        help="compute the hit map of a campaign",
+        description="Compute every hit of a campaign and write one netCDF file.",
+        epilog="example: warpimpact run campaigns/slotted_plate.toml -o slotted.nc --count 512",
+    )
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="what is shot at what")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="RESULT.nc", help="result (default: the campaign's name, here)"
+    )
+    _add_device(parser)
+    parser.add_argument("--count", type=int, metavar="N", help="number of hits, in place of the campaign's")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing result")
+    parser.set_defaults(command=_run)
+
+
+def _add_plot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "plot",
+        help="draw the maps of a result",
+        description="Draw the maps of a result as PNG files.",
+        epilog="example: warpimpact plot slotted.nc -o maps",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="existing folder (default: the result's)")
+    parser.set_defaults(command=_plot)
+
+
+def _add_validate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "validate",
+        help="compare with the published shots",
+        description="Compute the paper's two shots and print them beside its model, experiment and LS-DYNA.",
+        epilog="example: warpimpact validate",
+    )
+    parser.add_argument(
+        "campaign", type=Path, nargs="?", metavar="CAMPAIGN.toml", help="two hits (default: the bundled ones)"
+    )
+    _add_device(parser)
+    parser.set_defaults(command=_validate)
+
+
+def _add_device(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--device", default="auto", metavar="auto|cpu|cuda:0", help="auto takes CUDA where there is one"
+    )
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .analysis.summary import summary_text
+    from .campaign.campaign import Campaign, CampaignError
+    from .campaign.run import run
+
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
+    output = arguments.output or Path(arguments.campaign.stem + ".nc")
+    _check_output(output, overwrite=arguments.overwrite)
+    try:
+        with _progress() as progress:
+            dataset = run(campaign, device=arguments.device, progress=progress)
+    except MemoryError as error:
+        raise CampaignError(f"{arguments.campaign}: {error}") from None
+    results.write(dataset, output)
+    print(summary_text(dataset))
+    print(f"{dataset.attrs['hits_per_second']:.4g} hits per second on {dataset.attrs['device']}")
+    print(f"written to {output}")
+
+
+def _plot(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .plotting import save_maps
+
+    dataset = results.read(arguments.result)
+    folder = arguments.output or arguments.result.parent
+    _check_folder(folder)
+    for path in save_maps(dataset, folder, arguments.result.stem):
+        print(path)
+
+
+def _validate(arguments: argparse.Namespace) -> None:
+    from importlib.resources import files
+
+    from .analysis.paper import validation_table
+    from .campaign.campaign import Campaign
+    from .campaign.run import run
+
+    bundled = Path(str(files("warpimpact.campaigns") / "paper_shots.toml"))
+    campaign = Campaign.from_toml(arguments.campaign or bundled)
+    print(validation_table(run(campaign, device=arguments.device)))
+
+
+def _check_output(path: Path, *, overwrite: bool) -> None:
+    """Refuse before hours of computing what could not be written after them."""
+    from .results import OutputError
+
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, but the result is one file")
+    if path.exists() and not overwrite:
+        raise OutputError(f"{path}: exists already; name another file or give --overwrite")
+    _check_folder(path.parent)
+
+
+def _check_folder(folder: Path) -> None:
+    from .results import OutputError
+
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[int, int], None]]:
+    """Shows (done, total): a bar on a terminal, a line per tenth in a log."""
+    if not sys.stderr.isatty():
+        yield _log_tenths()
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="hit") as bar:
+
+        def show(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        yield show
+
+
+def _log_tenths() -> Callable[[int, int], None]:
+    shown = 0
+
+    def show(done: int, total: int) -> None:
+        nonlocal shown
+        tenths = 10 * done // total
+        if tenths > shown:
+            shown = tenths
+            print(f"{done} of {total} hits", file=sys.stderr, flush=True)
+
+    return show
