@@ -123,8 +123,8 @@ def rings_of(core: Core, axial: int, around: int, *, discs: bool = True) -> Ring
 
 
 def _stations(core: Core, count: int) -> Array:
-    """Edges of the profile's rings: even, with every jump of the slope on an edge."""
-    knots = np.array([0.0, *core.breaks, core.length])
+    """Edges of the profile's rings: even, with the jumps of the slope on edges unless they outnumber the rings."""
+    knots = np.array([0.0, *(core.breaks if len(core.breaks) < count else ()), core.length])
     spans = np.diff(knots)
     shares = np.maximum(1, np.round(count * spans / core.length)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
