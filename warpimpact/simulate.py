@@ -38,7 +38,7 @@ MEMORY_SHARE = 0.5
 
 
 class DeviceError(RuntimeError):
-    """The device asked for is not there, or too small for the task; the message is for a person."""
+    """The device asked for is not there; the message is for a person."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def simulate(
         progress: called with (shots done, shots) as they come.
 
     Raises:
-        DeviceError: the device is absent or out of memory.
+        DeviceError: the device is absent.
     """
     task = _Task(core, plate, interaction or Interaction(), numerics or Numerics(), shots, find_device(device))
     contact = task.march(progress or (lambda done, total: None))
@@ -314,6 +314,8 @@ class _Task:
         )
         reach = max(self.device_plate.reach_y, self.device_plate.reach_z)
         cells_y, cells_z = (2 * (math.ceil(half / cell) + reach + 3) for cell in (self.tile.dy, self.tile.dz))
+        while not self._fits(cells_y, cells_z):  # what leaves a smaller window gets its named status
+            cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
@@ -347,9 +349,6 @@ class _Task:
     def _march_some(self, which: NDArray[np.int64], cells: tuple[int, int], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
         slots = self._slots(*cells)
-        if slots < 1:
-            need = self._slot_bytes(*cells) / 2**20
-            raise DeviceError(f"device: {self.device} lacks the {need:.0f} MiB that one window of the plate takes")
         self.stage.kernel.module.load(self.device)
         order = self._array(which, dtype=wp.int32)
 

@@ -33,7 +33,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None =
         The Dataset of results.py, one entry per hit.
 
     Raises:
-        DeviceError: the device is absent or out of memory.
+        DeviceError: the device is absent.
         MemoryError: the results do not fit into memory; the message is for a person.
     """
     chosen = find_device(device)
