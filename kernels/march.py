@@ -10,7 +10,8 @@ from .status import Status
 from .variant import Variant
 
 TRACE_COLUMNS = 20
-"""Numbers per traced step: time, position, attitude (x, y, z, w), velocity, angular momentum, mean force and moment."""
+"""Numbers per traced step: time, position, attitude (x, y, z, w), velocity, angular momentum, mean force and moment.
+A last row, without load, is the state in which contact ended."""
 
 
 @cache
@@ -85,9 +86,9 @@ def build(variant: Variant) -> SimpleNamespace:
         front = -surface.bounding_radius
         for index in range(surface.rings):
             ring = surfaces.ring_at(surface, pose, index, zero)
-            rim = ring.radius + wp.abs(ring.half_radial)
-            ahead = (ring.station * pose.axis[0]) + rim * surfaces.broadside(pose)
-            front = wp.max(front, ahead + wp.abs(ring.half_axial * pose.axis[0]))
+            broadside = surfaces.broadside(pose)
+            middle = ring.station * pose.axis[0] + ring.radius * broadside
+            front = wp.max(front, middle + wp.abs(ring.half_axial * pose.axis[0] + ring.half_radial * broadside))
         return front
 
     @wp.func
@@ -202,6 +203,7 @@ def build(variant: Variant) -> SimpleNamespace:
             status = ended(surface, body, state, pose, found, touched, initial_energy, plate.thickness)
             if status == RUNNING:
                 load = Load()
+                before = state
                 if found.last_ring >= 0:
                     load = scheme.load_on(surface, plate, law, fields, window, found, pose, dt)
                     if load.touching:
@@ -209,12 +211,12 @@ def build(variant: Variant) -> SimpleNamespace:
                         contact_steps += 1
                         state = motion.kick(body, state, load, dt)
                 if wp.static(variant.traced):
-                    dv = state.velocity - pose.velocity
-                    dw = motion.angular_velocity(body, pose.axis, state.angular_momentum) - omega
-                    mean = motion.mean_load(load, dv, dw)
+                    mean = motion.mean_load(body, before, load, dt)
                     record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, mean)
                 state = motion.drift(body, state, dt)
                 step += 1
+        if wp.static(variant.traced):
+            record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, Load())
         if status == RUNNING:
             status = UNFINISHED
         axis = motion.axis_of(state.attitude)

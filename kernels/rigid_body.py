@@ -126,35 +126,43 @@ def build(variant: Variant) -> SimpleNamespace:
         return dv, dw
 
     @wp.func
-    def kick(body: Body, state: State, load: Load, dt: real):
-        """Change the velocities by the load over dt, never raising the kinetic energy.
+    def restraint(body: Body, axis: vec3, state: State, dv: vec3, dw: vec3):
+        """Share of a change of velocities to apply, so that it never raises the kinetic energy.
 
         Every surface element takes power from the core, so the continuous energy cannot grow; where a finite
-        step would overshoot (a core coming to rest), the impulse is scaled back to the least energy
-        along its direction.
+        step would overshoot (a core coming to rest), it ends at the least energy along its direction.
         """
-        axis = axis_of(state.attitude)
         omega = angular_velocity(body, axis, state.angular_momentum)
-        dv, dw = velocity_change(body, axis, load, dt)
         dl = angular_momentum(body, axis, dw)
         slope = body.mass * wp.dot(dv, state.velocity) + wp.dot(dl, omega)
         curvature = body.mass * wp.dot(dv, dv) + wp.dot(dl, dw)
-        scale = one
+        share = one
         if slope + curvature > zero:
-            scale = wp.max(zero, -slope / curvature)
+            share = wp.max(zero, -slope / curvature)
+        return share
+
+    @wp.func
+    def kick(body: Body, state: State, load: Load, dt: real):
+        """Change the velocities by the load over dt."""
+        axis = axis_of(state.attitude)
+        dv, dw = velocity_change(body, axis, load, dt)
+        share = restraint(body, axis, state, dv, dw)
         kicked = State()
         kicked.position = state.position
         kicked.attitude = state.attitude
-        kicked.velocity = state.velocity + scale * dv
-        kicked.angular_momentum = state.angular_momentum + scale * dl
+        kicked.velocity = state.velocity + share * dv
+        kicked.angular_momentum = state.angular_momentum + share * angular_momentum(body, axis, dw)
         return kicked
 
     @wp.func
-    def mean_load(load: Load, dv: vec3, dw: vec3):
-        """Force and moment averaged over a step that changed the velocities by (dv, dw): F − D Δu."""
+    def mean_load(body: Body, state: State, load: Load, dt: real):
+        """The force and moment that a kick applies on average over its step: λ (F − D Δu)."""
+        axis = axis_of(state.attitude)
+        dv, dw = velocity_change(body, axis, load, dt)
+        share = restraint(body, axis, state, dv, dw)
         mean = Load()
-        mean.force = load.force - load.damping_vv * dv - load.damping_vw * dw
-        mean.moment = load.moment - wp.transpose(load.damping_vw) * dv - load.damping_ww * dw
+        mean.force = share * (load.force - load.damping_vv * dv - load.damping_vw * dw)
+        mean.moment = share * (load.moment - wp.transpose(load.damping_vw) * dv - load.damping_ww * dw)
         return mean
 
     return SimpleNamespace(

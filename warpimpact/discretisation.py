@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import psutil
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from warpimpact.scene import Core, Numerics, Plate
 
@@ -60,6 +60,10 @@ class Resolution:
     grid_spacing: float
     double: bool
 
+    def step_at(self, velocity: float) -> float:
+        """Time step [s] at an impact velocity [m/s]."""
+        return self.time_step or self.way / velocity
+
 
 def resolve(numerics: Numerics, core: Core, plate: Plate) -> Resolution:
     """Fill in what the numerics leave to fidelity and scheme."""
@@ -76,9 +80,25 @@ def resolve(numerics: Numerics, core: Core, plate: Plate) -> Resolution:
     return Resolution(
         nodal=numerics.scheme == "nodal",
         double=fidelity.double if numerics.precision is None else numerics.precision == "double",
-        way=fidelity.travel * min(plate.thickness, SLENDER * core.length),
+        way=_way(fidelity.travel, core, plate),
         **(defaults | given),
     )
+
+
+def spelt_out(fidelity: Fidelity, core: Core, plate: Plate, velocity: float) -> Numerics:
+    """Numerics that give, at an impact velocity [m/s], what `resolve` would make of the fidelity if it had a name."""
+    return Numerics(
+        time_step=_way(fidelity.travel, core, plate) / velocity,
+        patches_axial=fidelity.patches_axial,
+        patches_around=fidelity.patches_around,
+        grid_spacing=plate.degradation_length / fidelity.cells_per_length,
+        precision="double" if fidelity.double else "single",
+    )
+
+
+def _way(travel: float, core: Core, plate: Plate) -> float:
+    """Way per time step at impact velocity [m]."""
+    return travel * min(plate.thickness, SLENDER * core.length)
 
 
 @dataclass(frozen=True)
@@ -123,12 +143,24 @@ def rings_of(core: Core, axial: int, around: int, *, discs: bool = True) -> Ring
 
 
 def _stations(core: Core, count: int) -> Array:
-    """Edges of the profile's rings: even, with the jumps of the slope on edges unless they outnumber the rings."""
-    knots = np.array([0.0, *(core.breaks if len(core.breaks) < count else ()), core.length])
+    """Edges of the profile's rings: even, with the widest station and, unless they outnumber the rings, the jumps
+    of the slope on edges."""
+    breaks = core.breaks if len(core.breaks) < count else ()
+    knots = np.unique([0.0, *breaks, _widest_station(core), core.length])
     spans = np.diff(knots)
     shares = np.maximum(1, np.round(count * spans / core.length)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
     return np.append(np.concatenate(edges), core.length)
+
+
+def _widest_station(core: Core) -> float:
+    """First station of the largest radius [m]: a ring astride it would partly cancel itself."""
+    stations = np.linspace(0.0, core.length, 1001)
+    peak = int(core.radius(stations).argmax())
+    low, high = stations[max(peak - 1, 0)], stations[min(peak + 1, len(stations) - 1)]
+    found = minimize_scalar(lambda s: -core.radius(np.array(s)), bounds=(low, high), method="bounded")
+    candidates = np.array([stations[peak], found.x, *(b for b in core.breaks if low <= b <= high)])
+    return float(candidates[core.radius(candidates).argmax()])
 
 
 def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
@@ -218,7 +250,7 @@ def tent_taps(length: float, cell: float) -> Array:
     ratio = length / cell
     if abs(ratio - round(ratio)) < 1e-6:
         return taps(round(ratio) * cell)[0]
-    return taps(brentq(excess, cell * 1.0001, length + cell))[0]
+    return taps(brentq(excess, cell, length + cell))[0]
 
 
 ONSET = 0.1

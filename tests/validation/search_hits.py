@@ -1,8 +1,8 @@
 """How the unpublished lattice, time step and hit points of campaigns/paper_shots.toml were found.
 
 For every lattice and time step: the hit on the slot's short axis that comes nearest to the paper's first row,
-and the hit near the slot's end that comes nearest to its second. "1.00" means that the worst of a row's five numbers is off by
-3 m/s or 3 degrees. Run it as a script: python tests/validation/search_hits.py
+and the hit near the slot's end that comes nearest to its second. "1.00" means that the worst of a row's five
+numbers is off by 3 m/s or 3 degrees. Run it as a script: python tests/validation/search_hits.py
 """
 
 from itertools import product

@@ -1,0 +1,94 @@
+"""What the tests of device functions share: structs and arrays in, poisoned arrays out; float64 throughout."""
+
+import ctypes
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.discretisation import rings_of, tent_taps
+from warpimpact.scene import Core
+
+
+def records(struct: Any, device: str, **columns: Any) -> wp.array:
+    """An array of structs [n] from columns of shape [n, ...], or of the shape of one for all."""
+    names = struct.numpy_dtype()["names"]
+    assert set(columns) <= set(names), "a misspelt member would stay zero unnoticed"
+    count = max(len(np.atleast_1d(column)) for column in columns.values())
+    values = np.zeros(count, dtype=struct.numpy_dtype())
+    for name, column in columns.items():
+        values[name] = column
+    return wp.array(values, dtype=struct, device=device)
+
+
+def poisoned(shape: int | tuple[int, ...], dtype: Any, device: str) -> wp.array:
+    """An array whose bits are all set: NaN in every float, so that what a kernel leaves out shows."""
+    array = wp.empty(shape, dtype=dtype, device="cpu")
+    ctypes.memset(array.ptr, 0xFF, array.capacity)
+    return array.to(device)
+
+
+def unit_vectors(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    """Random directions, shape [count, 3]."""
+    vectors = rng.standard_normal((count, 3))
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def attitudes(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
+    """Random unit quaternions (x, y, z, w), shape [count, 4]."""
+    quaternions = rng.standard_normal((count, 4))
+    return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
+
+
+def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
+    """The Surface of a core in `axial` × `around` patches and its discs."""
+    rings = rings_of(core, axial, around)
+    azimuth = 2 * np.pi * (np.arange(around) + 0.5) / around
+    area = np.hypot(rings.area_axial, rings.area_radial)
+    arrays = {name: getattr(rings, name) for name in ("station", "radius", "half_axial", "half_radial")} | {
+        "area": area,
+        "normal_axial": rings.area_axial / area,
+        "normal_radial": rings.area_radial / area,
+        "cosine": np.cos(azimuth),
+        "sine": np.sin(azimuth),
+    }
+    surface = struct()
+    for name, array in arrays.items():
+        setattr(surface, name, wp.array(array, dtype=wp.float64, device=device))
+    surface.rings, surface.around = len(rings.station), around
+    surface.bounding_radius = core.bounding_radius
+    return surface
+
+
+def plate_of(
+    struct: Any,
+    tile: NDArray[np.float64],
+    dy: float,
+    dz: float,
+    device: str,
+    *,
+    thickness: float = 4.0e-3,
+    length: float = 0.5e-3,
+    size: Any = (np.inf, np.inf),
+) -> Any:
+    """The Plate of a tile of material fractions, with the filter of a degradation length."""
+    plate = struct()
+    plate.tile = wp.array(tile.reshape(-1), dtype=wp.float64, device=device)
+    plate.tile_y, plate.tile_z = tile.shape
+    plate.dy, plate.dz = dy, dz
+    plate.half_y, plate.half_z = size[0] / 2, size[1] / 2
+    plate.thickness = thickness
+    taps_y, taps_z = tent_taps(length, dy), tent_taps(length, dz)
+    plate.taps_y, plate.taps_z = (wp.array(taps, dtype=wp.float64, device=device) for taps in (taps_y, taps_z))
+    plate.reach_y, plate.reach_z = len(taps_y) // 2, len(taps_z) // 2
+    return plate
+
+
+def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str) -> Any:
+    """The Fields of some windows, as the memory comes."""
+    fields = struct()
+    fields.cells_y, fields.cells_z = cells_y, cells_z
+    for name in ("material", "exposure", "gain", "filtered"):
+        setattr(fields, name, poisoned(slots * cells_y * cells_z, wp.float64, device))
+    return fields

@@ -1,0 +1,279 @@
+"""Rings and patches in a pose: areas, velocities, and how much of a patch is in the slab (MODEL.md §4)."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpimpact.kernels import core_surface
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore
+
+from .probes import attitudes, poisoned, surface_of
+
+Array = NDArray[np.float64]
+
+VARIANT = Variant(double=True)
+real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
+surfaces = core_surface.build(VARIANT)
+Surface = surfaces.Surface
+
+PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
+CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
+THICKNESS = 4.0e-3
+PER_PATCH = {"arm": vec3, "normal": vec3, "velocity": vec3, "closing": real, "immersed": real}
+EVERYWHERE = 1.0e3  # [m], a slab that holds the whole core
+
+
+def share(
+    depth: wp.array(dtype=real),
+    extent: wp.array(dtype=real),
+    motion: wp.array(dtype=real),
+    shares: wp.array(dtype=real),
+) -> None:
+    i = wp.tid()
+    shares[i] = surfaces.behind_face(depth[i], extent[i], motion[i])
+
+
+def patches(
+    surface: Surface,
+    position: wp.array(dtype=vec3),
+    attitude: wp.array(dtype=quat),
+    velocity: vec3,
+    omega: vec3,
+    thickness: real,
+    dt: real,
+    arms: wp.array3d(dtype=vec3),
+    normals: wp.array3d(dtype=vec3),
+    velocities: wp.array3d(dtype=vec3),
+    closing: wp.array3d(dtype=real),
+    immersed: wp.array3d(dtype=real),
+    areas: wp.array2d(dtype=real),
+    low: wp.array2d(dtype=real),
+    high: wp.array2d(dtype=real),
+    speeds: wp.array(dtype=real),
+) -> None:
+    """Every patch of every pose; area of a patch, and bounds along x, of every ring."""
+    i = wp.tid()
+    pose = surfaces.pose_of(surface, position[i], attitude[i], velocity, omega)
+    speeds[i] = pose.speed
+    for k in range(surface.rings):
+        ring = surfaces.ring_at(surface, pose, k, dt)
+        reach = surfaces.reach_along_x(surface, ring, pose, dt)
+        areas[i, k] = ring.area
+        low[i, k] = ring.centre[0] - reach
+        high[i, k] = ring.centre[0] + reach
+        for j in range(surface.around):
+            patch = surfaces.patch_at(surface, pose, ring, j)
+            arms[i, k, j] = patch.arm
+            normals[i, k, j] = patch.normal
+            velocities[i, k, j] = patch.velocity
+            closing[i, k, j] = patch.closing
+            immersed[i, k, j] = surfaces.immersed_area(pose, ring, patch, thickness, dt)
+
+
+SHARE, PATCHES = VARIANT.kernel(share), VARIANT.kernel(patches)
+
+
+def behind_face(depth: Array, extent: Array, motion: Array, device: str) -> Array:
+    inputs = [wp.array(a, dtype=real, device=device) for a in np.broadcast_arrays(depth, extent, motion)]
+    shares = poisoned(len(inputs[0]), real, device)
+    wp.launch(SHARE, len(shares), inputs=inputs, outputs=[shares], device=device)
+    return shares.numpy()
+
+
+def posed(
+    surface: Any,
+    device: str,
+    *,
+    position: Array,
+    attitude: Array,
+    velocity: Any = (800.0, 0.0, 0.0),
+    omega: Any = (0.0, 0.0, 0.0),
+    thickness: float = THICKNESS,
+    dt: float = 1e-6,
+) -> dict[str, Array]:
+    """What the kernel says of poses; arrays of shape [poses, rings, (patches around,) ...]."""
+    count, per_ring = len(position), (len(position), surface.rings)
+    outputs = {
+        **{name: poisoned((*per_ring, surface.around), dtype, device) for name, dtype in PER_PATCH.items()},
+        **{name: poisoned(per_ring, real, device) for name in ("area", "low", "high")},
+        "speed": poisoned(count, real, device),
+    }
+    inputs = [
+        surface,
+        wp.array(position, dtype=vec3, device=device),
+        wp.array(attitude, dtype=quat, device=device),
+        vec3(*velocity),
+        vec3(*omega),
+        thickness,
+        dt,
+    ]
+    wp.launch(PATCHES, count, inputs=inputs, outputs=list(outputs.values()), device=device)
+    return {name: array.numpy() for name, array in outputs.items()}
+
+
+def random_poses(count: int, spread: float) -> dict[str, Array]:
+    rng = np.random.default_rng(count)
+    return {"position": spread * rng.uniform(-1, 1, (count, 3)), "attitude": attitudes(rng, count)}
+
+
+# --- Share of a patch behind a face ---
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.1, 0.5, 1.0, 3.0, 50.0])
+def test_share_is_that_of_two_boxes_convolved(ratio: float, device: str) -> None:
+    # Mean over the motion, at 20 000 midpoints, of the sharp share of a box of ±extent.
+    extent, motion = 2e-4, 2e-4 * ratio
+    depth = np.linspace(-1.1, 1.1, 301) * (extent + motion)
+    steps = motion * ((np.arange(20_000) + 0.5) / 10_000 - 1)
+    expected = [np.clip(0.5 + (d + steps) / (2 * extent), 0, 1).mean() for d in depth]
+    np.testing.assert_allclose(behind_face(depth, extent, motion, device), expected, atol=1e-7)
+
+
+@pytest.mark.parametrize(("extent", "motion"), [(1e-4, 0.0), (0.0, 1e-4), (1e-4, 1e-7)])
+def test_share_of_a_box_alone_has_its_corners_rounded_only(extent: float, motion: float, device: str) -> None:
+    wide = max(extent, motion)
+    depth = np.linspace(-1.5, 1.5, 301) * wide
+    sharp = np.clip(0.5 + depth / (2 * wide), 0, 1)
+    shares = behind_face(depth, extent, motion, device)
+    np.testing.assert_allclose(shares, sharp, atol=0.0026)  # narrow/(8 wide) at the corners
+    away = np.abs(np.abs(depth) - wide) > 0.021 * wide
+    np.testing.assert_allclose(shares[away], sharp[away], atol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [0.1, 1.0, 7.3])
+def test_steps_through_a_slab_add_up_to_its_thickness(ratio: float, device: str) -> None:
+    # Σ over steps of the immersed share × way per step = h, wherever the steps begin.
+    extent, motion = 2e-4, 2e-4 * ratio
+    for phase in (0.0, 0.3, 0.9):
+        depth = 2 * motion * (np.arange(-200, 200) + phase)
+        front, rear = (behind_face(depth - face, extent, motion, device) for face in (0.0, THICKNESS))
+        assert 2 * motion * (front - rear).sum() == pytest.approx(THICKNESS, rel=1e-12)
+
+
+# --- Patches in a pose ---
+
+
+@pytest.mark.parametrize("core", [PAPER, OGIVE, CONE])
+def test_closed_surface_has_no_net_area(core: Core, device: str) -> None:
+    surface = surface_of(Surface, core, 24, 48, device)
+    found = posed(surface, device, **random_poses(3, 0.1), thickness=EVERYWHERE)
+    area = found["area"][:, :, None, None] * found["normal"]
+    np.testing.assert_allclose(area.sum(axis=(1, 2)), 0.0, atol=1e-12 * found["area"].max())
+    np.testing.assert_allclose(np.linalg.norm(found["normal"], axis=-1), 1.0, rtol=1e-13)
+
+
+@pytest.mark.parametrize(("core", "tolerance"), [(OGIVE, 1e-12), (CONE, 1e-12), (PAPER, 1e-3)])
+def test_forward_facing_area_is_the_disc_of_the_largest_radius(core: Core, tolerance: float, device: str) -> None:
+    # Exact where the shoulder is the edge of a ring; the ring astride the paper's smooth one cancels in part.
+    surface = surface_of(Surface, core, 24, 48, device)
+    deep = {"position": np.array([[1.0, 0, 0]]), "attitude": np.array([[0.0, 0, 0, 1]])}
+    found = posed(surface, device, **deep, thickness=EVERYWHERE)
+    projected = found["immersed"] * found["normal"][..., 0]
+    assert projected[projected > 0].sum() == pytest.approx(np.pi * core.max_radius**2, rel=tolerance)
+
+
+def test_patches_turn_with_the_body_and_move_as_rigid_points_do(device: str) -> None:
+    poses, still = random_poses(5, 0.01), np.array([[0.0, 0, 0, 1]])
+    velocity, omega = np.array([500.0, -90.0, 40.0]), np.array([2e4, -1e4, 3e4])
+    surface = surface_of(Surface, PAPER, 8, 12, device)
+    found = posed(surface, device, **poses, velocity=velocity, omega=omega)
+    body = posed(surface, device, position=np.zeros((1, 3)), attitude=still)
+    for i, turned in enumerate(Rotation.from_quat(poses["attitude"])):
+        for name in ("arm", "normal"):
+            expected = turned.apply(body[name][0].reshape(-1, 3)).reshape(body[name][0].shape)
+            np.testing.assert_allclose(found[name][i], expected, atol=1e-14)
+    expected = velocity + np.cross(omega, found["arm"])
+    np.testing.assert_allclose(found["velocity"], expected, rtol=1e-13, atol=1e-10)
+    closing = (expected * found["normal"]).sum(axis=-1)
+    np.testing.assert_allclose(found["closing"], closing, rtol=1e-12, atol=1e-10)
+    fastest = np.linalg.norm(expected, axis=-1).max(axis=(1, 2))
+    assert (fastest <= found["speed"]).all()
+    assert (found["speed"] < 2 * fastest).all()
+
+
+def test_patches_lie_on_the_profile_and_face_outwards(device: str) -> None:
+    surface = surface_of(Surface, PAPER, 16, 32, device)
+    found = posed(surface, device, position=np.zeros((1, 3)), attitude=np.array([[0.0, 0, 0, 1]]))
+    arm, normal = found["arm"][0], found["normal"][0]
+    station = PAPER.mass_properties.centre_of_mass - arm[..., 0]
+    lateral = np.abs(normal[..., 0]) < 0.9
+    radius = np.hypot(arm[..., 1], arm[..., 2])
+    np.testing.assert_allclose(radius[lateral], PAPER.radius(station[lateral]), rtol=1e-13)
+    slope = (PAPER.radius(station[lateral] + 1e-6) - PAPER.radius(station[lateral] - 1e-6)) / 2e-6
+    ratio = normal[lateral][:, 0] / np.hypot(normal[lateral][:, 1], normal[lateral][:, 2])
+    np.testing.assert_allclose(ratio, slope, atol=2e-3)  # the chord of a sector of 1/32 turn
+    outward = arm[..., 1] * normal[..., 1] + arm[..., 2] * normal[..., 2]
+    assert (outward[lateral] > 0).all()
+    assert sorted(set(np.sign(normal[~lateral][:, 0]))) == [-1, 1]
+
+
+def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
+    # Straight flight of a tilted core: Σ over steps of immersed area × way = area × h, patch by patch.
+    surface = surface_of(Surface, PAPER, 12, 16, device)
+    attitude = Rotation.from_euler("zy", [20.0, -10.0], degrees=True).as_quat()
+    speed, dt = 800.0, 1.3e-6
+    x = np.arange(-0.03, 0.04, speed * dt)
+    position = np.stack([x, 0 * x, 0 * x], axis=1)
+    attitude = np.broadcast_to(attitude, (len(x), 4))
+    found = posed(surface, device, position=position, attitude=attitude, velocity=(speed, 0, 0), dt=dt)
+    swept = speed * dt * found["immersed"].sum(axis=0)
+    expected = np.broadcast_to(found["area"][0][:, None] * THICKNESS, swept.shape)
+    np.testing.assert_allclose(swept, expected, rtol=1e-11)
+
+
+def test_immersed_area_converges_to_that_of_a_fine_surface(device: str) -> None:
+    # Random poses astride the slab; a fine surface counted patch by patch, in or out, is the reference.
+    poses = random_poses(12, 0.008)
+    coarse, fine = (
+        posed(surface_of(Surface, PAPER, axial, around, device), device, **poses, dt=0.0)
+        for axial, around in ((24, 48), (192, 384))
+    )
+    depth = poses["position"][:, None, None, 0] + fine["arm"][..., 0]
+    inside = (depth > 0) & (depth < THICKNESS)
+    sharp = (inside * fine["area"][:, :, None]).sum(axis=(1, 2))
+    assert (sharp > 0).sum() > 8
+    smooth = coarse["immersed"].sum(axis=(1, 2))
+    np.testing.assert_allclose(smooth, sharp, rtol=0, atol=0.01 * sharp.max())
+
+
+def test_patch_along_the_face_is_in_or_out_at_once(device: str) -> None:
+    # A cone that lies with one line of its mantle in the face: patches there have no extent across it.
+    around = 16
+    half_angle, azimuth = np.arctan2(CONE.max_radius, CONE.cone_length), np.pi / around
+    axis = np.array([np.sin(half_angle), 0.0, np.cos(half_angle)])
+    outward = np.array([np.cos(half_angle), 0.0, -np.sin(half_angle)])
+    sideways = np.cross(axis, outward)
+    right = np.cos(azimuth) * outward - np.sin(azimuth) * sideways
+    up = np.sin(azimuth) * outward + np.cos(azimuth) * sideways
+    attitude = Rotation.from_matrix(np.stack([axis, right, up], axis=1)).as_quat()
+    tip = CONE.mass_properties.centre_of_mass * axis[0]  # all of the line is as deep
+    gaps = np.array([-5e-6, 5e-6])
+    position = np.stack([gaps - tip, 0 * gaps, 0 * gaps], axis=1)
+    surface = surface_of(Surface, CONE, 20, around, device)
+    found = posed(surface, device, position=position, attitude=np.stack([attitude] * 2), dt=0.0)
+    mantle = found["normal"][0, :, 0, 0] > 0.999
+    assert mantle.sum() == 12
+    out, inside = found["immersed"][:, mantle, 0]
+    np.testing.assert_allclose(out, 0.0, atol=1e-15)
+    np.testing.assert_allclose(inside, found["area"][0, mantle], rtol=1e-12)
+
+
+@pytest.mark.parametrize("slant", [0.1, np.pi])
+def test_ring_out_of_reach_of_the_slab_has_nothing_immersed(slant: float, device: str) -> None:
+    # Cores about straight and all ways round, turning fast in a long step.
+    rng = np.random.default_rng(6)
+    turned = Rotation.from_rotvec(rng.uniform(-slant, slant, (400, 3)))
+    poses = {"position": rng.uniform(-0.015, 0.015, (400, 3)), "attitude": turned.as_quat()}
+    surface = surface_of(Surface, CONE, 16, 16, device)
+    found = posed(surface, device, **poses, velocity=(100.0, 50.0, 0.0), omega=(3e4, -5e4, 4e4), dt=1e-5)
+    out_of_reach = (found["high"] <= 0) | (found["low"] >= THICKNESS)
+    touching = (found["immersed"] > 0).any(axis=2)
+    assert touching.sum() > 1000
+    assert not (out_of_reach & touching).any()
+    assert (~out_of_reach & ~touching).sum() < touching.sum() / 2  # nor is the reach a wild guess

@@ -1,0 +1,168 @@
+"""The march: how a shot starts, how it ends, and that its window is its own affair (MODEL.md §1)."""
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpimpact import simulate
+from warpimpact.kernels.status import Status
+from warpimpact.scene import CirclePattern, ConeCore, Core, Numerics, OgiveCore, Plate, PolynomialCore, Shots
+
+Array = NDArray[np.float64]
+
+PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
+CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
+SOLID = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05, degradation=0.8, degradation_interval=1e-6)
+HARD = SOLID.model_copy(update={"resistance": 1e11})
+HOLES = SOLID.model_copy(update={"pattern": CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))})
+WEIGHTLESS = Plate(thickness=4e-3, resistance=0.0)
+DRAFT = Numerics(fidelity="draft")
+
+
+def shots_of(**columns: Any) -> Shots:
+    """Shots of 825 m/s at the origin, but for the given columns."""
+    values = {field.name: 0.0 for field in fields(Shots)} | {"velocity": 825.0} | columns
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, dtype=float)) for value in values.values()))
+    return Shots(**dict(zip(values, (array.copy() for array in arrays), strict=True)))
+
+
+def slanted_shots(count: int = 40) -> Shots:
+    """Random shots of which no axis comes near the plate."""
+    rng = np.random.default_rng(1)
+    return shots_of(
+        hit_y=rng.uniform(-5e-3, 5e-3, count),
+        hit_z=rng.uniform(-5e-3, 5e-3, count),
+        velocity=rng.uniform(300.0, 900.0, count),
+        obliquity=rng.uniform(0.0, 0.7, count),
+        azimuth=rng.uniform(-np.pi, np.pi, count),
+        pitch=rng.uniform(-0.5, 0.5, count),
+        yaw=rng.uniform(-0.5, 0.5, count),
+        spin=rng.uniform(-2e4, 2e4, count),
+    )
+
+
+def launched(core: Core, shots: Shots) -> dict[str, Array]:
+    """How shots start: first rows of their traces through a plate without resistance, drifted back."""
+    numerics = Numerics(fidelity="draft", precision="double", time_step=1e-6)
+    histories = simulate.trace(core, WEIGHTLESS, shots, numerics=numerics)
+    first = np.array([history[0] for history in histories])
+    assert (first[:, 0] == 0.5e-6).all()
+    return {
+        "position": first[:, 1:4] - 0.5e-6 * first[:, 8:11],
+        "axis": Rotation.from_quat(first[:, 4:8]).apply([1.0, 0.0, 0.0]),
+        "velocity": first[:, 8:11],
+        "angular_momentum": first[:, 11:14],
+    }
+
+
+def line_of_flight(shots: Shots) -> Array:
+    sine = np.sin(shots.obliquity)
+    return np.stack([np.cos(shots.obliquity), sine * np.cos(shots.azimuth), sine * np.sin(shots.azimuth)], axis=1)
+
+
+def test_shot_starts_along_its_line_of_flight_through_the_hit() -> None:
+    shots = slanted_shots()
+    start, flight = launched(PAPER, shots), line_of_flight(shots)
+    np.testing.assert_allclose(start["velocity"], shots.velocity[:, None] * flight, rtol=1e-12, atol=1e-10)
+    np.testing.assert_allclose(np.cross(start["position"], flight), 0.0, atol=1e-15)
+    assert (start["position"][:, 0] < 0).all()
+
+
+def test_axis_has_the_projected_angles_of_the_flight_and_the_shot() -> None:
+    shots = slanted_shots()
+    start, flight = launched(PAPER, shots), line_of_flight(shots)
+    x, y, z = start["axis"].T
+    np.testing.assert_allclose(np.arctan2(z, x), np.arctan2(flight[:, 2], flight[:, 0]) + shots.pitch, atol=1e-12)
+    np.testing.assert_allclose(np.arctan2(y, x), np.arctan2(flight[:, 1], flight[:, 0]) + shots.yaw, atol=1e-12)
+    spin = PAPER.mass_properties.inertia_axial * shots.spin[:, None] * start["axis"]
+    np.testing.assert_allclose(start["angular_momentum"], spin, rtol=1e-9, atol=1e-18)
+
+
+@pytest.mark.parametrize("core", [PAPER, OGIVE, CONE], ids=["paper", "ogive", "cone"])
+def test_shot_starts_with_its_foremost_point_at_the_front_face(core: Core) -> None:
+    straight, slanted = launched(core, shots_of()), launched(core, slanted_shots())
+    nose = core.mass_properties.centre_of_mass
+    np.testing.assert_allclose(straight["position"], [[-nose, 0.0, 0.0]], atol=1e-15)
+    # Farthest point along x of the circles r(s) about a slanted axis.
+    s = np.linspace(0.0, core.length, 4001)
+    along = slanted["axis"][:, :1]
+    ahead = ((nose - s) * along + core.radius(s) * np.sqrt(1 - along**2)).max(axis=1)
+    gap = -(slanted["position"][:, 0] + ahead)
+    assert (gap >= -1e-12).all()
+    assert (gap < 0.6 * core.length / 16).all()  # half a ring too early at most, and rings differ in length
+
+
+@pytest.mark.parametrize(
+    ("plate", "shot", "status"),
+    [
+        (SOLID, {}, Status.PERFORATED),
+        (HARD, {}, Status.ARRESTED),
+        (SOLID, {"velocity": 300.0, "obliquity": 1.4}, Status.RICOCHETED),
+        (HOLES, {}, Status.MISSED),
+        (HOLES, {"hit_y": 40e-3, "hit_z": -60e-3}, Status.MISSED),
+        (HOLES, {"hit_y": 10e-3}, Status.PERFORATED),
+        (SOLID.model_copy(update={"size": (10e-3, 30e-3)}), {"hit_y": 9e-3}, Status.MISSED),
+        (SOLID.model_copy(update={"size": (10e-3, 30e-3)}), {"hit_z": 9e-3}, Status.PERFORATED),
+    ],
+)
+def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], status: Status, device: str) -> None:
+    outcomes = simulate.simulate(PAPER, plate, shots_of(**shot), numerics=DRAFT, standoffs=[0.05], device=device)
+    assert Status(outcomes.status[0]) is status
+    speed, initial = outcomes.residual_velocity[0], shot.get("velocity", 825.0)
+    assert np.isfinite(outcomes.tilt[0, 0]) == (status in (Status.PERFORATED, Status.MISSED))
+    if status is Status.MISSED:
+        assert speed == pytest.approx(initial, rel=1e-6)
+        assert outcomes.contact_duration[0] == 0.0
+        assert outcomes.tilt[0, 0] == pytest.approx(0.0, abs=1e-5)
+    elif status is Status.ARRESTED:
+        assert speed == 0.0
+    else:
+        assert 0.0 < speed < initial
+        assert outcomes.contact_duration[0] > 0.0
+
+
+def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
+    monkeypatch.setattr(simulate, "STEP_ALLOWANCE", 0.1)
+    outcomes = simulate.simulate(PAPER, SOLID, shots_of(), numerics=DRAFT, device=device)
+    assert Status(outcomes.status[0]) is Status.UNFINISHED
+    assert np.isnan(outcomes.residual_velocity[0])
+
+
+def test_shot_that_leaves_its_window_is_told_or_computed_in_a_wider_one(
+    monkeypatch: pytest.MonkeyPatch, device: str
+) -> None:
+    # A slow shot against the edge of a hole lies down across the window that would do for a straight one.
+    shots = shots_of(velocity=200.0, hit_y=5e-3)
+    outcomes = simulate.simulate(PAPER, HOLES, shots, numerics=DRAFT, device=device)
+    assert Status(outcomes.status[0]) is Status.PERFORATED
+    monkeypatch.setattr(simulate, "MAX_DOUBLINGS", 1)
+    outcomes = simulate.simulate(PAPER, HOLES, shots, numerics=DRAFT, device=device)
+    assert Status(outcomes.status[0]) is Status.LEFT_WINDOW
+    assert np.isnan(outcomes.residual_velocity[0])
+
+
+def test_shot_computes_the_same_bits_in_any_window_and_company(device: str) -> None:
+    # The steepest shot of a batch sets the windows of all.
+    shot = {"hit_y": 5.1e-3, "hit_z": 1.3e-3, "obliquity": 0.3, "pitch": 0.05}
+    alone = simulate.simulate(PAPER, HOLES, shots_of(**shot), numerics=DRAFT, standoffs=[0.05], device=device)
+    company = shots_of(**shot | {"hit_y": [1e-3, 5.1e-3], "obliquity": [1.2, 0.3]})
+    among = simulate.simulate(PAPER, HOLES, company, numerics=DRAFT, standoffs=[0.05], device=device)
+    for field in fields(alone):
+        np.testing.assert_array_equal(getattr(among, field.name)[1], getattr(alone, field.name)[0])
+
+
+def test_trace_adds_up_to_the_motion() -> None:
+    # Mean force and moment of every step times its duration are the change of the momenta.
+    shots = shots_of(hit_y=5.0e-3, hit_z=2.0e-3, velocity=800.0, pitch=0.05)
+    (history,) = simulate.trace(PAPER, HOLES, shots, numerics=Numerics(fidelity="draft", precision="double"))
+    mass, dt = PAPER.mass_properties.mass, history[1, 0] - history[0, 0]
+    assert np.abs(history[:, 14:17]).max() > 1e3
+    np.testing.assert_allclose(dt * history[1:, 14:17], mass * np.diff(history[:, 8:11], axis=0), atol=1e-12)
+    np.testing.assert_allclose(dt * history[1:, 17:20], np.diff(history[:, 11:14], axis=0), atol=1e-14)
+    drift = np.diff(history[:, 1:4], axis=0) - dt * history[:-1, 8:11]
+    np.testing.assert_allclose(drift, 0.0, atol=1e-15)

@@ -1,0 +1,292 @@
+"""Rigid-body motion: closed forms of the symmetric top, and what a kick may and may not do (MODEL.md §5)."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpimpact.kernels import rigid_body
+from warpimpact.kernels.variant import Variant
+
+from .probes import attitudes, poisoned, records, unit_vectors
+
+Array = NDArray[np.float64]
+
+VARIANT = Variant(double=True)
+real, vec3 = VARIANT.real, VARIANT.vec3
+motion = rigid_body.build(VARIANT)
+Body, State, Load = motion.Body, motion.State, motion.Load
+
+COUNT = 64
+MASS, AXIAL, TRANSVERSE = 4.0e-3, 1.5e-8, 1.65e-7  # the paper's core, SI
+STEP = 1.0e-6
+STIFF = 1.0e-3  # [s], so long that the damping of these tests stops most of the motion within it
+GENERALISED_INERTIA = np.array([MASS] * 3 + [TRANSVERSE] * 3)
+
+
+def convert(
+    body: Body,
+    states: wp.array(dtype=State),
+    rates: wp.array(dtype=vec3),
+    momenta: wp.array(dtype=vec3),
+    axes: wp.array(dtype=vec3),
+    energies: wp.array(dtype=real),
+) -> None:
+    """ω from the states' L, and L from that ω."""
+    i = wp.tid()
+    state = states[i]
+    axis = motion.axis_of(state.attitude)
+    axes[i] = axis
+    rates[i] = motion.angular_velocity(body, axis, state.angular_momentum)
+    momenta[i] = motion.angular_momentum(body, axis, rates[i])
+    energies[i] = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+
+
+def drift(
+    body: Body, states: wp.array(dtype=State), dt: real, repeats: wp.int32, drifted: wp.array(dtype=State)
+) -> None:
+    i = wp.tid()
+    state = states[i]
+    for _ in range(repeats):
+        state = motion.drift(body, state, dt)
+    drifted[i] = state
+
+
+def turn(body: Body, states: wp.array(dtype=State), time: real, axes: wp.array(dtype=vec3)) -> None:
+    i = wp.tid()
+    axes[i] = motion.turned(body, motion.axis_of(states[i].attitude), states[i].angular_momentum, time)
+
+
+def kick(
+    body: Body,
+    states: wp.array(dtype=State),
+    loads: wp.array(dtype=Load),
+    dt: real,
+    kicked: wp.array(dtype=State),
+    means: wp.array(dtype=Load),
+) -> None:
+    """The kicked states, and the mean load of each kick."""
+    i = wp.tid()
+    kicked[i] = motion.kick(body, states[i], loads[i], dt)
+    means[i] = motion.mean_load(body, states[i], loads[i], dt)
+
+
+CONVERT, DRIFT, TURN, KICK = (VARIANT.kernel(function) for function in (convert, drift, turn, kick))
+
+
+def paper_body() -> Any:
+    body = Body()
+    body.mass, body.inertia_axial, body.inertia_transverse = MASS, AXIAL, TRANSVERSE
+    return body
+
+
+def random_motion() -> SimpleNamespace:
+    """States of cores that spin and tumble at some 1e4 rad/s, and their inertia in the plate frame."""
+    rng = np.random.default_rng(1)
+    attitude = attitudes(rng, COUNT)
+    turned = Rotation.from_quat(attitude)
+    matrices = turned.as_matrix()
+    inertia = matrices @ np.diag([AXIAL, TRANSVERSE, TRANSVERSE]) @ matrices.transpose(0, 2, 1)
+    omega = 1e4 * rng.standard_normal((COUNT, 3))
+    return SimpleNamespace(
+        position=1e-2 * rng.standard_normal((COUNT, 3)),
+        attitude=attitude,
+        velocity=800.0 * rng.standard_normal((COUNT, 3)),
+        angular_momentum=np.einsum("nij,nj->ni", inertia, omega),
+        rotation=turned,
+        axis=matrices[:, :, 0],
+        omega=omega,
+        inertia=inertia,
+    )
+
+
+def states_of(start: SimpleNamespace, device: str) -> wp.array:
+    names = ("position", "attitude", "velocity", "angular_momentum")
+    return records(State, device, **{name: getattr(start, name) for name in names})
+
+
+def drifted(start: SimpleNamespace, dt: float, device: str, repeats: int = 1) -> Any:
+    after = poisoned(COUNT, State, device)
+    inputs = [paper_body(), states_of(start, device), dt, repeats]
+    wp.launch(DRIFT, COUNT, inputs=inputs, outputs=[after], device=device)
+    return after.numpy()
+
+
+def kicked(start: SimpleNamespace, dt: float, device: str, **load: Any) -> tuple[Any, Any]:
+    after, means = poisoned(COUNT, State, device), poisoned(COUNT, Load, device)
+    inputs = [paper_body(), states_of(start, device), records(Load, device, **load), dt]
+    wp.launch(KICK, COUNT, inputs=inputs, outputs=[after, means], device=device)
+    return after.numpy(), means.numpy()
+
+
+def energy(start: SimpleNamespace, velocity: Array, momentum: Array) -> Array:
+    omega = np.linalg.solve(start.inertia, momentum[..., None])[..., 0]
+    return 0.5 * (MASS * (velocity**2).sum(axis=1) + (momentum * omega).sum(axis=1))
+
+
+def mass_matrices(start: SimpleNamespace) -> Array:
+    """M of (v, ω), shape [COUNT, 6, 6]."""
+    matrices = np.zeros((COUNT, 6, 6))
+    matrices[:, :3, :3] = MASS * np.eye(3)
+    matrices[:, 3:, 3:] = start.inertia
+    return matrices
+
+
+def drag() -> Array:
+    """Random positive semidefinite −∂(force, moment)/∂(v, ω) of rank 1 to 6, shape [COUNT, 6, 6]."""
+    rng = np.random.default_rng(2)
+    directions = rng.standard_normal((COUNT, 6, 6)) * (np.arange(6) <= np.arange(COUNT)[:, None] % 6)[:, None]
+    directions *= np.sqrt(GENERALISED_INERTIA / STIFF)[:, None]
+    return directions @ directions.transpose(0, 2, 1)
+
+
+def damping(matrices: Array) -> dict[str, Array]:
+    """Members of a Load for the damping D, shape [COUNT, 6, 6]."""
+    return {
+        "damping_vv": matrices[:, :3, :3],
+        "damping_vw": matrices[:, :3, 3:],
+        "damping_ww": matrices[:, 3:, 3:],
+        "damped": np.full(COUNT, True),
+    }
+
+
+def test_rates_momenta_and_energy_are_those_of_the_inertia_tensor(device: str) -> None:
+    start = random_motion()
+    rates, momenta, axes = (poisoned(COUNT, vec3, device) for _ in range(3))
+    energies = poisoned(COUNT, real, device)
+    outputs = [rates, momenta, axes, energies]
+    wp.launch(CONVERT, COUNT, inputs=[paper_body(), states_of(start, device)], outputs=outputs, device=device)
+    np.testing.assert_allclose(axes.numpy(), start.axis, atol=1e-14)
+    np.testing.assert_allclose(rates.numpy(), start.omega, rtol=1e-12, atol=1e-8)
+    np.testing.assert_allclose(momenta.numpy(), start.angular_momentum, rtol=1e-12, atol=1e-17)
+    expected = energy(start, start.velocity, start.angular_momentum)
+    np.testing.assert_allclose(energies.numpy(), expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("dt", [1e-9, 1e-6, 1e-3])
+def test_drift_is_the_closed_form_of_the_symmetric_top(dt: float, device: str) -> None:
+    # §6.5: the axis precesses about L at |L|/I_t; in the body frame the spin stays and the transverse rate
+    # turns about the axis at (I_a − I_t)/I_t of the spin. Together they fix the attitude. For any dt.
+    start = random_motion()
+    after = drifted(start, dt, device)
+    np.testing.assert_allclose(after["position"], start.position + dt * start.velocity, rtol=1e-14)
+    np.testing.assert_array_equal(after["velocity"], start.velocity)
+    np.testing.assert_array_equal(after["angular_momentum"], start.angular_momentum)
+
+    rotation = Rotation.from_quat(after["attitude"])
+    precession = Rotation.from_rotvec(dt / TRANSVERSE * start.angular_momentum)
+    np.testing.assert_allclose(rotation.as_matrix()[:, :, 0], precession.apply(start.axis), atol=1e-11)
+
+    body_rate = start.rotation.inv().apply(start.omega)
+    angle = dt * (AXIAL - TRANSVERSE) / TRANSVERSE * body_rate[:, 0]
+    turned_rate = Rotation.from_rotvec(angle[:, None] * [1.0, 0.0, 0.0]).apply(body_rate)
+    inertia = np.array([AXIAL, TRANSVERSE, TRANSVERSE])
+    np.testing.assert_allclose(
+        rotation.inv().apply(start.angular_momentum), inertia * turned_rate, rtol=1e-9, atol=1e-13
+    )
+
+
+def test_drift_without_rotation_is_a_straight_line(device: str) -> None:
+    start = random_motion()
+    start.angular_momentum = np.zeros((COUNT, 3))
+    after = drifted(start, 1e-3, device)
+    np.testing.assert_allclose(after["attitude"], start.attitude, atol=1e-15)
+    np.testing.assert_allclose(after["position"], start.position + 1e-3 * start.velocity, rtol=1e-14)
+
+
+def test_two_half_drifts_make_one(device: str) -> None:
+    start, dt = random_motion(), 1e-4
+    once, twice = drifted(start, dt, device), drifted(start, dt / 2, device, repeats=2)
+    for name in State.numpy_dtype()["names"]:
+        np.testing.assert_allclose(twice[name], once[name], atol=1e-13)
+
+
+def test_attitude_stays_a_unit_quaternion(device: str) -> None:
+    # Unnormalised, 1e4 products in float64 drift by some 1e-14.
+    after = drifted(random_motion(), STEP, device, repeats=10_000)
+    np.testing.assert_allclose(np.linalg.norm(after["attitude"], axis=1), 1.0, rtol=0, atol=1e-15)
+
+
+def test_turned_axis_is_that_of_the_drift(device: str) -> None:
+    start, time = random_motion(), 2e-4
+    axes = poisoned(COUNT, vec3, device)
+    inputs = [paper_body(), states_of(start, device), time]
+    wp.launch(TURN, COUNT, inputs=inputs, outputs=[axes], device=device)
+    after = Rotation.from_quat(drifted(start, time, device)["attitude"]).as_matrix()[:, :, 0]
+    np.testing.assert_allclose(axes.numpy(), after, atol=1e-12)
+
+
+def test_small_kick_is_the_impulse(device: str) -> None:
+    start = random_motion()
+    force, moment = -5.0 * start.velocity, -1e3 * start.angular_momentum
+    after, means = kicked(start, STEP, device, force=force, moment=moment)
+    np.testing.assert_array_equal(after["position"], start.position)
+    np.testing.assert_array_equal(after["attitude"], start.attitude)
+    np.testing.assert_allclose(after["velocity"], start.velocity + STEP / MASS * force, rtol=1e-13)
+    np.testing.assert_allclose(
+        after["angular_momentum"], start.angular_momentum + STEP * moment, rtol=1e-12, atol=1e-17
+    )
+    np.testing.assert_allclose(means["force"], force, rtol=1e-13)
+    np.testing.assert_allclose(means["moment"], moment, rtol=1e-13)
+
+
+def test_damped_kick_solves_the_linearly_implicit_step(device: str) -> None:
+    # (M + dt D) Δu = dt F with F of a linear drag, F = −D u: implicit Euler, which dissipates at any step.
+    start, matrices = random_motion(), drag()
+    u = np.concatenate([start.velocity, start.omega], axis=1)
+    load = -np.einsum("nij,nj->ni", matrices, u)
+    after, means = kicked(start, STIFF, device, force=load[:, :3], moment=load[:, 3:], **damping(matrices))
+
+    inertia = mass_matrices(start)
+    change = np.linalg.solve(inertia + STIFF * matrices, STIFF * load[..., None])[..., 0]
+    scale = np.abs(change[:, :3]).max(), np.abs(change[:, 3:]).max()
+    dv = after["velocity"] - start.velocity
+    dl = (after["angular_momentum"] - start.angular_momentum)[..., None]
+    dw = np.linalg.solve(start.inertia, dl)[..., 0]
+    np.testing.assert_allclose(dv, change[:, :3], rtol=0, atol=1e-9 * scale[0])
+    np.testing.assert_allclose(dw, change[:, 3:], rtol=0, atol=1e-9 * scale[1])
+
+    # What the step has applied on average is its change of momentum.
+    impulse = np.einsum("nij,nj->ni", inertia, change)
+    applied = STIFF * np.concatenate([means["force"], means["moment"]], axis=1)
+    np.testing.assert_allclose(applied[:, :3], impulse[:, :3], rtol=0, atol=1e-9 * np.abs(impulse[:, :3]).max())
+    np.testing.assert_allclose(applied[:, 3:], impulse[:, 3:], rtol=0, atol=1e-9 * np.abs(impulse[:, 3:]).max())
+
+
+@pytest.mark.parametrize("dt", [1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("with_drag", [False, True])
+def test_kick_never_raises_the_energy(with_drag: bool, dt: float, device: str) -> None:
+    # Random loads of the size that stops the core in 10 µs; half of them push along the motion.
+    start, rng = random_motion(), np.random.default_rng(3)
+    load = {
+        "force": MASS * 800.0 / 1e-5 * rng.standard_normal((COUNT, 3)),
+        "moment": TRANSVERSE * 1e4 / 1e-5 * rng.standard_normal((COUNT, 3)),
+    } | (damping(drag()) if with_drag else {})
+    after, _ = kicked(start, dt, device, **load)
+    before = energy(start, start.velocity, start.angular_momentum)
+    left = energy(start, after["velocity"], after["angular_momentum"])
+    assert (left <= before * (1 + 1e-12)).all()
+    assert (left < 0.999 * before).any()
+
+
+@pytest.mark.parametrize(("overshoot", "applied"), [(0.9, 0.9), (1.1, 1.0), (1.9, 1.0), (1e3, 1.0)])
+def test_overshooting_kick_stops_at_the_least_energy_along_it(overshoot: float, applied: float, device: str) -> None:
+    # Along a direction d an impulse −m (v·d) takes the most that it can; of a larger one as much is applied.
+    start = random_motion()
+    d = unit_vectors(np.random.default_rng(4), COUNT)
+    along = (start.velocity * d).sum(axis=1, keepdims=True) * d
+    after, means = kicked(start, 1.0, device, force=-overshoot * MASS * along)
+    np.testing.assert_allclose(after["velocity"], start.velocity - applied * along, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(means["force"], -applied * MASS * along, rtol=0, atol=1e-11)
+    np.testing.assert_array_equal(after["angular_momentum"], start.angular_momentum)
+
+
+def test_kick_that_would_only_add_energy_is_none(device: str) -> None:
+    start = random_motion()
+    after, _ = kicked(start, STEP, device, force=start.velocity, moment=1e-3 * start.angular_momentum)
+    np.testing.assert_array_equal(after["velocity"], start.velocity)
+    np.testing.assert_array_equal(after["angular_momentum"], start.angular_momentum)

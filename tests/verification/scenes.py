@@ -1,0 +1,144 @@
+"""The scenes of the verification: the paper's core and plate, others around them, and what a trace says."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+from warpimpact import simulate as simulation
+from warpimpact.scene import (
+    Core,
+    Interaction,
+    NoPattern,
+    Numerics,
+    Plate,
+    PolynomialCore,
+    Shots,
+    SlotPattern,
+)
+
+from . import references
+
+Array = NDArray[np.float64]
+
+PAPER_CORE = PolynomialCore(
+    coefficients=references.PAPER_COEFFICIENTS, length=references.PAPER_LENGTH, mass=references.PAPER_MASS
+)
+SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
+STANDOFFS = (0.05, 0.13)
+
+
+def paper_plate(**changes: Any) -> Plate:
+    """The paper's plate and material (spacing assumed), but for `changes`."""
+    paper = {
+        "thickness": 4e-3,
+        "resistance": 2.6e9,
+        "shear_coefficient": 0.05,
+        "degradation": 0.8,
+        "degradation_interval": 1e-6,
+        "degradation_length": 0.5e-3,
+        "pattern": SLOTS,
+    }
+    return Plate(**paper | changes)
+
+
+def solid_plate(**changes: Any) -> Plate:
+    """The paper's plate without holes."""
+    return paper_plate(pattern=NoPattern(), **changes)
+
+
+def shots_at(
+    hit_y: ArrayLike = 0.0,
+    hit_z: ArrayLike = 0.0,
+    *,
+    velocity: ArrayLike = 825.0,
+    obliquity: ArrayLike = 0.0,
+    azimuth: ArrayLike = 0.0,
+    pitch: ArrayLike = 0.0,
+    yaw: ArrayLike = 0.0,
+    spin: ArrayLike = 0.0,
+) -> Shots:
+    """Shots at hit points [m], everything broadcast; angles in degrees here."""
+    angles = (np.deg2rad(a) for a in (obliquity, azimuth, pitch, yaw))
+    columns = np.broadcast_arrays(*map(np.atleast_1d, (hit_y, hit_z, velocity, *angles, spin)))
+    return Shots(*(np.array(column, dtype=float) for column in columns))
+
+
+def scattered_hits(count: int, seed: int = 0) -> Array:
+    """Hit points over the unit cell of the slotted plate [m], shape (2, count): none on a line of symmetry."""
+    return np.random.default_rng(seed).random((2, count)) * 16e-3
+
+
+def simulate(
+    plate: Plate,
+    shots: Shots,
+    *,
+    core: Core = PAPER_CORE,
+    interaction: Interaction | None = None,
+    standoffs: tuple[float, ...] = STANDOFFS,
+    device: str = "cpu",
+    **numerics: Any,
+) -> simulation.Outcomes:
+    """`warpimpact.simulate` with the numerics spelt out."""
+    return simulation.simulate(
+        core,
+        plate,
+        shots,
+        interaction=interaction,
+        numerics=Numerics(**numerics),
+        standoffs=list(standoffs),
+        device=device,
+    )
+
+
+@dataclass(frozen=True)
+class History:
+    """A traced shot: the state after each step and the mean load of the step; arrays (steps,) or (steps, 3)."""
+
+    core: Core
+    time: Array
+    position: Array
+    attitude: Rotation  # from the core's axes to the plate's
+    velocity: Array
+    angular_momentum: Array
+    force: Array
+    moment: Array
+
+    @property
+    def axis(self) -> Array:
+        """Unit vector along the core towards its nose."""
+        return self.attitude.apply([1.0, 0.0, 0.0])
+
+    @property
+    def angular_velocity(self) -> Array:
+        """ω = I⁻¹ L [rad/s]."""
+        inertia, axis = self.core.mass_properties, self.axis
+        along = (self.angular_momentum * axis).sum(axis=1, keepdims=True) * axis
+        return along / inertia.inertia_axial + (self.angular_momentum - along) / inertia.inertia_transverse
+
+    @property
+    def energy(self) -> Array:
+        """Kinetic energy [J]."""
+        linear = self.core.mass_properties.mass * self.velocity
+        return 0.5 * (linear * self.velocity + self.angular_momentum * self.angular_velocity).sum(axis=1)
+
+
+def histories(
+    plate: Plate,
+    shots: Shots,
+    *,
+    core: Core = PAPER_CORE,
+    interaction: Interaction | None = None,
+    **numerics: Any,
+) -> list[History]:
+    """`warpimpact.simulate.trace`, its columns named."""
+    traced = simulation.trace(core, plate, shots, interaction=interaction, numerics=Numerics(**numerics))
+    return [_history(core, rows.astype(float)) for rows in traced]
+
+
+def _history(core: Core, rows: Array) -> History:
+    attitude = Rotation.from_quat(rows[:, 4:8])
+    columns = (rows[:, start : start + 3] for start in (8, 11, 14, 17))
+    return History(core, rows[:, 0], rows[:, 1:4], attitude, *columns)

@@ -1,0 +1,76 @@
+"""The same shots give the same bits, however they are shared out."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact import simulate as simulation
+from warpimpact.scene import Shots
+from warpimpact.simulate import Outcomes
+
+from .scenes import paper_plate, scattered_hits, shots_at, simulate
+
+COUNT = 100
+
+
+def mixed_shots() -> Shots:
+    """Velocities, obliquities and attitudes that differ from hit to hit, so that windows and steps do."""
+    rng = np.random.default_rng(1)
+    return shots_at(
+        *scattered_hits(COUNT),
+        velocity=rng.uniform(300.0, 900.0, COUNT),
+        obliquity=rng.uniform(0.0, 70.0, COUNT),
+        azimuth=rng.uniform(0.0, 360.0, COUNT),
+        pitch=rng.uniform(-10.0, 10.0, COUNT),
+        yaw=rng.uniform(-10.0, 10.0, COUNT),
+        spin=rng.uniform(0.0, 2e4, COUNT),
+    )
+
+
+ALIKE, MIXED = shots_at(*scattered_hits(COUNT)), mixed_shots()
+KINDS = pytest.mark.parametrize("shots", [ALIKE, MIXED], ids=["alike", "mixed"])
+NUMERICS = pytest.mark.parametrize(
+    "numerics",
+    [{"precision": "single"}, {"precision": "double"}, {"precision": "single", "time_step": 0.7e-6}],
+    ids=["single", "double", "fixed step"],
+)
+
+
+def outcomes_of(shots: Shots, device: str, numerics: dict[str, Any]) -> Outcomes:
+    return simulate(paper_plate(), shots, fidelity="draft", device=device, **numerics)
+
+
+def assert_identical(got: Outcomes, expected: Outcomes) -> None:
+    for name, values in vars(expected).items():
+        np.testing.assert_array_equal(getattr(got, name), values, err_msg=name)
+
+
+@KINDS
+@NUMERICS
+def test_same_shots_twice(shots: Shots, numerics: dict[str, Any], device: str) -> None:
+    assert_identical(outcomes_of(shots, device, numerics), outcomes_of(shots, device, numerics))
+
+
+@KINDS
+@NUMERICS
+@pytest.mark.parametrize("size", [1, 7, 32, 33, 64])
+def test_any_split(shots: Shots, numerics: dict[str, Any], size: int, device: str) -> None:
+    parts = [outcomes_of(shots[k : k + size], device, numerics) for k in range(0, COUNT, size)]
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])}
+    assert_identical(Outcomes(**joined), outcomes_of(shots, device, numerics))
+
+
+@KINDS
+@pytest.mark.parametrize("threads", [1, 3, 8])
+def test_any_number_of_threads(shots: Shots, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = outcomes_of(shots, "cpu", {})
+    monkeypatch.setattr(simulation, "_threads", lambda: threads)
+    assert_identical(outcomes_of(shots, "cpu", {}), expected)
+
+
+@KINDS
+def test_any_chunk(shots: Shots, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = outcomes_of(shots, "cpu", {})
+    monkeypatch.setattr(simulation, "CPU_CHUNK", 5)
+    assert_identical(outcomes_of(shots, "cpu", {}), expected)

@@ -1,0 +1,100 @@
+"""A hit on the straight edge of a plate too weak to turn the core: force, moment and exposure (MODEL.md §4, 5)."""
+
+import numpy as np
+import pytest
+from scipy.signal import fftconvolve
+
+from warpimpact.kernels.status import Status
+from warpimpact.scene import ConeCore, ProfileCore
+
+from .scenes import Array, shots_at, simulate, solid_plate
+
+VELOCITY, THICKNESS, HALF_SIZE = 825.0, 4e-3, 10e-3
+WEAK = 2.6e4  # [Pa]: the core turns by 1e-5 of what it does in the paper's plate
+CONE_LENGTH, RADIUS = 15e-3, 3e-3
+CONE = ConeCore(diameter=2 * RADIUS, length=25e-3, cone_length=CONE_LENGTH, mass=4e-3)
+
+
+def impulse(shear_coefficient: float) -> tuple[float, float]:
+    """Lateral impulse [N s] and angular impulse about z [N m s] on the half of the cone that faces −y.
+
+    In straight flight every element of it is in the plate for h/v and carries Y (−n + η t). With k = r' it has
+    n dA = (k, e_r) r dφ ds, t dA = (−1, k e_r) r dφ ds and the arm (ξ, r e_r), ξ ahead of the centre of mass; so, as
+    ∫ cos φ dφ = −2 over the half,
+
+        ∫ F_y dt = 2 Y h/v (1 − η k) ∫ r ds,      ∫ M_z dt = 2 Y h/v ∫ [(1 − η k) ξ − (k + η) r] r ds.
+    """
+    slope, centre = RADIUS / CONE_LENGTH, CONE.mass_properties.centre_of_mass
+    radius_integral, square_integral = RADIUS * CONE_LENGTH / 2, RADIUS**2 * CONE_LENGTH / 3
+    arm_integral = centre * radius_integral - square_integral / slope
+    lateral = 1 - shear_coefficient * slope
+    scale = 2 * WEAK * THICKNESS / VELOCITY
+    return (
+        scale * lateral * radius_integral,
+        scale * (lateral * arm_integral - (slope + shear_coefficient) * square_integral),
+    )
+
+
+# What is finite: rings and sectors, and the edge, smeared over a cell of ℓ/2. Measured: 1.5e-3 of the force,
+# 2.4e-3 of the moment (reference: 2.5e-4 and 5e-4).
+@pytest.mark.parametrize("shear_coefficient", [0.0, 0.3])
+@pytest.mark.parametrize(("along", "turning"), [("y", [0.0, 0.0, 1.0]), ("z", [0.0, -1.0, 0.0])])
+def test_half_a_cone_on_an_edge_receives_its_impulse(
+    shear_coefficient: float, along: str, turning: list[float], device: str
+) -> None:
+    plate = solid_plate(
+        size=(2 * HALF_SIZE, 2 * HALF_SIZE),
+        resistance=WEAK,
+        shear_coefficient=shear_coefficient,
+        degradation=1.0,
+    )
+    shots = shots_at(**{f"hit_{along}": HALF_SIZE})
+    outcomes = simulate(plate, shots, core=CONE, precision="double", device=device)
+    assert outcomes.status[0] == Status.PERFORATED
+    lateral, angular = impulse(shear_coefficient)
+    mass, _, _, inertia = CONE.mass_properties
+    assert outcomes.deflection[0] == pytest.approx(lateral / mass / VELOCITY, rel=3e-3)
+    expected = angular / inertia * np.array(turning)
+    assert outcomes.angular_velocity[0] == pytest.approx(expected, rel=4e-3, abs=1e-9 * abs(expected).max())
+
+
+ROD = ProfileCore(s=(0.0, 25e-3), r=(RADIUS, RADIUS), mass=4e-3)
+WEAKENING = {"degradation": 0.3, "degradation_interval": 1e-6, "degradation_length": 0.5e-3}
+
+
+def rod_impulse(points_per_length: int = 40) -> tuple[float, float]:
+    """Impulse along −x [N s] and angular impulse about z [N m s] on a flat-nosed rod whose half y < 0 meets the plate.
+
+    The half disc D touches for τ = h/v. Beneath it dT/dt = A, A = ∫_D K: what is not material adds nothing. So a
+    point of it resists with ∫ Y β^(A t/Δt_β) dt = Y (1 − e^(−κAτ))/(κA), κ = −ln β/Δt_β. Quadrature on a grid.
+    """
+    length = WEAKENING["degradation_length"]
+    spacing = length / points_per_length
+    y, z = spacing * (np.arange(-240, 0) + 0.5)[:, None], spacing * (np.arange(-240, 240) + 0.5)
+    touched = (y**2 + z**2 < RADIUS**2).astype(float)
+    tent = 1 - np.abs(np.arange(-points_per_length, points_per_length + 1)) / points_per_length
+    covered: Array = fftconvolve(touched, np.outer(tent, tent) / points_per_length**2, mode="same")
+    decay = -np.log(WEAKENING["degradation"]) / WEAKENING["degradation_interval"] * np.maximum(covered, 1e-9)
+    resistance = WEAK * touched * -np.expm1(-decay * THICKNESS / VELOCITY) / decay * spacing**2
+    return float(resistance.sum()), float((y * resistance).sum())
+
+
+# Rings of 0.2 mm and cells of ℓ/4, which smear the edge. Measured: 0.5 % and 1 % less; with exposure gained from holes
+# too, 5 % less. Degradation takes 81 % of the impulse.
+def test_exposure_is_gained_from_material_alone(device: str) -> None:
+    plate = solid_plate(size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=0.0, **WEAKENING)
+    outcomes = simulate(
+        plate,
+        shots_at(HALF_SIZE),
+        core=ROD,
+        device=device,
+        precision="double",
+        patches_axial=128,
+        patches_around=128,
+        grid_spacing=0.125e-3,
+        time_step=1e-7,
+    )
+    impulse_x, angular = rod_impulse()
+    mass, _, _, inertia = ROD.mass_properties
+    assert VELOCITY - outcomes.residual_velocity[0] == pytest.approx(impulse_x / mass, rel=0.01)
+    assert outcomes.angular_velocity[0, 2] == pytest.approx(angular / inertia, rel=0.02)

@@ -1,0 +1,103 @@
+"""Torque-free flight of the spinning core: through a hole, and behind a plate (MODEL.md §5, 6.5, 6.6)."""
+
+import numpy as np
+import pytest
+
+from warpimpact.kernels.status import Status
+from warpimpact.scene import CirclePattern
+
+from . import references
+from .scenes import PAPER_CORE, STANDOFFS, History, histories, paper_plate, shots_at, simulate, solid_plate
+
+WIDE_HOLE = paper_plate(pattern=CirclePattern(diameter=40e-3, spacing=(60e-3, 60e-3)))
+THROUGH_HOLE = {"velocity": 826.0, "pitch": 3.0, "yaw": -2.0, "spin": 1.7e4}
+EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
+PRECISIONS = pytest.mark.parametrize("precision", list(EPSILON))
+
+# Past the edge of a small plate: the nose is pushed aside, and the core goes on without touching.
+SMALL_PLATE = solid_plate(size=(10e-3, 10e-3))
+PAST_THE_EDGE = {"velocity": 600.0, "yaw": 10.0, "pitch": 3.0, "spin": 1.7e4}
+EDGE = (7e-3, 1e-3)
+
+
+@PRECISIONS
+def test_pass_through_a_wide_hole_is_free_flight(precision: str, device: str) -> None:
+    shots = shots_at(1e-3, -2e-3, **THROUGH_HOLE)
+    outcomes = simulate(WIDE_HOLE, shots, precision=precision, device=device)
+    assert outcomes.status[0] == Status.MISSED
+    assert outcomes.residual_velocity[0] == 826.0
+    assert outcomes.energy_loss[0] == outcomes.contact_duration[0] == outcomes.deflection[0] == 0.0
+    # Spin about the axis is all there is to L, so the axis stays: its projections are the shot's pitch and yaw.
+    pitch, yaw = np.deg2rad([3.0, -2.0])
+    few_ulp = 8 * EPSILON[precision]
+    assert outcomes.pitch == pytest.approx(pitch, abs=few_ulp)
+    assert outcomes.yaw == pytest.approx(yaw, abs=few_ulp)
+    tilt = np.arctan(np.hypot(np.tan(pitch), np.tan(yaw)))
+    assert outcomes.tilt == pytest.approx(tilt, abs=few_ulp)
+    assert outcomes.total_yaw == pytest.approx(tilt, abs=few_ulp)
+    axis = np.array([1.0, np.tan(yaw), np.tan(pitch)]) * np.cos(tilt)
+    assert outcomes.angular_velocity[0] == pytest.approx(1.7e4 * axis, abs=1.7e4 * few_ulp)
+
+
+@PRECISIONS
+def test_oblique_pass_keeps_speed_and_direction(precision: str, device: str) -> None:
+    shots = shots_at(1e-3, -2e-3, obliquity=10.0, azimuth=50.0, **THROUGH_HOLE)
+    outcomes = simulate(WIDE_HOLE, shots, precision=precision, device=device)
+    # The direction's components are rounded, so its length is one but for rounding.
+    few_ulp = 4 * EPSILON[precision]
+    assert outcomes.status[0] == Status.MISSED
+    assert outcomes.residual_velocity[0] == pytest.approx(826.0, rel=few_ulp)
+    assert outcomes.deflection[0] == pytest.approx(0.0, abs=few_ulp)
+    assert outcomes.energy_loss[0] == outcomes.contact_duration[0] == 0.0
+
+
+def after_contact(history: History) -> slice:
+    """The traced steps from the last one with a load on."""
+    return slice(int(np.flatnonzero(history.force.any(axis=1))[-1]), None)
+
+
+@PRECISIONS
+def test_spinning_core_precesses_about_its_angular_momentum(precision: str) -> None:
+    # a(t) = R(|L| t/I_t about L) a(0), with |L| and T constant
+    (history,) = histories(SMALL_PLATE, shots_at(*EDGE, **PAST_THE_EDGE), precision=precision, time_step=1e-7)
+    free = after_contact(history)
+    momentum, energy, axis = history.angular_momentum[free], history.energy[free], history.axis[free]
+    assert len(axis) > 50
+    assert (momentum == momentum[0]).all()
+    along = momentum[0] @ axis[0]
+    assert np.linalg.norm(momentum[0]) > 1.2 * abs(along)  # else there is no precession
+    # The attitude is rounded in every step, like a random walk.
+    rounding = EPSILON[precision] * 4 * np.sqrt(len(axis))
+    assert energy == pytest.approx(energy[0], rel=rounding)
+    time = history.time[free] - history.time[free][0]
+    _, _, axial, transverse = PAPER_CORE.mass_properties
+    expected = references.torque_free_axis(time, axis[0], momentum[0], transverse)
+    assert axis == pytest.approx(expected, abs=rounding)
+    assert np.abs(expected[-1] - axis[0]).max() > 100 * rounding
+    # Seen from the core, its transverse rate turns at (I_a − I_t)/I_t p.
+    rate = history.attitude[free].inv().apply(history.angular_velocity[free])
+    expected = references.body_rate(time, rate[0], axial, transverse)
+    assert rate == pytest.approx(expected, abs=np.linalg.norm(rate[0]) * transverse / axial * rounding)
+
+
+def test_attitude_at_the_standoffs_is_that_of_precession() -> None:
+    shots = shots_at(*EDGE, **PAST_THE_EDGE)
+    (history,) = histories(SMALL_PLATE, shots, precision="double")
+    outcomes = simulate(SMALL_PLATE, shots, precision="double")
+    assert outcomes.status[0] == Status.PERFORATED
+    # The centre of mass passes x = h + d at this time after the last traced step.
+    planes = SMALL_PLATE.thickness + np.array(STANDOFFS)
+    time = (planes - history.position[-1, 0]) / history.velocity[-1, 0]
+    axis = references.torque_free_axis(
+        time,
+        history.axis[-1],
+        history.angular_momentum[-1],
+        PAPER_CORE.mass_properties.inertia_transverse,
+    )
+    # Traced and untraced kernels are compiled apart, and may round differently: 1e-12 against angles of order 1.
+    assert outcomes.pitch[0] == pytest.approx(np.arctan2(axis[:, 2], axis[:, 0]), abs=1e-11)
+    assert outcomes.yaw[0] == pytest.approx(np.arctan2(axis[:, 1], axis[:, 0]), abs=1e-11)
+    assert outcomes.tilt[0] == pytest.approx(np.arccos(axis[:, 0]), abs=1e-11)
+    direction = history.velocity[-1] / np.linalg.norm(history.velocity[-1])
+    assert outcomes.total_yaw[0] == pytest.approx(np.arccos(axis @ direction), abs=1e-11)
+    assert np.ptp(outcomes.tilt) > 0.1

@@ -1,0 +1,227 @@
+"""From a scene to arrays: numerics with every choice made, rings of the core, tile of the plate, filter."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact import discretisation
+from warpimpact.discretisation import FIDELITIES, NODAL, onset_jump, resolve, rings_of, tent_taps, tile_of
+from warpimpact.scene import (
+    CirclePattern,
+    ConeCore,
+    Core,
+    Numerics,
+    OgiveCore,
+    Plate,
+    PolynomialCore,
+    ProfileCore,
+    SlotPattern,
+    TrianglePattern,
+)
+
+PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, density=7850.0)
+CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, density=7850.0)
+TABLE = ProfileCore(s=(0.0, 3e-3, 11e-3, 20e-3), r=(1e-3, 2e-3, 3e-3, 2.5e-3), density=7850.0)
+CORES = pytest.mark.parametrize("core", [PAPER, OGIVE, CONE, TABLE], ids=["paper", "ogive", "cone", "table"])
+PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
+PATTERNS = [
+    SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True),
+    CirclePattern(diameter=5e-3, spacing=(7.1e-3, 9.3e-3)),
+    TrianglePattern(side=6e-3, spacing=(8e-3, 8e-3), staggered=True),
+]
+
+
+# --- Resolution ---
+
+
+@pytest.mark.parametrize("name", FIDELITIES)
+def test_fidelity_fills_in_what_is_not_given(name: str) -> None:
+    fidelity = FIDELITIES[name]
+    resolution = resolve(Numerics(fidelity=name), PAPER, PLATE)
+    assert not resolution.nodal
+    assert resolution.time_step is None
+    assert (resolution.patches_axial, resolution.patches_around) == (
+        fidelity.patches_axial,
+        fidelity.patches_around,
+    )
+    assert resolution.grid_spacing == pytest.approx(0.6e-3 / fidelity.cells_per_length)
+    assert resolution.double is fidelity.double
+
+
+@pytest.mark.parametrize("scheme", ["consistent", "nodal"])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("time_step", 3e-7), ("patches_axial", 10), ("patches_around", 20), ("grid_spacing", 0.1e-3)],
+)
+def test_single_setting_goes_before_fidelity_and_scheme(name: str, value: float, scheme: str) -> None:
+    given: dict[str, Any] = {"scheme": scheme, "fidelity": "reference"}
+    plain = resolve(Numerics(**given), PAPER, PLATE)
+    changed = resolve(Numerics(**given, **{name: value}), PAPER, PLATE)
+    assert getattr(changed, name) == value
+    assert {k for k in vars(plain) if getattr(plain, k) != getattr(changed, k)} == {name}
+
+
+@pytest.mark.parametrize(("precision", "double"), [("single", False), ("double", True)])
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_precision_goes_before_fidelity(fidelity: str, precision: str, double: bool) -> None:
+    assert resolve(Numerics(fidelity=fidelity, precision=precision), PAPER, PLATE).double is double
+
+
+@pytest.mark.parametrize("fidelity", FIDELITIES)
+def test_nodal_scheme_has_the_paper_s_own_resolution(fidelity: str) -> None:
+    resolution = resolve(Numerics(scheme="nodal", fidelity=fidelity), PAPER, PLATE)
+    assert resolution.nodal
+    assert {name: getattr(resolution, name) for name in NODAL} == NODAL
+    assert (resolution.patches_axial, resolution.patches_around) == (36, 36)
+    assert (resolution.grid_spacing, resolution.time_step) == (1e-5, 1e-6)
+
+
+def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
+    thin, thick = (resolve(Numerics(), PAPER, PLATE.model_copy(update={"thickness": h})) for h in (1e-3, 1.0))
+    standard = FIDELITIES["standard"].travel
+    assert thin.way == pytest.approx(standard * 1e-3)
+    assert thick.way == pytest.approx(standard * discretisation.SLENDER * PAPER.length)
+
+
+def test_onset_is_a_share_of_what_a_wall_does_in_one_step() -> None:
+    # One patch of wall, 2R × h, at full contact: a0·2R·h/m.
+    mass = PAPER.mass_properties.mass
+    wall = 2 * PAPER.max_radius * 4e-3
+    assert onset_jump(PAPER, PLATE, 2.6e9) == pytest.approx(discretisation.ONSET * 2.6e9 * wall / mass)
+    long = PLATE.model_copy(update={"thickness": 1.0})
+    assert onset_jump(PAPER, long, 2.6e9) == pytest.approx(
+        discretisation.ONSET * 2.6e9 * 2 * PAPER.max_radius * PAPER.length / mass
+    )
+    assert onset_jump(PAPER, PLATE, 0.0) > 0.0
+
+
+# --- Rings ---
+
+
+@CORES
+def test_rings_close_the_surface(core: Core) -> None:
+    around = 16
+    rings = rings_of(core, 20, around)
+    assert around * rings.area_axial.sum() == pytest.approx(0.0, abs=1e-12 * np.pi * core.max_radius**2)
+    # Seen from the side a core shows 2 ∫ r ds; azimuths of the patches are those of their middles.
+    s, weights = np.polynomial.legendre.leggauss(200)
+    shadow = core.length * core.radius(core.length * (1 + s) / 2) @ weights
+    facing = np.cos(2 * np.pi * (np.arange(around) + 0.5) / around).clip(0).sum()
+    assert facing * rings.area_radial.sum() == pytest.approx(shadow, rel=1e-4)
+
+
+@pytest.mark.parametrize("core", [OGIVE, CONE], ids=["ogive", "cone"])
+def test_forward_areas_make_the_disc_of_the_largest_radius(core: Core) -> None:
+    rings = rings_of(core, 20, 16)
+    forward = 16 * rings.area_axial.clip(0).sum()
+    assert forward == pytest.approx(np.pi * core.max_radius**2, rel=1e-12)
+
+
+@CORES
+def test_volume_of_the_rings_converges_to_the_core_s(core: Core) -> None:
+    # V = ⅓ ∮ x·dA with one point per patch: second order in the rings.
+    volume = core.mass_properties.mass / 7850.0
+    errors = []
+    for axial in (16, 32, 64):
+        rings = rings_of(core, axial, 256)
+        found = 256 / 3 * (rings.station @ rings.area_axial + rings.radius @ rings.area_radial)
+        errors.append(abs(found / volume - 1))
+    assert errors[0] < 0.01
+    assert errors[2] < max(errors[0] / 8, 1e-4)
+
+
+@CORES
+def test_rings_lie_end_to_end_with_the_breaks_on_their_edges(core: Core) -> None:
+    rings = rings_of(core, 20, 16)
+    station = core.mass_properties.centre_of_mass - rings.station
+    lateral = rings.half_axial != 0
+    low, high = (station[lateral] + sign * rings.half_axial[lateral] for sign in (1, -1))
+    np.testing.assert_allclose(low[1:], high[:-1], atol=1e-15)
+    assert low[0] == pytest.approx(0.0, abs=1e-15)
+    assert high[-1] == pytest.approx(core.length)
+    for station_of_break in core.breaks:
+        assert np.abs(high - station_of_break).min() < 1e-12
+    np.testing.assert_allclose(rings.radius[lateral], core.radius(station[lateral]), rtol=1e-12)
+    np.testing.assert_allclose(-rings.half_radial[lateral], (core.radius(low) - core.radius(high)) / 2, atol=1e-12)
+
+
+def test_discs_are_rings_from_the_axis_to_the_rim() -> None:
+    rings = rings_of(TABLE, 20, 16)
+    disc = rings.half_axial == 0
+    station = TABLE.mass_properties.centre_of_mass - rings.station[disc]
+    for at, radius, facing in ((0.0, 1e-3, 1), (20e-3, 2.5e-3, -1)):
+        here = np.abs(station - at) < 1e-12
+        assert 16 * rings.area_axial[disc][here].sum() == pytest.approx(facing * np.pi * radius**2)
+        outer = (rings.radius + np.abs(rings.half_radial))[disc][here]
+        assert outer.max() == pytest.approx(radius)
+    np.testing.assert_array_equal(rings.area_radial[disc], 0.0)
+    assert len(rings_of(TABLE, 20, 16, discs=False).station) == (~disc).sum()
+
+
+# --- Tile ---
+
+
+@pytest.mark.parametrize("pattern", PATTERNS, ids=lambda pattern: pattern.shape)
+def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
+    plate = PLATE.model_copy(update={"pattern": pattern})
+    tile = tile_of(plate, 0.25e-3)
+    assert tile.material.mean() == pytest.approx(1 - pattern.open_area, abs=5e-4)
+    assert tile.material.min() == 0.0
+    assert tile.material.max() == 1.0
+    assert max(tile.dy, tile.dz) <= 0.25e-3
+    extent = np.array(tile.material.shape) * (tile.dy, tile.dz)
+    np.testing.assert_allclose(extent, pattern.period, rtol=1e-12)
+
+
+def test_tile_tells_material_from_holes_by_area() -> None:
+    # A 5 mm hole on the origin, which is a corner of cell (0, 0); cells on the edge are fractions.
+    plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 10e-3))})
+    tile = tile_of(plate, 0.5e-3)
+    y, z = ((np.arange(n) + 0.5) * 0.5e-3 for n in tile.material.shape)
+    distance = np.hypot(np.minimum(y, 8e-3 - y)[:, None], np.minimum(z, 10e-3 - z))
+    diagonal = 0.5e-3 / np.sqrt(2)
+    assert (tile.material[distance < 2.5e-3 - diagonal] == 0).all()
+    assert (tile.material[distance > 2.5e-3 + diagonal] == 1).all()
+    assert ((tile.material > 0) & (tile.material < 1)).sum() > 8
+    np.testing.assert_array_equal(tile.material, tile.material[::-1, ::-1])  # the pattern's own symmetry
+
+
+def test_sharp_tile_takes_the_cells_centres() -> None:
+    plate = PLATE.model_copy(update={"pattern": PATTERNS[2]})
+    tile = tile_of(plate, 0.1e-3, sharp=True)
+    y, z = ((np.arange(n) + 0.5) * d for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True))
+    np.testing.assert_array_equal(tile.material, ~PATTERNS[2].is_hole(y[:, None], z))
+
+
+def test_spacing_that_fits_the_period_is_kept() -> None:
+    plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(7e-3, 9.1e-3))})
+    tile = tile_of(plate, 0.1e-3)
+    assert tile.material.shape == (70, 91)
+
+
+# --- Tent ---
+
+
+@pytest.mark.parametrize("ratio", [2, 3, 8])
+def test_taps_are_the_tent_where_the_length_is_a_multiple_of_the_cell(ratio: int) -> None:
+    offsets = np.arange(-ratio + 1, ratio)
+    np.testing.assert_allclose(tent_taps(ratio * 0.1, 0.1), (1 - np.abs(offsets) / ratio) / ratio, rtol=1e-12)
+
+
+@pytest.mark.parametrize("ratio", [1.00001, 1.001, 1.3, 1.9, 2.5, 3.7, 7.99])
+def test_taps_keep_mass_and_second_moment(ratio: float) -> None:
+    taps = tent_taps(ratio, 1.0)
+    offsets = np.arange(len(taps)) - len(taps) // 2
+    assert len(taps) % 2 == 1
+    assert (taps > 0).all()
+    np.testing.assert_allclose(taps, taps[::-1], rtol=1e-12)
+    assert taps.sum() == pytest.approx(1.0)
+    # Interpolation adds a sixth of the cell's square on average.
+    assert taps @ offsets**2 + 1 / 6 == pytest.approx(ratio**2 / 6, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [0.2, 1.0])
+def test_length_within_a_cell_is_not_filtered(ratio: float) -> None:
+    np.testing.assert_array_equal(tent_taps(ratio, 1.0), [1.0])
