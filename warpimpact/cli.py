@@ -43,6 +43,8 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_run(commands)
     _add_plot(commands)
+    _add_replay(commands)
+    _add_study(commands)
     _add_validate(commands)
     return parser
 
@@ -74,6 +76,56 @@ def _add_plot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
     parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="existing folder (default: the result's)")
     parser.set_defaults(command=_plot)
+
+
+def _add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "replay",
+        help="compute one hit of a result again, with its history",
+        description="Compute one hit of a result again on the CPU; write its history as netCDF and PNG files. It ends "
+        "bit-identical to the stored outcome where this CPU and version computed that; a result from a GPU is met "
+        "within rounding only.",
+        epilog="example: warpimpact replay slotted.nc --hit 34",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument("--hit", type=int, required=True, metavar="N", help="which hit of the result, from 0")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="HIT.nc", help="history (default: RESULT_hitN.nc beside the result)"
+    )
+    parser.add_argument(
+        "--campaign-folder",
+        type=Path,
+        metavar="FOLDER",
+        help="where the files are that the campaign names, such as a hit list (default: the result's folder)",
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing history")
+    parser.set_defaults(command=_replay)
+
+
+def _add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "study",
+        help="measure what accuracy costs on a campaign's scene",
+        description="Measure error and speed of the numerics, coarse to fine, against a converged answer; write them "
+        "as one netCDF file with a figure beside it. Takes minutes.",
+        epilog="example: warpimpact study campaigns/slotted_plate.toml --hits 128",
+    )
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="what is shot at what")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="STUDY.nc", help="study (default: the campaign's name with _study, here)"
+    )
+    parser.add_argument(
+        "--hits", type=_positive, default=512, metavar="N", help="hits, spread over the campaign's cell (default: 512)"
+    )
+    _add_device(parser)
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing study")
+    parser.set_defaults(command=_study)
+
+
+def _positive(text: str) -> int:
+    if (number := int(text)) < 1:
+        raise argparse.ArgumentTypeError(f"got {number}, but it must be at least 1")
+    return number
 
 
 def _add_validate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -125,6 +177,48 @@ def _plot(arguments: argparse.Namespace) -> None:
     _check_folder(folder)
     for path in save_maps(dataset, folder, arguments.result.stem):
         print(path)
+
+
+def _replay(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .analysis.hit import hit_text
+    from .campaign.campaign import CampaignError
+    from .campaign.replay import replay
+    from .plotting.trajectory import save_figures
+
+    result, path = results.read(arguments.result), arguments.result
+    output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
+    _check_output(output, overwrite=arguments.overwrite)
+    try:
+        history = replay(result, arguments.hit, folder=arguments.campaign_folder or path.parent)
+    except CampaignError as error:
+        raise CampaignError(f"{error}; --campaign-folder tells where the campaign's files are") from None
+    results.write(history, output)
+    print(hit_text(history))
+    for written in (output, *save_figures(history, output.parent, output.stem)):
+        print(written)
+
+
+def _study(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .analysis.study import study, study_text
+    from .campaign.campaign import Campaign, CampaignError
+    from .plotting import study_figure
+
+    campaign = Campaign.from_toml(arguments.campaign)
+    output = arguments.output or Path(arguments.campaign.stem + "_study.nc")
+    _check_output(output, overwrite=arguments.overwrite)
+    try:
+        with _progress() as progress:
+            dataset = study(campaign, hits=arguments.hits, device=arguments.device, progress=progress)
+    except MemoryError as error:
+        raise CampaignError(f"{arguments.campaign}: {error}") from None
+    results.write(dataset, output)
+    print(study_text(dataset))
+    picture = output.with_suffix(".png")
+    study_figure(dataset).savefig(picture, dpi=150)
+    for written in (output, picture):
+        print(written)
 
 
 def _validate(arguments: argparse.Namespace) -> None:

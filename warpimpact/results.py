@@ -20,8 +20,8 @@ from warpimpact.kernels.status import Status
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from warpimpact.scene import Shots
-    from warpimpact.simulate import Outcomes
+    from warpimpact.scene import Core, Plate, Shots
+    from warpimpact.simulate import Outcomes, Replay
 
 
 class OutputError(OSError):
@@ -76,6 +76,63 @@ OUTLINE_VARIABLES = {
 
 VARIABLES = SHOT_VARIABLES | OUTCOME_VARIABLES | OUTLINE_VARIABLES
 
+HISTORY_COORDINATES = {
+    "time": Variable(("time",), "s", "time since the first touch of the front face"),
+    "quaternion": Variable(("quaternion",), "1", "component of a quaternion, w its scalar part"),
+    "snapshot": Variable(("snapshot",), "s", "time at which the plate is shown"),
+    "cell_y": Variable(("cell_y",), "m", "cell of the plate, y"),
+    "cell_z": Variable(("cell_z",), "m", "cell of the plate, z"),
+    "section": Variable(("section",), "m", "distance from the hit point in the plate"),
+    "station": Variable(("station",), "m", "distance along the core, from its centre of mass towards the nose"),
+}
+
+HISTORY_VARIABLES = {
+    "position": Variable(("time", "axis"), "m", "centre of mass, from the hit point"),
+    "plate_position": Variable(("time", "axis"), "m", "centre of mass in the plate"),
+    "attitude": Variable(("time", "quaternion"), "1", "turn of the plate's axes into the core's, x towards its nose"),
+    "core_axis": Variable(("time", "axis"), "1", "unit vector along the core towards its nose"),
+    "velocity": Variable(("time", "axis"), "m s-1", "velocity of the centre of mass"),
+    "angular_velocity": Variable(("time", "axis"), "rad s-1", "angular velocity"),
+    "force": Variable(("time", "axis"), "N", "force on the core, mean over the step"),
+    "moment": Variable(("time", "axis"), "N m", "moment about the centre of mass, mean over the step"),
+    "translational_energy": Variable(("time",), "J", "kinetic energy of translation"),
+    "rotational_energy": Variable(("time",), "J", "kinetic energy of rotation"),
+    "resistance_share": Variable(("snapshot", "cell_y", "cell_z"), "1", "share of the resistance left; 0 in holes"),
+    "core_radius": Variable(("station",), "m", "radius of the core"),
+    "solid_along_y": Variable(("section",), "1", "1 where the plate is solid along y through the hit point, else 0"),
+    "solid_along_z": Variable(("section",), "1", "1 where the plate is solid along z through the hit point, else 0"),
+}
+
+STUDY_COORDINATES = {
+    "setting": Variable(("setting",), "1", "numerics under study"),
+    "quantile": Variable(("quantile",), "1", "share of the hits with at most this error"),
+    "level": Variable(("level",), "1", "level of refinement behind the converged answer"),
+} | {name: COORDINATES[name] for name in ("standoff", "hit_y", "hit_z")}
+
+STUDY_VARIABLES = {
+    "scheme": Variable(("setting",), "1", "scheme"),
+    "patches_axial": Variable(("setting",), "1", "surface patches along the core"),
+    "patches_around": Variable(("setting",), "1", "surface patches around the core"),
+    "grid_spacing": Variable(("setting",), "m", "spacing of the plate grid"),
+    "time_step": Variable(("setting",), "s", "time step at impact velocity"),
+    "hits_per_second": Variable(("setting",), "s-1", "hits computed per second"),
+    "residual_velocity_error": Variable(("setting", "quantile"), "m s-1", "error of the residual velocity"),
+    "tilt_error": Variable(("setting", "quantile", "standoff"), "degree", "error of the tilt"),
+    "other_status": Variable(("setting",), "1", "hits that end otherwise than the converged answer"),
+    "residual_velocity_front": Variable(("setting",), "1", "1 where no faster setting has a smaller 90 % error"),
+    "tilt_front": Variable(("setting",), "1", "1 where no faster setting has a smaller 90 % error, last stand-off"),
+    "residual_velocity_change": Variable(
+        ("level", "quantile"), "m s-1", "change of the residual velocity from the level before"
+    ),
+    "tilt_change": Variable(("level", "quantile", "standoff"), "degree", "change of the tilt from the level before"),
+    "settled": Variable(("hit",), "1", "1 where the hit ends with the same status on all levels"),
+    "status": Variable(("hit",), "1", "how the shot ended, converged"),
+    "residual_velocity": Variable(("hit",), "m s-1", "residual velocity, converged"),
+    "residual_velocity_uncertainty": Variable(("hit",), "m s-1", "change of it on the last level"),
+    "tilt": Variable(("hit", "standoff"), "degree", "angle between core axis and line of fire, converged"),
+    "tilt_uncertainty": Variable(("hit", "standoff"), "degree", "change of it on the last level"),
+}
+
 _ATTRIBUTES = {
     "Conventions": "CF-1.11",
     "source": "warpimpact: trajectories of a rigid core through a perforated plate that resists and weakens",
@@ -84,6 +141,10 @@ _ATTRIBUTES = {
     "comment": "Plate frame, right-handed: x along the plate normal in the direction of fire, x = 0 at the "
     "front face; y and z in the plate. What does not exist is NaN.",
 }
+
+
+_STATIONS, _SECTION_POINTS = 101, 1601
+"""Points of a core's profile and of a section of the plate in a history."""
 
 
 def to_dataset(
@@ -115,11 +176,76 @@ def to_dataset(
         {name: _described(variable, coordinates[name]) for name, variable in COORDINATES.items()},
         _ATTRIBUTES | dict(attributes) | {"plate_period": np.array(period)},
     )
+    return _with_flags(dataset)
+
+
+def _with_flags(dataset: xarray.Dataset) -> xarray.Dataset:
+    """The Dataset with the codes of its status said."""
     dataset["status"].attrs |= {
         "flag_values": np.array(list(Status), dtype=np.int8),
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
     return dataset
+
+
+def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, str | int | float]) -> xarray.Dataset:
+    """Gather a study of speed and accuracy.
+
+    Args:
+        values: of every name in STUDY_VARIABLES and STUDY_COORDINATES, SI and radians.
+        attributes: global attributes: title, history, campaign, versions, device, ...
+    """
+    return _with_flags(
+        xarray.Dataset(
+            {name: _described(variable, values[name]) for name, variable in STUDY_VARIABLES.items()},
+            {name: _described(variable, values[name]) for name, variable in STUDY_COORDINATES.items()},
+            _ATTRIBUTES | dict(attributes),
+        )
+    )
+
+
+def history_dataset(
+    hit: xarray.Dataset,
+    replay: Replay,
+    core: Core,
+    plate: Plate,
+    *,
+    attributes: Mapping[str, str | int | float],
+) -> xarray.Dataset:
+    """Gather a replayed shot into the Dataset of its history.
+
+    Args:
+        hit: the shot and its outcome as `to_dataset` gives them, one hit of it selected; they stay as scalars,
+            the angular velocity at the end as `residual_angular_velocity`.
+        replay: the shot's history.
+        core, plate: what hit what; the Dataset tells enough of both to draw them.
+        attributes: global attributes over those of `hit`.
+    """
+    hit_y, hit_z = float(hit["hit_y"]), float(hit["hit_z"])
+    history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
+    section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * core.bounding_radius
+    values = {name: getattr(history, name) for name in HISTORY_VARIABLES if hasattr(history, name)} | {
+        "plate_position": history.position + np.array([0.0, hit_y, hit_z]),
+        "resistance_share": replay.resistance_share,
+        "core_radius": core.radius(stations),
+        "solid_along_y": plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
+        "solid_along_z": plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
+    }
+    coordinates = {
+        "time": history.time,
+        "quaternion": ["x", "y", "z", "w"],
+        "snapshot": replay.plate_time,
+        "cell_y": replay.cell_y,
+        "cell_z": replay.cell_z,
+        "section": section,
+        "station": core.mass_properties.centre_of_mass - stations,
+    }
+    dataset = hit.rename(angular_velocity="residual_angular_velocity").assign_coords(
+        {name: _described(variable, coordinates[name]) for name, variable in HISTORY_COORDINATES.items()}
+    )
+    return dataset.assign(
+        {name: _described(variable, values[name]) for name, variable in HISTORY_VARIABLES.items()}
+    ).assign_attrs(dict(attributes) | {"plate_thickness": plate.thickness})
 
 
 def _described(variable: Variable, values: Any) -> tuple[tuple[str, ...], Any, dict[str, str]]:
@@ -153,8 +279,8 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         for name, array in dataset.variables.items()
         if array.dtype.kind in "if"  # netCDF compresses no strings
     }
-    for name in COORDINATES:
-        encoding.setdefault(name, {})["_FillValue"] = None  # CF: a coordinate has no missing values
+    for name in dataset.coords:
+        encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
     try:
         dataset.to_netcdf(aside, format="NETCDF4", engine="netcdf4", encoding=encoding)
         os.replace(aside, path)
@@ -179,4 +305,6 @@ def read(path: Path) -> xarray.Dataset:
     missing = (COORDINATES.keys() | VARIABLES.keys()) - dataset.variables.keys()
     if missing:
         raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
+    if "hit" not in dataset.sizes:
+        raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
     return dataset

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
+from functools import partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -17,6 +18,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact import discretisation
+from warpimpact.history import History
 from warpimpact.kernels import free_flight, march
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.variant import Variant
@@ -69,6 +71,27 @@ class Outcomes:
     total_yaw: Array
 
 
+@dataclass(frozen=True)
+class Replay:
+    """One shot with all that happened on the way: SI, float64.
+
+    Attributes:
+        outcomes: how it ended, each of shape [1] or [1, …].
+        history: the core at every step, and at the end.
+        plate_time: instants at which the plate is shown [s], shape [snapshots]; 0 is the first touch.
+        resistance_share: resistance left, as a share of Y, in the cells that the core may reach: 0 in holes,
+            shape [snapshots, cells_y, cells_z].
+        cell_y, cell_z: centres of those cells in the plate [m], shapes [cells_y] and [cells_z].
+    """
+
+    outcomes: Outcomes
+    history: History
+    plate_time: Array
+    resistance_share: Array
+    cell_y: Array
+    cell_z: Array
+
+
 def simulate(
     core: Core,
     plate: Plate,
@@ -93,7 +116,7 @@ def simulate(
         DeviceError: the device is absent.
     """
     task = _Task(core, plate, interaction or Interaction(), numerics or Numerics(), shots, find_device(device))
-    contact = task.march(progress or (lambda done, total: None))
+    contact = task.march(progress or _unseen)
     return task.report(contact, np.asarray(standoffs, dtype=float), standoff_point)
 
 
@@ -105,19 +128,49 @@ def trace(
     interaction: Interaction | None = None,
     numerics: Numerics | None = None,
 ) -> list[Array]:
-    """Histories of shots on the CPU: one array [steps, TRACE_COLUMNS] per shot (kernels/march.py)."""
-    task = _Task(
-        core,
-        plate,
-        interaction or Interaction(),
-        numerics or Numerics(),
-        shots,
-        find_device("cpu"),
-        traced=True,
+    """Histories of shots on the CPU: one array [steps + 1, TRACE_COLUMNS] per shot (kernels/march.py)."""
+    task = _traced_task(core, plate, shots, interaction, numerics)
+    return task.traces(task.march(_unseen))
+
+
+def replay(
+    core: Core,
+    plate: Plate,
+    shot: Shots,
+    *,
+    interaction: Interaction | None = None,
+    numerics: Numerics | None = None,
+    standoffs: Sequence[float] = (),
+    standoff_point: str = "centre_of_mass",
+    snapshots: int = 6,
+) -> Replay:
+    """One shot again on the CPU, with its history; it ends with the bits of `simulate` on the same CPU.
+
+    Args:
+        shot: shots of length 1; the others as in `simulate`.
+        snapshots: how often the plate is shown, evenly from the first touch to the end.
+    """
+    task = _traced_task(core, plate, shot, interaction, numerics)
+    contact = task.march(_unseen)
+    (trace,) = task.traces(contact)
+    time_step = 2.0 * trace[0, 0]
+    steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
+    cell_y, cell_z = task.cell_centres()
+    return Replay(
+        outcomes=task.report(contact, np.asarray(standoffs, dtype=float), standoff_point),
+        history=History.from_trace(trace, core),
+        plate_time=steps * time_step,
+        resistance_share=np.stack([task.plate_after(count, time_step) for count in steps]),
+        cell_y=cell_y,
+        cell_z=cell_z,
     )
-    contact = task.march(lambda done, total: None)
-    rows = task.history.numpy().reshape(len(shots), task.pace.rows, march.TRACE_COLUMNS)
-    return [row[:steps] for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
+
+
+def _traced_task(
+    core: Core, plate: Plate, shots: Shots, interaction: Interaction | None, numerics: Numerics | None
+) -> _Task:
+    device = find_device("cpu")
+    return _Task(core, plate, interaction or Interaction(), numerics or Numerics(), shots, device, traced=True)
 
 
 def find_device(name: str) -> Any:
@@ -189,6 +242,7 @@ class _Task:
         self.pace = self._pace()
         rows = len(shots) * self.pace.rows if traced else 0
         self.history = wp.empty((rows, march.TRACE_COLUMNS), dtype=self.variant.real, device=device)
+        self.cells = self._window_cells()
 
     def _array(self, values: NDArray[Any], dtype: Any = None) -> Any:
         return wp.array(np.ascontiguousarray(values), dtype=dtype or self.variant.real, device=self.device)
@@ -257,23 +311,48 @@ class _Task:
         pace.way = self.resolution.way
         pace.longest_way = STEP_ALLOWANCE * passage
         shortest = min(pace.way, self.shots.velocity.min() * (self.resolution.time_step or math.inf))
-        pace.rows = math.ceil(pace.longest_way / shortest) + 1
+        pace.rows = math.ceil(pace.longest_way / shortest) + 2  # the end, and a step that rounding may add
         return pace
 
     def march(self, progress: Progress) -> Any:
         """March all shots; those that leave their window again in wider ones."""
         count = len(self.shots)
         outcomes = self._empty(self.stage.Outcomes, (count,))
-        cells = self._window_cells()
         pending = np.arange(count)
         for _ in range(MAX_DOUBLINGS):
-            self._march_some(pending, cells, outcomes, _after(count - len(pending), count, progress))
+            self._march_some(pending, outcomes, _after(count - len(pending), count, progress))
             pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
-            if not len(pending) or not self._fits(2 * cells[0], 2 * cells[1]):
+            if not len(pending) or not self._fits(2 * self.cells[0], 2 * self.cells[1]):
                 break
-            cells = (2 * cells[0], 2 * cells[1])
+            self.cells = (2 * self.cells[0], 2 * self.cells[1])
         progress(count, count)
         return outcomes
+
+    def traces(self, contact: Any) -> list[Array]:
+        """What every shot of a traced march wrote, the state at its end included."""
+        rows = self.history.numpy().reshape(len(self.shots), self.pace.rows, march.TRACE_COLUMNS)
+        return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
+
+    def plate_after(self, steps: int, time_step: float) -> Array:
+        """Share of the resistance left for the first shot after some steps on the CPU, in its window once marched."""
+        scratch = self._fields(1, *self.cells)
+        pace = self._pace()
+        pace.longest_way = (steps - 0.5) * time_step * self.shots.velocity[0]
+        stopped = self._empty(self.stage.Outcomes, (1,))
+        self._launch(self._array(np.zeros(1), dtype=wp.int32), stopped, pace, scratch, 1, 0, 1)
+        share = _host(scratch.material)
+        if self.variant.degrades and not self.variant.nodal:
+            share *= np.exp(self.law.decay_rate * _host(scratch.exposure))
+        return share.reshape(self.cells)
+
+    def cell_centres(self) -> tuple[Array, Array]:
+        """Where the cells of the first shot's window are in the plate [m], along y and z."""
+        hit = self.shots.hit_y[0], self.shots.hit_z[0]
+        y, z = (
+            (math.floor(at / width) + np.arange(count) - count // 2 + 0.5) * width
+            for at, width, count in zip(hit, (self.tile.dy, self.tile.dz), self.cells, strict=True)
+        )
+        return y, z
 
     def report(self, contact: Any, standoffs: Array, standoff_point: str) -> Outcomes:
         """Free flight to the stand-offs, and everything back on the host."""
@@ -346,50 +425,48 @@ class _Task:
             setattr(scratch, name, wp.empty(size if used else 0, dtype=self.variant.real, device=self.device))
         return scratch
 
-    def _march_some(self, which: NDArray[np.int64], cells: tuple[int, int], outcomes: Any, progress: Progress1) -> None:
+    def _launch(self, order: Any, outcomes: Any, pace: Any, scratch: Any, slots: int, first: int, count: int) -> int:
+        """March `count` shots from order[first] on; returns `count`."""
+        wp.launch(
+            self.stage.kernel,
+            count,
+            inputs=[
+                first,
+                slots,
+                order,
+                self.surface,
+                self.body,
+                self.device_plate,
+                self.law,
+                self.device_shots,
+                pace,
+                scratch,
+            ],
+            outputs=[outcomes, self.history],
+            device=self.device,
+        )
+        return count
+
+    def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
-        slots = self._slots(*cells)
+        slots = self._slots(*self.cells)
         self.stage.kernel.module.load(self.device)
-        order = self._array(which, dtype=wp.int32)
-
-        def launch(scratch: Any, slots: int, first: int, count: int) -> int:
-            wp.launch(
-                self.stage.kernel,
-                count,
-                inputs=[
-                    first,
-                    slots,
-                    order,
-                    self.surface,
-                    self.body,
-                    self.device_plate,
-                    self.law,
-                    self.device_shots,
-                    self.pace,
-                    scratch,
-                ],
-                outputs=[outcomes, self.history],
-                device=self.device,
-            )
-            return count
-
+        launch = partial(self._launch, self._array(which, dtype=wp.int32), outcomes, self.pace)
         if self.device.is_cpu:
-            self._on_threads(launch, slots, cells, len(which), progress)
+            self._on_threads(launch, slots, len(which), progress)
         else:
-            scratch = self._fields(slots, *cells)
+            scratch = self._fields(slots, *self.cells)
             for first, count in _chunks(len(which), slots):
                 launch(scratch, slots, first, count)
                 wp.synchronize_device(self.device)
                 progress(first + count)
 
-    def _on_threads(
-        self, launch: Callable[..., int], slots: int, cells: tuple[int, int], total: int, progress: Progress1
-    ) -> None:
+    def _on_threads(self, launch: Callable[..., int], slots: int, total: int, progress: Progress1) -> None:
         """Share chunks out over threads, each with one slot: a CPU launch runs its shots one after another on
         the calling thread, without the interpreter lock."""
         idle = SimpleQueue[Any]()
         for _ in range(slots):
-            idle.put(self._fields(1, *cells))
+            idle.put(self._fields(1, *self.cells))
 
         def work(chunk: tuple[int, int]) -> int:
             scratch = idle.get()
@@ -403,6 +480,10 @@ class _Task:
             for count in pool.map(work, _chunks(total, CPU_CHUNK)):
                 done += count
                 progress(done)
+
+
+def _unseen(done: int, total: int) -> None:
+    """Progress that nobody follows."""
 
 
 def _after(finished: int, total: int, progress: Progress) -> Progress1:

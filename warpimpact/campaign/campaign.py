@@ -1,5 +1,6 @@
 """Campaign: one TOML file, validated, as one immutable value."""
 
+import json
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -67,13 +68,31 @@ class Campaign(Model):
             CampaignError: the file is missing, is no TOML, or asks for something that cannot be.
         """
         path = Path(path)
-        text, data = _read(path)
+        return cls.from_text(_read(path), name=str(path), folder=path.parent, count=count)
+
+    @classmethod
+    def from_text(cls, text: str, *, name: str, folder: Path, count: int | None = None) -> Self:
+        """Read what `text` gave.
+
+        Args:
+            text: TOML, or JSON as of a campaign made in Python.
+            name: what errors call it.
+            folder: where the files are that it names.
+            count: number of hits, in place of the text's.
+
+        Raises:
+            CampaignError: the text is no TOML, or asks for something that cannot be.
+        """
+        try:
+            data = json.loads(text) if text.startswith("{") else tomllib.loads(text)
+        except ValueError as error:
+            raise CampaignError(f"{name}: is not valid TOML: {error}") from None
         if count is not None and isinstance(data.setdefault("hits", {}), dict):
             data["hits"]["count"] = count
         try:
-            campaign = cls.model_validate(data, context={"folder": path.parent})
+            campaign = cls.model_validate(data, context={"folder": folder})
         except ValidationError as error:
-            raise CampaignError(f"{path}: {_sentence(error, data)}") from None
+            raise CampaignError(f"{name}: {_sentence(error, data)}") from None
         campaign._source = text
         return campaign
 
@@ -90,15 +109,14 @@ class Campaign(Model):
         return self
 
 
-def _read(path: Path) -> tuple[str, dict[str, Any]]:
+def _read(path: Path) -> str:
     try:
-        text = path.read_text(encoding="utf-8")
-        return text, tomllib.loads(text)
+        return path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise CampaignError(f"{path}: there is no such file") from None
     except OSError as error:
         raise CampaignError(f"{path}: cannot be read ({error.strerror})") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise CampaignError(f"{path}: is not valid TOML: {error}") from None
 
 

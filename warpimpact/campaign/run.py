@@ -63,7 +63,8 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None =
             "numerics": _numerics(campaign),
             "compute_time": elapsed,
             "hits_per_second": len(shots) / elapsed,
-        },
+        }
+        | ({} if campaign.hits.count is None else {"count": campaign.hits.count}),
     )
 
 

@@ -2,10 +2,11 @@
 
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
-from .model import Model
-from .patterns import AnyPattern, NoPattern
+from .model import Array, Model
+from .patterns import AnyPattern, BoolArray, NoPattern
 from .units import (
     NonNegativeNumber,
     NonNegativeStress,
@@ -45,6 +46,11 @@ class Plate(Model):
     def open_area(self) -> float:
         """Share of holes in a unit cell."""
         return self.pattern.open_area
+
+    def is_solid(self, y: Array, z: Array) -> BoolArray:
+        """Whether points y, z [m] lie on the plate and in none of its holes; bool, of their broadcast shape."""
+        half_y, half_z = (0.5 * side for side in self.size or (np.inf, np.inf))
+        return (np.abs(y) <= half_y) & (np.abs(z) <= half_z) & ~self.pattern.is_hole(y, z)
 
     @property
     def sampled_cell(self) -> tuple[float, float]:

@@ -1,0 +1,175 @@
+"""Figures of a history show the core where it is, to scale, and the plate as it is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+
+from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate, PolynomialCore
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.plotting import trajectory
+from warpimpact.plotting.trajectory import Pose, silhouette
+
+LENGTH, CENTRE = 27.86e-3, 18.05e-3
+THICKNESS = 4e-3
+
+
+def history_of(resistance: float = 2.6e9, standoff_point: str = "centre_of_mass") -> xarray.Dataset:
+    """One slanted hit beside a round hole of a finite plate."""
+    campaign = Campaign(
+        title="a test",
+        core=PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=LENGTH, mass=4e-3),
+        plate=Plate(
+            thickness=THICKNESS,
+            resistance=resistance,
+            shear_coefficient=0.05,
+            degradation=0.8,
+            pattern=CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3)),
+            size=(40e-3, 60e-3),
+        ),
+        impact=Impact(velocity=600.0, obliquity=0.3, azimuth=0.7),
+        hits=Hits(count=2),
+        numerics=Numerics(fidelity="draft"),
+        output={"standoffs": (0.05, 0.13), "standoff_point": standoff_point},
+    )
+    return replay(run(campaign, device="cpu"), 1, folder=Path())
+
+
+@pytest.fixture(scope="module")
+def history() -> xarray.Dataset:
+    return history_of()
+
+
+def cores(figure: Figure, view: int) -> list[np.ndarray]:
+    """Outlines of the cores in a view [mm]."""
+    return [np.array(patch.get_xy()) for patch in figure.axes[view].patches if isinstance(patch, Polygon)]
+
+
+@pytest.mark.parametrize(("view", "component"), [("y", 1), ("z", 2)])
+def test_silhouette_is_that_of_the_turned_core(history: xarray.Dataset, view: str, component: int) -> None:
+    place, width = np.array([1e-3, 2e-3, -3e-3]), 2.0 * 3.022e-3
+    for axis, extent in (
+        ([1.0, 0.0, 0.0], (LENGTH, width)),
+        ([0.0, 1.0, 0.0], (width, LENGTH if view == "y" else width)),
+        ([0.0, 0.0, -1.0], (width, LENGTH if view == "z" else width)),
+    ):
+        outline = silhouette(history, Pose(place, np.array(axis)), view)
+        np.testing.assert_allclose(np.ptp(outline, axis=0), extent, rtol=2e-3)
+    ahead = silhouette(history, Pose(place, np.array([1.0, 0.0, 0.0])), view)
+    assert ahead[:, 0].max() == pytest.approx(place[0] + CENTRE, rel=1e-3)
+    assert ahead[:, 1].mean() == pytest.approx(place[component], abs=1e-4)
+
+
+def test_passage_shows_the_core_from_first_touch_to_the_end(history: xarray.Dataset) -> None:
+    figure = trajectory.passage(history)
+    for view, axis in enumerate("yz"):
+        outlines = cores(figure, view)
+        assert len(outlines) == trajectory.INSTANTS
+        for outline, step in ((outlines[0], 0), (outlines[-1], -1)):
+            pose = Pose(history["plate_position"].values[step], history["core_axis"].values[step])
+            np.testing.assert_allclose(outline[:-1], silhouette(history, pose, axis) * 1e3)
+        low, high = figure.axes[view].get_ylim()
+        assert all((low < outline[:, 1]).all() and (outline[:, 1] < high).all() for outline in outlines)
+        assert figure.axes[view].get_aspect() == 1.0
+
+
+def test_plate_is_cut_through_the_hit_point(history: xarray.Dataset) -> None:
+    # Holes of 5 mm lie 8 mm apart; the plate measures 40 mm x 60 mm.
+    figure = trajectory.passage(history)
+    pieces = []
+    for view, (half, across) in enumerate(((20.0, "hit_z"), (30.0, "hit_y"))):
+        (plate,) = figure.axes[view].collections
+        offset = float(history[across]) * 1e3
+        polygons = [polygon for path in plate.get_paths() for polygon in path.to_polygons()]
+        pieces.append(len(polygons))
+        for x, along in (polygon.T for polygon in polygons):
+            assert (x.min(), x.max()) == (0.0, 1e3 * THICKNESS)
+            assert np.abs(along).max() <= half + 0.05
+            middle = np.linspace(along.min(), along.max(), 101)[1:-1]
+            assert (np.hypot((middle + 4) % 8 - 4, (offset + 4) % 8 - 4) > 2.45).all()
+    assert max(pieces) > 4
+
+
+@pytest.mark.parametrize("standoff_point", ["centre_of_mass", "nose"])
+def test_flight_shows_the_core_at_the_standoffs(standoff_point: str) -> None:
+    history = history_of(standoff_point=standoff_point)
+    figure = trajectory.flight(history)
+    for view, angle in enumerate(("yaw", "pitch")):
+        assert len(cores(figure, view)) == 3
+        texts = [text.get_text() for text in figure.axes[view].texts]
+        for text, shown, standoff in zip(texts[1:], history[angle].values, (50, 130), strict=True):
+            assert text == f"{standoff} mm: {angle} {shown:.1f}°".replace("-", "−")
+    for outline, standoff in zip(cores(figure, 0)[1:], history["standoff"].values, strict=True):
+        yaw, pitch = (np.radians(float(history[a].sel(standoff=standoff))) for a in ("yaw", "pitch"))
+        along = 1.0 / np.sqrt(1.0 + np.tan(yaw) ** 2 + np.tan(pitch) ** 2)
+        nose, base = CENTRE * along, (CENTRE - LENGTH) * along
+        passing = 0.0 if standoff_point == "centre_of_mass" else nose
+        middle = (THICKNESS + standoff - passing + 0.5 * (nose + base)) * 1e3
+        assert 0.5 * (outline[:, 0].min() + outline[:, 0].max()) == pytest.approx(middle, abs=3.0)
+
+
+def test_a_core_that_stays_in_the_plate_is_shown_on_impact_only() -> None:
+    history = history_of(resistance=1e11)
+    assert np.isnan(history["tilt"]).all()
+    assert [len(cores(trajectory.flight(history), view)) for view in (0, 1)] == [1, 1]
+
+
+def test_largest_load_is_drawn_at_its_instant(history: xarray.Dataset) -> None:
+    figure = trajectory.largest_load(history)
+    size = np.linalg.norm(history["force"], axis=1)
+    step = int(size.argmax())
+    assert f"{float(history['time'][step]) * 1e6:.1f} µs" in figure.get_suptitle()
+    _, force, moment = figure.axes[0].collections
+    assert (force.get_label(), moment.get_label()) == (
+        f"force {size[step] / 1e3:.3g} kN",
+        f"moment {np.linalg.norm(history['moment'][step]):.3g} N m",
+    )
+    drawn = np.array([force.U[0], force.V[0]]) / 12.0
+    np.testing.assert_allclose(drawn, history["force"].values[step, :2] / size[step], rtol=1e-6)
+
+
+def test_course_shows_what_the_history_holds(history: xarray.Dataset) -> None:
+    panels = trajectory.course(history).axes
+    time = history["time"].values * 1e6
+    shown = {panel.get_ylabel(): [line.get_ydata() for line in panel.lines] for panel in panels}
+    np.testing.assert_allclose(panels[0].lines[0].get_xdata(), time)
+    np.testing.assert_allclose(np.transpose(shown["force [kN]"]), history["force"] / 1e3)
+    np.testing.assert_allclose(np.transpose(shown["moment [N m]"]), history["moment"])
+    np.testing.assert_allclose(np.transpose(shown["angular velocity [10³ rad/s]"]), history["angular_velocity"] / 1e3)
+    change = history["velocity"] - history["velocity"][0]
+    np.testing.assert_allclose(np.transpose(shown["change of velocity [m/s]"]), change)
+    np.testing.assert_allclose(shown["rotational energy [J]"][0], history["rotational_energy"])
+    yaw, _ = shown["angle of the axis [°]"]
+    assert yaw[0] == pytest.approx(np.degrees(np.arctan(np.tan(0.3) * np.cos(0.7))), abs=0.1)
+
+
+def test_plate_is_shown_at_every_snapshot_with_holes_left_out(history: xarray.Dataset) -> None:
+    figure = trajectory.plate(history)
+    share = history["resistance_share"]
+    panels = figure.axes[: share.sizes["snapshot"]]
+    assert [panel.get_title() for panel in panels] == [f"{t * 1e6:.1f} µs" for t in share["snapshot"].values]
+    for panel, snapshot in zip(panels, share.values, strict=True):
+        (image,) = panel.images
+        left, right, bottom, top = image.get_extent()
+        cell = float(share["cell_y"][1] - share["cell_y"][0]) * 1e3
+        assert left == pytest.approx(float(share["cell_y"][0]) * 1e3 - 0.5 * cell)
+        assert (right - left, top - bottom) == pytest.approx((cell * snapshot.shape[0], cell * snapshot.shape[1]))
+        drawn = image.get_array().T
+        np.testing.assert_array_equal(np.ma.getmaskarray(drawn), share.values[0] < 0.5)
+        np.testing.assert_array_equal(drawn[share.values[0] >= 0.5], snapshot[share.values[0] >= 0.5])
+
+
+def test_figures_are_written(history: xarray.Dataset, tmp_path: Path) -> None:
+    paths = trajectory.save_figures(history, tmp_path, "a")
+    assert [path.name for path in paths] == [
+        "a_passage.png",
+        "a_flight.png",
+        "a_largest_load.png",
+        "a_course.png",
+        "a_plate.png",
+    ]
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in paths)

@@ -1,0 +1,381 @@
+"""The trade of speed for accuracy, measured on one's own scene and machine.
+
+The converged answer comes from patches, grid and time step refined together. On every level the error of first order
+in the time step is removed by extrapolation from a second run with twice the step. The grid's and the patches' own
+error is not extrapolated: hit by hit it is no power of the spacing. It falls by about half from level to level, so
+that the change on the last level bounds what is left, and stands for the uncertainty.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
+
+import numpy as np
+import warp
+import xarray
+from numpy.typing import NDArray
+
+import warpimpact
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.discretisation import FIDELITIES, Fidelity, resolve, spelt_out
+from warpimpact.results import study_dataset
+from warpimpact.scene import Hits, Numerics, Shots, make_shots
+from warpimpact.simulate import Outcomes, Progress, find_device, simulate
+
+Array = NDArray[np.float64]
+
+LEVELS = (
+    Fidelity(72, 144, 6.0, 0.06),
+    Fidelity(108, 216, 9.0, 0.04),
+    Fidelity(162, 324, 13.5, 0.0267),
+)
+"""Refinements behind the converged answer, coarse to fine; the uncertainty is the change from the last but one."""
+
+SWEEP = (
+    Fidelity(8, 16, 0.5, 0.8),
+    Fidelity(8, 16, 1.0, 0.8),
+    Fidelity(12, 24, 1.0, 0.8),
+    Fidelity(16, 32, 1.0, 0.4),
+    Fidelity(16, 32, 2.0, 0.4),
+    Fidelity(24, 24, 2.0, 0.4),
+    Fidelity(32, 32, 2.0, 0.4),
+    Fidelity(24, 48, 3.0, 0.4),
+    Fidelity(32, 32, 3.0, 0.2),
+    Fidelity(32, 64, 4.0, 0.4),
+    Fidelity(48, 48, 4.0, 0.2),
+    Fidelity(48, 96, 4.0, 0.1),
+    Fidelity(72, 144, 6.0, 0.07),
+)
+"""Settings beside the named fidelities: near the best of 280 on the slotted plate, coarse to fine."""
+
+NODAL_STEPS = (1.0e-6, 0.5e-6)
+"""Time steps of the paper's literal scheme [s]."""
+
+QUANTITIES = ("residual_velocity", "tilt")
+QUANTILES = (0.5, 0.9, 1.0)
+QUOTED = 0.9
+MEASURED_TIME = 1.0
+"""A setting is timed for at least so long in all [s], ..."""
+SHORTEST_RUN = 0.3
+"""... the last time in a run of at least this length [s] ..."""
+SINGLES = 10.0
+"""... and this many times that of a single hit, so that preparation is no part of the cost and a GPU is filled. The
+hits are taken more than once where they are too few for it."""
+
+
+class Answer(NamedTuple):
+    """What the study compares: status and residual velocity [m/s], shape [hits]; tilt [rad], [hits, stand-offs]."""
+
+    status: NDArray[np.int8]
+    residual_velocity: Array
+    tilt: Array
+
+
+@dataclass(frozen=True)
+class Converged:
+    """The converged answer and how far it still moved.
+
+    Attributes:
+        answer: that of the finest level.
+        settled: whether the status is the same in all runs of all levels, shape [hits].
+        residual_velocity_changes: from the answer of the level before [m/s], shape [levels, hits]; NaN on the first
+            level and where not settled; likewise
+        tilt_changes: [rad], shape [levels, hits, stand-offs].
+    """
+
+    answer: Answer
+    settled: NDArray[np.bool_]
+    residual_velocity_changes: Array
+    tilt_changes: Array
+
+
+def study(
+    campaign: Campaign,
+    *,
+    hits: int = 512,
+    device: str = "auto",
+    progress: Progress | None = None,
+    settings: Mapping[str, Numerics] | None = None,
+    levels: Sequence[Fidelity] = LEVELS,
+) -> xarray.Dataset:
+    """Measure error and cost of settings of the numerics on a campaign's scene.
+
+    Args:
+        hits: how many hits, spread evenly over the campaign's cell.
+        device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
+        progress: called with (hits, hits in all); the share done is that of the estimated work.
+        settings: what to measure; if None, the fidelities, a sweep and the literal scheme (`default_settings`).
+        levels: refinements behind the converged answer, at least two, coarse to fine.
+
+    Returns:
+        The Dataset of results.py with dimensions setting, quantile, standoff, level and hit.
+
+    Raises:
+        DeviceError: the device is absent.
+    """
+    settings = default_settings(campaign) if settings is None else settings
+    bench = _Bench(campaign, hits, device, progress or (lambda done, total: None))
+    pairs = [(bench.numerics(_doubled(level)), bench.numerics(level)) for level in levels]
+    bench.expect([*settings.values(), *(numerics for pair in pairs for numerics in pair)])
+    measured = [bench.measure(numerics) for numerics in settings.values()]
+    truth = converged([(bench.compute(double)[0], bench.compute(single)[0]) for double, single in pairs])
+    rates = np.array([rate for _, rate in measured])
+    values = _numerics_values(campaign, settings) | _error_values([answer for answer, _ in measured], truth)
+    values |= _converged_values(truth) | {
+        "setting": list(settings),
+        "quantile": np.array(QUANTILES),
+        "level": [label(campaign, numerics) for _, numerics in pairs],
+        "standoff": np.array(campaign.output.standoffs),
+        "hit_y": bench.shots.hit_y,
+        "hit_z": bench.shots.hit_z,
+        "hits_per_second": rates,
+    }
+    quoted = QUANTILES.index(QUOTED)
+    values["residual_velocity_front"] = front(rates, values["residual_velocity_error"][:, quoted]).astype(np.int8)
+    values["tilt_front"] = front(rates, values["tilt_error"][:, quoted, -1]).astype(np.int8)
+    return study_dataset(
+        values,
+        {
+            "title": campaign.title,
+            "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact study",
+            "campaign": campaign.text,
+            "warpimpact_version": warpimpact.__version__,
+            "warp_version": warp.__version__,
+            "device": f"{bench.device.alias} ({bench.device.name})",
+            "seed": campaign.hits.seed,
+            "standoff_point": campaign.output.standoff_point,
+        },
+    )
+
+
+def default_settings(campaign: Campaign) -> dict[str, Numerics]:
+    """The fidelities by their names, and the sweep and the literal scheme by what they are."""
+    fidelities = {name: Numerics(fidelity=name) for name in FIDELITIES}
+    sweep = [spelt_out(setting, campaign.core, campaign.plate, campaign.impact.velocity) for setting in SWEEP]
+    nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
+    return fidelities | {label(campaign, numerics): numerics for numerics in sweep} | nodal
+
+
+def label(campaign: Campaign, numerics: Numerics) -> str:
+    """Patches, cells per degradation length and time step as one short name."""
+    resolution = resolve(numerics, campaign.core, campaign.plate)
+    cells = campaign.plate.degradation_length / resolution.grid_spacing
+    step = resolution.step_at(campaign.impact.velocity)
+    return f"{resolution.patches_axial}×{resolution.patches_around}, ℓ/{cells:.3g}, {step * 1e6:.3g} µs"
+
+
+def extrapolated(double: Answer, single: Answer) -> Answer:
+    """The answer without its error of first order in the time step, from runs with twice the step and once."""
+    return Answer(
+        single.status,
+        np.maximum(2.0 * single.residual_velocity - double.residual_velocity, 0.0),
+        np.maximum(2.0 * single.tilt - double.tilt, 0.0),
+    )
+
+
+def converged(runs: Sequence[tuple[Answer, Answer]]) -> Converged:
+    """The converged answer of runs with twice the time step and once on each level, coarse to fine."""
+    statuses = np.array([run.status for pair in runs for run in pair])
+    settled = (statuses == statuses[-1]).all(axis=0)
+    answers = [extrapolated(*pair) for pair in runs]
+
+    def changes(values: list[Array]) -> Array:
+        moved = np.abs(np.diff(values, axis=0, prepend=np.nan))
+        moved[:, ~settled] = np.nan
+        return moved
+
+    return Converged(
+        answers[-1],
+        settled,
+        changes([answer.residual_velocity for answer in answers]),
+        changes([answer.tilt for answer in answers]),
+    )
+
+
+def front(rates: Array, errors: Array) -> NDArray[np.bool_]:
+    """Which settings no other one beats in both speed and error; arrays of shape [settings]."""
+    no_worse = (rates[:, None] >= rates) & (errors[:, None] <= errors)
+    better = (rates[:, None] > rates) | (errors[:, None] < errors)
+    return np.isfinite(errors) & ~(no_worse & better).any(axis=0)
+
+
+def advantage(dataset: xarray.Dataset, literal: str) -> tuple[str, float] | None:
+    """The fastest consistent setting with 90 % errors no larger than those of a literal one (by its name), at the last
+    stand-off, and how many times as fast it is; None if there is none."""
+    quoted = dataset.sel(quantile=QUOTED).isel(standoff=-1)
+    rival = quoted.sel(setting=literal)
+    no_worse = quoted["scheme"] == "consistent"
+    for name in QUANTITIES:
+        no_worse &= quoted[f"{name}_error"] <= rival[f"{name}_error"]
+    if not no_worse.any():
+        return None
+    rates = quoted["hits_per_second"].where(no_worse)
+    return str(rates.idxmax().item()), float(rates.max() / rival["hits_per_second"])
+
+
+def study_text(dataset: xarray.Dataset) -> str:
+    """The study as a table, fast to slow, and what the converged answer is worth."""
+    last = dataset.isel(standoff=-1).sortby("hits_per_second", ascending=False)
+    standoff = f"{last['standoff'].item() * 1e3:g} mm"
+    change = last.isel(level=-1).sel(quantile=QUOTED)
+    unsettled = int((dataset["settled"] == 0).sum())
+    width = max(len(name) for name in last["setting"].values)
+    lines = [
+        f"{'':{width + 10}}{'residual velocity [m/s]':>26}{f'tilt at {standoff} [°]':>28}{'other':>10}",
+        f"{'setting':{width}}{'hits/s':>10}{_heads()}{_heads()}{'status':>8}",
+        *(_row(last.isel(setting=index), width) for index in range(last.sizes["setting"])),
+        "* no faster setting has a smaller 90 % error",
+        *(_advantage_line(dataset, name) for name in last["setting"].values[last["scheme"] == "nodal"]),
+        f"converged answer: uncertain by {change['residual_velocity_change'].item():.2g} m/s and "
+        f"{change['tilt_change'].item():.2g}° (90 % of {dataset.sizes['hit']} hits)",
+    ]
+    if unsettled:
+        lines.append(f"{unsettled} hits are left out: how they end still depends on the numerics")
+    return "\n".join(lines)
+
+
+def _advantage_line(dataset: xarray.Dataset, literal: str) -> str:
+    found = advantage(dataset, literal)
+    if found is None:
+        return f"{literal}: no setting of the consistent scheme is as close"
+    return f"{literal}: {found[0]} is no further off and {found[1]:.3g} times as fast"
+
+
+def _heads() -> str:
+    return "  " + "".join(f"{name:>8}" for name in ("50 %", "90 %", "max")) + "  "
+
+
+def _row(setting: xarray.Dataset, width: int) -> str:
+    cells = f"{setting['setting'].item():{width}}{setting['hits_per_second'].item():10.4g}"
+    for name in QUANTITIES:
+        cells += "  " + "".join(f"{value:8.3f}" for value in setting[f"{name}_error"].values)
+        cells += " *" if setting[f"{name}_front"] else "  "
+    return cells + f"{setting['other_status'].item():8d}"
+
+
+class _Bench:
+    """A campaign's shots on a device, ready to be computed by any numerics."""
+
+    def __init__(self, campaign: Campaign, hits: int, device: str, progress: Progress) -> None:
+        self.campaign, self.device = campaign, find_device(device)
+        self.progress, self.work, self.total = progress, 0.0, 0.0
+        spread = Hits(count=hits, seed=campaign.hits.seed)
+        self.shots = make_shots(campaign.impact, spread, campaign.plate)
+
+    def numerics(self, fidelity: Fidelity) -> Numerics:
+        return spelt_out(fidelity, self.campaign.core, self.campaign.plate, self.campaign.impact.velocity)
+
+    def expect(self, runs: Sequence[Numerics]) -> None:
+        """Say what is going to be computed, for the progress."""
+        self.total = sum(self._work(numerics) for numerics in runs)
+
+    def compute(self, numerics: Numerics) -> tuple[Answer, float]:
+        """Answer, and the time it took [s]; counts as progress."""
+        work, hits = self._work(numerics), len(self.shots)
+
+        def show(done: int, total: int) -> None:
+            self.progress(int(hits * (self.work + work * done / total) / self.total), hits)
+
+        begin = time.perf_counter()
+        outcomes = self._simulate(numerics, self.shots, show)
+        elapsed = time.perf_counter() - begin
+        self.work += work
+        return Answer(outcomes.status, outcomes.residual_velocity, outcomes.tilt), elapsed
+
+    def measure(self, numerics: Numerics) -> tuple[Answer, float]:
+        """Answer, and hits per second at best, with the kernels built beforehand."""
+        single = min(self._seconds(numerics, self.shots[:1]) for _ in range(2))  # the first time builds kernels
+        shortest = max(SHORTEST_RUN, SINGLES * single)
+        answer, elapsed = self.compute(numerics)
+        copies, spent, best = 1, elapsed, len(self.shots) / elapsed
+        while spent < MEASURED_TIME or elapsed < shortest:
+            copies *= max(1, math.ceil(shortest / elapsed))
+            elapsed = self._seconds(numerics, _repeated(self.shots, copies))
+            spent, best = spent + elapsed, max(best, copies * len(self.shots) / elapsed)
+        return answer, best
+
+    def _seconds(self, numerics: Numerics, shots: Shots) -> float:
+        begin = time.perf_counter()
+        self._simulate(numerics, shots, lambda done, total: None)
+        return time.perf_counter() - begin
+
+    def _work(self, numerics: Numerics) -> float:
+        """Patches times steps of a hit, up to a factor."""
+        resolution = resolve(numerics, self.campaign.core, self.campaign.plate)
+        steps = 1.0 / resolution.step_at(self.campaign.impact.velocity)
+        return resolution.patches_axial * resolution.patches_around * steps
+
+    def _simulate(self, numerics: Numerics, shots: Shots, progress: Progress) -> Outcomes:
+        campaign = self.campaign
+        return simulate(
+            campaign.core,
+            campaign.plate,
+            shots,
+            interaction=campaign.interaction,
+            numerics=numerics,
+            standoffs=campaign.output.standoffs,
+            standoff_point=campaign.output.standoff_point,
+            device=str(self.device),
+            progress=progress,
+        )
+
+
+def _repeated(shots: Shots, copies: int) -> Shots:
+    return Shots(*(np.tile(getattr(shots, field.name), copies) for field in fields(Shots)))
+
+
+def _doubled(level: Fidelity) -> Fidelity:
+    """The same patches and grid with twice the time step."""
+    return replace(level, travel=2.0 * level.travel)
+
+
+def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> dict[str, Any]:
+    """The numerics of every setting with all choices made."""
+    resolutions = [resolve(numerics, campaign.core, campaign.plate) for numerics in settings.values()]
+    values = {
+        name: np.array([getattr(resolution, name) for resolution in resolutions])
+        for name in ("patches_axial", "patches_around", "grid_spacing")
+    }
+    steps = [resolution.step_at(campaign.impact.velocity) for resolution in resolutions]
+    return values | {"scheme": [numerics.scheme for numerics in settings.values()], "time_step": np.array(steps)}
+
+
+def _error_values(answers: Sequence[Answer], truth: Converged) -> dict[str, Any]:
+    """Errors of every setting over the settled hits that end as they do in the converged answer."""
+    same = np.array([answer.status == truth.answer.status for answer in answers])
+
+    def errors(name: str, index: int) -> Array:
+        off: Array = np.abs(getattr(answers[index], name) - getattr(truth.answer, name))
+        off[~(truth.settled & same[index])] = np.nan
+        return off
+
+    values: dict[str, Any] = {
+        f"{name}_error": np.stack([_quantiles(errors(name, index)) for index in range(len(answers))])
+        for name in QUANTITIES
+    }
+    return values | {"other_status": (truth.settled & ~same).sum(axis=1)}
+
+
+def _converged_values(truth: Converged) -> dict[str, Any]:
+    return {
+        "settled": truth.settled.astype(np.int8),
+        "status": truth.answer.status,
+        "residual_velocity": truth.answer.residual_velocity,
+        "tilt": truth.answer.tilt,
+        "residual_velocity_uncertainty": truth.residual_velocity_changes[-1],
+        "tilt_uncertainty": truth.tilt_changes[-1],
+        "residual_velocity_change": np.stack([_quantiles(change) for change in truth.residual_velocity_changes]),
+        "tilt_change": np.stack([_quantiles(change) for change in truth.tilt_changes]),
+    }
+
+
+def _quantiles(errors: Array) -> Array:
+    """QUANTILES over the first axis, of the values that exist; NaN where there is none."""
+    with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # of a slice without values
+        return np.asarray(np.nanquantile(errors, QUANTILES, axis=0))

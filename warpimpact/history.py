@@ -1,0 +1,62 @@
+"""The history of one shot: the columns of its trace by name, and what follows from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpimpact.scene import Core
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class History:
+    """A core in the middle of every step, and where contact ended: plate frame, SI.
+
+    Attributes:
+        time: since the first touch of the front face [s], shape [steps].
+        position: of the centre of mass, from the hit point [m], shape [steps, 3].
+        attitude: unit quaternion (x, y, z, w) that turns the plate's axes into the core's, shape [steps, 4].
+        core_axis: unit vector along the core towards its nose, shape [steps, 3].
+        velocity: of the centre of mass, at the end of the step [m/s], shape [steps, 3].
+        angular_velocity: at the end of the step [rad/s], shape [steps, 3].
+        force, moment: means over the step, about the centre of mass [N] and [N m], shape [steps, 3].
+        translational_energy, rotational_energy: at the end of the step [J], shape [steps].
+    """
+
+    time: Array
+    position: Array
+    attitude: Array
+    core_axis: Array
+    velocity: Array
+    angular_velocity: Array
+    force: Array
+    moment: Array
+    translational_energy: Array
+    rotational_energy: Array
+
+    @classmethod
+    def from_trace(cls, trace: Array, core: Core) -> Self:
+        """Read a trace of shape [steps, TRACE_COLUMNS] (kernels/march.py)."""
+        time, position, attitude, velocity, momentum, force, moment = np.split(trace, (1, 4, 8, 11, 14, 17), axis=1)
+        body = core.mass_properties
+        axis = Rotation.from_quat(attitude).apply([1.0, 0.0, 0.0])
+        along = np.sum(momentum * axis, axis=1, keepdims=True) * axis
+        omega = along / body.inertia_axial + (momentum - along) / body.inertia_transverse
+        return cls(
+            time=time[:, 0],
+            position=position,
+            attitude=attitude,
+            core_axis=axis,
+            velocity=velocity,
+            angular_velocity=omega,
+            force=force,
+            moment=moment,
+            translational_energy=0.5 * body.mass * np.sum(velocity**2, axis=1),
+            rotational_energy=0.5 * np.sum(momentum * omega, axis=1),
+        )

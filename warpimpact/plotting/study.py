@@ -1,0 +1,79 @@
+"""Error against cost: what a study of the numerics found, for residual velocity and tilt."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray
+from matplotlib.figure import Figure
+
+from warpimpact.analysis.study import QUOTED
+from warpimpact.discretisation import FIDELITIES
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_PANELS = {"residual_velocity": "residual velocity [m/s]", "tilt": "tilt [°]"}
+_BELOW_FLOOR = 0.4  # lowest error shown, in units of the uncertainty
+# Okabe and Ito's colours, which stay apart in every kind of colour blindness.
+_BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.62"
+
+
+def study_figure(dataset: xarray.Dataset) -> Figure:
+    """Error of 90 % of the hits against hits per second, for residual velocity and tilt at the last stand-off.
+
+    Args:
+        dataset: the result of `analysis.study.study`.
+    """
+    figure = Figure(figsize=(11.5, 5.4), layout="constrained")
+    quoted = dataset.sel(quantile=QUOTED).isel(standoff=-1)
+    panels = figure.subplots(1, 2)
+    for axes, quantity in zip(panels, _PANELS, strict=True):
+        _draw(axes, quoted, quantity)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
+    figure.suptitle(
+        f"{dataset.attrs['title']}\n{dataset.sizes['hit']} hits, tilt at {quoted['standoff'].item() * 1e3:g} mm; "
+        f"{dataset.attrs['device']}, {dataset.attrs['history'][:10]}"
+    )
+    return figure
+
+
+def _draw(axes: Axes, quoted: xarray.Dataset, quantity: str) -> None:
+    """One panel: every setting, the front, the names that people look for, the floor of what can be told."""
+    axes.set(xscale="log", yscale="log", xlabel="hits per second", ylabel=f"{QUOTED:.0%} error of {_PANELS[quantity]}")
+    axes.grid(which="major", color="0.9")
+    axes.set_axisbelow(True)
+    quoted = quoted.isel(setting=(quoted[f"{quantity}_error"] > 0.0).values)  # what a logarithm can show
+    literal = (quoted["scheme"] == "nodal").values
+    on_front = quoted.isel(setting=quoted[f"{quantity}_front"].values == 1).sortby("hits_per_second")
+
+    def points(settings: xarray.Dataset) -> tuple[np.ndarray, np.ndarray]:
+        return settings["hits_per_second"].values, settings[f"{quantity}_error"].values
+
+    floor = quoted[f"{quantity}_change"].values[-1]
+    axes.plot(*points(on_front), color=_BLUE, linewidth=1.5, zorder=2, label="front: no faster setting is as exact")
+    axes.scatter(*points(quoted.isel(setting=~literal)), s=28, color=_GREY, zorder=3, label="other settings")
+    axes.scatter(*points(on_front), s=28, color=_BLUE, zorder=4)
+    axes.scatter(
+        *points(quoted.isel(setting=literal)), s=48, color=_VERMILION, marker="X", zorder=4, label="literal scheme"
+    )
+    named = quoted.isel(setting=np.isin(quoted["setting"].values, list(FIDELITIES)))
+    axes.scatter(*points(named), s=110, facecolors="none", edgecolors="black", zorder=5, label="fidelities")
+    axes.margins(x=0.22, y=0.15)
+    if floor > 0.0:
+        bottom = min(axes.get_ylim()[0], _BELOW_FLOOR * floor)
+        axes.axhspan(bottom, floor, color=_VERMILION, alpha=0.12, linewidth=0, label="converged answer uncertain")
+        axes.set_ylim(bottom=bottom)
+    for setting in named["setting"].values:
+        _name(axes, *points(named.sel(setting=[setting])), setting, right=-5, up=7, ha="right")
+    for row, setting in enumerate(quoted["setting"].values[literal]):
+        _name(axes, *points(quoted.sel(setting=[setting])), setting, right=9, up=4 - 14 * row)
+
+
+def _name(
+    axes: Axes, rates: np.ndarray, errors: np.ndarray, text: str, *, right: float, up: float, ha: str = "left"
+) -> None:
+    """Write a setting's name so far from its point [pt]."""
+    place = (rates.item(), errors.item())
+    axes.annotate(text, place, xytext=(right, up), textcoords="offset points", ha=ha, zorder=6)

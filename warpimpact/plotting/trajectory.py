@@ -1,0 +1,267 @@
+"""Figures of one hit's history: the core on its way through the plate and behind it, its loads, and the plate.
+
+The core is drawn to scale in two views: x-y, where the angle of its axis is the yaw, and x-z, where it is the pitch.
+It comes from the left; the plate is cut through the hit point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import xarray
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from matplotlib.patheffects import Normal, Stroke
+from scipy.spatial import ConvexHull
+
+from warpimpact.analysis.summary import passed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+INSTANTS = 5  # poses of the core within the plate that are drawn
+
+_MM, _US = 1e3, 1e6
+_ANGLES = {"y": "yaw", "z": "pitch"}  # view → projected angle of the axis that it shows
+_COMPONENTS = {"x": "black", "y": "#0072B2", "z": "#D55E00"}  # Okabe and Ito's colours
+# Blue and green, as in the paper's fig. 5, but light enough for a dark core.
+_LOADS = {"force": ("#56B4E9", "kN", 1e-3), "moment": ("#009E73", "N m", 1.0)}
+_STEEL = "0.8"
+_ARROW = 12.0  # length of a load's arrow [mm]
+_AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
+
+
+class Pose(NamedTuple):
+    """Where a core is: centre of mass in the plate [m] and unit vector towards the nose, both of shape [3]."""
+
+    position: Array
+    axis: Array
+
+
+def passage(dataset: xarray.Dataset) -> Figure:
+    """The core at instants spread evenly over its way through the plate (the paper's figs. 7 and 9)."""
+    steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
+    poses = {f"{float(dataset['time'][step]) * _US:.0f} µs": _pose(dataset, step) for step in steps}
+    figure, views = _views(dataset, poses.values(), "passage through the plate", room=5.0)
+    colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
+    for view, axes in views.items():
+        for (label, pose), colour in zip(poses.items(), colours, strict=True):
+            outline = silhouette(dataset, pose, view) * _MM
+            axes.add_patch(Polygon(outline, facecolor=(*colour[:3], 0.3), edgecolor=colour, lw=1.4, label=label))
+        path = dataset["plate_position"].sel(axis=["x", view]) * _MM
+        axes.plot(path[:, 0], path[:, 1], color="black", lw=0.8, ls="--", label="centre of mass")
+    _add_legend(figure, views["y"])
+    return figure
+
+
+def flight(dataset: xarray.Dataset) -> Figure:
+    """The core on impact and at the stand-offs behind the plate, if it gets there (the paper's figs. 8 and 10)."""
+    poses = {"impact": _pose(dataset, 0)}
+    if passed(dataset):
+        poses |= {f"{float(d) * _MM:g} mm": _pose_at(dataset, float(d)) for d in dataset["standoff"]}
+    figure, views = _views(dataset, poses.values(), "on impact and behind the plate", room=15.0)
+    for view, axes in views.items():
+        for label, pose in poses.items():
+            outline = silhouette(dataset, pose, view) * _MM
+            axes.add_patch(Polygon(outline, facecolor="0.55", edgecolor="black"))
+            angle = np.degrees(np.arctan2(pose.axis["xyz".index(view)], pose.axis[0]))
+            axes.text(
+                outline[:, 0].mean(),
+                outline[:, 1].max() + 1.0,
+                f"{label}: {_ANGLES[view]} {angle:.1f}°".replace("-", "−"),
+                ha="center",
+                va="bottom",
+            )
+    return figure
+
+
+def largest_load(dataset: xarray.Dataset) -> Figure:
+    """The core under the largest force, with force and moment as arrows (the paper's fig. 5b)."""
+    step = int(np.linalg.norm(dataset["force"], axis=1).argmax())
+    pose = _pose(dataset, step)
+    what = f"under the largest force, at {float(dataset['time'][step]) * _US:.1f} µs"
+    figure, views = _views(dataset, [pose], what, room=_ARROW)
+    for view, axes in views.items():
+        axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor="0.55", edgecolor="black"))
+        start = pose.position[[0, "xyz".index(view)]] * _MM
+        for name, (colour, unit, factor) in _LOADS.items():
+            load = dataset[name][step]
+            size = float(np.linalg.norm(load))
+            arrow = load.sel(axis=["x", view]).values * (_ARROW / size if size else 0.0)
+            axes.quiver(
+                *start,
+                *arrow,
+                angles="xy",
+                scale_units="xy",
+                scale=1.0,
+                width=0.006,
+                color=colour,
+                zorder=3,
+                label=f"{name} {size * factor:.3g} {unit}",
+            )
+    _add_legend(figure, views["y"])
+    return figure
+
+
+def course(dataset: xarray.Dataset) -> Figure:
+    """Velocity, attitude, loads and energy against time."""
+    figure = Figure(figsize=(10.0, 9.0), layout="constrained")
+    figure.suptitle(_title(dataset, "course through the plate"))
+    panels = figure.subplots(3, 2, sharex=True)
+    time, axis = dataset["time"] * _US, dataset["core_axis"]
+    velocity = dataset["velocity"]
+    _draw_components(panels[0, 0], time, velocity - velocity[0], "change of velocity [m/s]")
+    _draw_components(panels[0, 1], time, dataset["angular_velocity"] / 1e3, "angular velocity [10³ rad/s]")
+    _draw_components(panels[1, 0], time, dataset["force"] / 1e3, "force [kN]")
+    _draw_components(panels[1, 1], time, dataset["moment"], "moment [N m]")
+    _draw_energy(panels[2, 0], time, dataset)
+    for view, angle in _ANGLES.items():
+        values = np.degrees(np.unwrap(np.arctan2(axis.sel(axis=view), axis.sel(axis="x"))))
+        panels[2, 1].plot(time, values, color=_COMPONENTS[view], label=angle)
+    panels[2, 1].set_ylabel("angle of the axis [°]")
+    panels[2, 1].legend(frameon=False)
+    for panel in panels.flat:
+        panel.grid(color="0.9")
+    for panel in panels[-1]:
+        panel.set_xlabel("time [µs]")
+    return figure
+
+
+def plate(dataset: xarray.Dataset) -> Figure:
+    """Resistance left in the plate, from the first touch to the end, seen from behind (the paper's fig. 6)."""
+    share = dataset["resistance_share"]
+    columns = min(3, share.sizes["snapshot"])
+    rows = -(-share.sizes["snapshot"] // columns)
+    limits = _touched(dataset)
+    tall = np.ptp(limits["z"]) / np.ptp(limits["y"])
+    figure = Figure(figsize=(3.3 * columns + 1.2, (3.1 * tall + 0.5) * rows + 0.7), layout="constrained")
+    figure.suptitle(_title(dataset, "resistance left in the plate, seen from behind"))
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    y, z = (_cell_edges(dataset[f"cell_{axis}"]) for axis in "yz")
+    for panel, snapshot in zip(panels.flat, share.where(share[0] >= 0.5), strict=False):
+        image = panel.imshow(
+            snapshot.T, origin="lower", extent=(*y, *z), cmap="viridis", vmin=0.0, vmax=1.0, interpolation="nearest"
+        )
+        edge = [Stroke(linewidth=2.4, foreground="black"), Normal()]
+        panel.plot(dataset["outline_y"] * _MM, dataset["outline_z"] * _MM, color="white", lw=1.0, path_effects=edge)
+        panel.plot(dataset["hit_y"] * _MM, dataset["hit_z"] * _MM, "+", color="#D55E00", ms=10, mew=2)
+        panel.set(xlim=limits["y"], ylim=limits["z"], title=f"{float(snapshot['snapshot']) * _US:.1f} µs")
+    for panel in panels[-1]:
+        panel.set_xlabel("y [mm]")
+    for panel in panels[:, 0]:
+        panel.set_ylabel("z [mm]")
+    figure.colorbar(image, ax=panels, label="share of the resistance left; + is the hit point")
+    return figure
+
+
+def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
+    """Write the figures of a history as PNG files ``<stem>_<figure>.png`` and return their paths."""
+    paths = []
+    for draw in (passage, flight, largest_load, course, plate):
+        paths.append(folder / f"{stem}_{draw.__name__}.png")
+        draw(dataset).savefig(paths[-1], dpi=150)
+    return paths
+
+
+def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
+    """Outline of the core [m], shape [points, 2]: x, and y or z as `view` says.
+
+    The convex hull of its rings: a groove of a core that has one is not seen.
+    """
+    _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # completes the axis to three at right angles
+    station, radius = (dataset[name].values[:, None, None] for name in ("station", "core_radius"))
+    ring = np.cos(_AROUND)[:, None] * right + np.sin(_AROUND)[:, None] * up
+    points = (pose.position + station * pose.axis + radius * ring)[..., [0, "xyz".index(view)]].reshape(-1, 2)
+    outline: Array = points[ConvexHull(points).vertices]
+    return outline
+
+
+def _pose(dataset: xarray.Dataset, step: int) -> Pose:
+    return Pose(dataset["plate_position"].values[step], dataset["core_axis"].values[step])
+
+
+def _pose_at(dataset: xarray.Dataset, standoff: float) -> Pose:
+    """The core when it passes a stand-off [m]: its axis from the projected angles, its place in free flight."""
+    there, end = dataset.sel(standoff=standoff), dataset.isel(time=-1)
+    yaw, pitch = (np.radians(float(there[name])) for name in ("yaw", "pitch"))
+    axis = np.sign(np.cos(yaw)) * np.array([1.0, np.tan(yaw), np.tan(pitch)])
+    axis /= np.linalg.norm(axis)
+    ahead = float(dataset["station"].max()) * axis[0] if dataset.attrs["standoff_point"] == "nose" else 0.0
+    position, velocity = end["plate_position"].values, end["velocity"].values
+    x = dataset.attrs["plate_thickness"] + standoff - ahead
+    return Pose(position + velocity * ((x - position[0]) / velocity[0]), axis)
+
+
+def _title(dataset: xarray.Dataset, what: str) -> str:
+    return f"{dataset.attrs['title']}\nhit {dataset.attrs['hit']}: {what}"
+
+
+def _views(dataset: xarray.Dataset, poses: Iterable[Pose], what: str, *, room: float) -> tuple[Figure, dict[str, Axes]]:
+    """A figure of two views to scale that hold the plate, all poses of the core and some room [mm] round them."""
+    poses = list(poses)
+    corners = {}
+    for view in _ANGLES:
+        outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
+        hit = [dataset.attrs["plate_thickness"], float(dataset[f"hit_{view}"])]
+        points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * _MM
+        corners[view] = points.min(axis=0) - room, points.max(axis=0) + room
+    heights = [high[1] - low[1] for low, high in corners.values()]
+    width = corners["y"][1][0] - corners["y"][0][0]
+    inch = min(9.0 / width, 8.0 / sum(heights))  # per mm
+    figure = Figure(figsize=(inch * width + 1.0, inch * sum(heights) + 2.0), layout="constrained")
+    figure.suptitle(_title(dataset, what))
+    panels = figure.subplots(2, 1, height_ratios=heights)
+    for axes, (view, (low, high)) in zip(panels, corners.items(), strict=True):
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+        axes.set(xlabel="x [mm]", ylabel=f"{view} [mm]")
+        along = (dataset["section"] + dataset[f"hit_{view}"]) * _MM
+        solid = dataset[f"solid_along_{view}"].values == 1
+        thickness = dataset.attrs["plate_thickness"] * _MM
+        axes.fill_betweenx(along, 0.0, thickness, where=solid, step="mid", color=_STEEL, ec="none", zorder=0)
+        axes.autoscale(False)
+    return figure, dict(zip(corners, panels, strict=True))
+
+
+def _add_legend(figure: Figure, axes: Axes) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(handles), frameon=False)
+
+
+def _draw_components(axes: Axes, time: xarray.DataArray, values: xarray.DataArray, label: str) -> None:
+    for component, colour in _COMPONENTS.items():
+        axes.plot(time, values.sel(axis=component), color=colour, label=component)
+    axes.set_ylabel(label)
+    axes.legend(frameon=False)
+
+
+def _draw_energy(axes: Axes, time: xarray.DataArray, dataset: xarray.Dataset) -> None:
+    """Kinetic energy of translation on the left, and the much smaller one of rotation on the right."""
+    for side, motion, colour in ((axes, "translational", "black"), (axes.twinx(), "rotational", "#D55E00")):
+        side.plot(time, dataset[f"{motion}_energy"], color=colour)
+        side.set_ylabel(f"{motion} energy [J]", color=colour)
+        side.tick_params(axis="y", colors=colour)
+
+
+def _cell_edges(centres: xarray.DataArray) -> tuple[float, float]:
+    """Outer edges [mm] of evenly spaced cells."""
+    half = 0.5 * float(centres[1] - centres[0])
+    return (float(centres[0]) - half) * _MM, (float(centres[-1]) + half) * _MM
+
+
+def _touched(dataset: xarray.Dataset) -> dict[str, tuple[float, float]]:
+    """Range [mm] along y and z that the core has weakened, and some room; all there is if it has weakened nothing."""
+    share = dataset["resistance_share"]
+    weaker = (share[-1] < share[0]).values
+    ranges = {}
+    for axis, across in (("y", 1), ("z", 0)):
+        low, high = _cell_edges(dataset[f"cell_{axis}"])
+        there = dataset[f"cell_{axis}"].values[weaker.any(axis=across)] * _MM
+        ranges[axis] = (max(low, there.min() - 2.0), min(high, there.max() + 2.0)) if there.size else (low, high)
+    return ranges
