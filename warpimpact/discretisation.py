@@ -65,9 +65,14 @@ class Resolution:
         return self.time_step or self.way / velocity
 
 
-def resolve(numerics: Numerics, core: Core, plate: Plate) -> Resolution:
-    """Fill in what the numerics leave to fidelity and scheme."""
-    fidelity = FIDELITIES[numerics.fidelity]
+def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resolution:
+    """Fill in what the numerics leave to fidelity and scheme; a fidelity need not have a name."""
+    if isinstance(numerics, Fidelity):
+        fidelity, numerics = numerics, Numerics()
+    else:
+        fidelity = FIDELITIES[numerics.fidelity]
+    if numerics.tolerance is not None:
+        raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
     defaults: dict[str, Any] = {
         "time_step": None,
         "patches_axial": fidelity.patches_axial,
@@ -214,8 +219,8 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     needed, free = 2 * 8 * count_y * count_z, psutil.virtual_memory().available
     if needed > free:
         raise MemoryError(
-            f"numerics.grid_spacing: got {spacing:g} m, but the plate's period of {period_y:g} m x {period_z:g} m would "
-            f"take {needed / 2**30:.3g} GiB at that spacing, of {free / 2**30:.3g} GiB free"
+            f"numerics.grid_spacing: got {spacing:g} m, but the plate's period of {period_y:g} m x {period_z:g} m "
+            f"would take {needed / 2**30:.3g} GiB at that spacing, of {free / 2**30:.3g} GiB free"
         )
     samples = 1 if sharp else SUBSAMPLES
     within = (np.arange(samples) + 0.5) / samples

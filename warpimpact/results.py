@@ -20,6 +20,7 @@ from warpimpact.kernels.status import Status
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from warpimpact.refine import Estimates
     from warpimpact.scene import Core, Plate, Shots
     from warpimpact.simulate import Outcomes, Replay
 
@@ -68,6 +69,14 @@ OUTCOME_VARIABLES = {
     "yaw": Variable(("hit", "standoff"), "degree", "yaw of the core, projected into the x-y plane"),
     "total_yaw": Variable(("hit", "standoff"), "degree", "angle between core axis and residual velocity"),
 }
+
+ESTIMATE_VARIABLES = {
+    "residual_velocity_error": Variable(("hit",), "m s-1", "estimated error of the residual velocity"),
+    "tilt_error": Variable(("hit", "standoff"), "degree", "estimated error of the tilt"),
+    "converged": Variable(("hit",), "1", "whether the estimated errors meet the tolerance, 1 or 0"),
+    "level": Variable(("hit",), "1", "level of resolution on which the hit was computed"),
+}
+"""Only of a run to a tolerance."""
 
 OUTLINE_VARIABLES = {
     "outline_y": Variable(("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN"),
@@ -155,6 +164,7 @@ def to_dataset(
     outlines: Sequence[NDArray[np.float64]],
     period: tuple[float, float],
     attributes: Mapping[str, str | int | float],
+    estimates: Estimates | None = None,
 ) -> xarray.Dataset:
     """Gather shots and outcomes into the Dataset of the hit map.
 
@@ -165,14 +175,20 @@ def to_dataset(
         outlines: Closed hole outlines [m], each of shape (vertices, 2), that maps draw.
         period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits are drawn.
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
+        estimates: Of the errors of a run to a tolerance, SI and radians.
     """
     vertices = _joined(outlines)
     coordinates = {"hit_y": shots.hit_y, "hit_z": shots.hit_z, "standoff": standoffs, "axis": ["x", "y", "z"]}
     values = {name: getattr(shots, name.removeprefix("impact_")) for name in SHOT_VARIABLES}
     values |= {name: getattr(outcomes, name) for name in OUTCOME_VARIABLES}
     values |= {"outline_y": vertices[:, 0], "outline_z": vertices[:, 1]}
+    variables = VARIABLES
+    if estimates is not None:
+        variables = variables | ESTIMATE_VARIABLES
+        values |= {name: getattr(estimates, name) for name in ESTIMATE_VARIABLES}
+        values["converged"] = estimates.converged.astype(np.int8)
     dataset = xarray.Dataset(
-        {name: _described(variable, values[name]) for name, variable in VARIABLES.items()},
+        {name: _described(variable, values[name]) for name, variable in variables.items()},
         {name: _described(variable, coordinates[name]) for name, variable in COORDINATES.items()},
         _ATTRIBUTES | dict(attributes) | {"plate_period": np.array(period)},
     )

@@ -18,6 +18,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact import discretisation
+from warpimpact.discretisation import Fidelity
 from warpimpact.history import History
 from warpimpact.kernels import free_flight, march
 from warpimpact.kernels.status import Status
@@ -98,7 +99,7 @@ def simulate(
     shots: Shots,
     *,
     interaction: Interaction | None = None,
-    numerics: Numerics | None = None,
+    numerics: Numerics | Fidelity | None = None,
     standoffs: Sequence[float] = (),
     standoff_point: str = "centre_of_mass",
     device: str = "auto",
@@ -126,7 +127,7 @@ def trace(
     shots: Shots,
     *,
     interaction: Interaction | None = None,
-    numerics: Numerics | None = None,
+    numerics: Numerics | Fidelity | None = None,
 ) -> list[Array]:
     """Histories of shots on the CPU: one array [steps + 1, TRACE_COLUMNS] per shot (kernels/march.py)."""
     task = _traced_task(core, plate, shots, interaction, numerics)
@@ -139,7 +140,7 @@ def replay(
     shot: Shots,
     *,
     interaction: Interaction | None = None,
-    numerics: Numerics | None = None,
+    numerics: Numerics | Fidelity | None = None,
     standoffs: Sequence[float] = (),
     standoff_point: str = "centre_of_mass",
     snapshots: int = 6,
@@ -167,7 +168,7 @@ def replay(
 
 
 def _traced_task(
-    core: Core, plate: Plate, shots: Shots, interaction: Interaction | None, numerics: Numerics | None
+    core: Core, plate: Plate, shots: Shots, interaction: Interaction | None, numerics: Numerics | Fidelity | None
 ) -> _Task:
     device = find_device("cpu")
     return _Task(core, plate, interaction or Interaction(), numerics or Numerics(), shots, device, traced=True)
@@ -214,7 +215,7 @@ class _Task:
         core: Core,
         plate: Plate,
         interaction: Interaction,
-        numerics: Numerics,
+        numerics: Numerics | Fidelity,
         shots: Shots,
         device: Any,
         *,

@@ -175,6 +175,9 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
     assert replay(result, 0, folder=tmp_path).attrs["agreement"] == "bit-identical"
     with pytest.raises(CampaignError, match=r"the campaign in the result: hits\.file: .* no file nowhere/hits\.csv"):
         replay(result, 0, folder=NOWHERE)
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n0.002,0.002\n")
+    with pytest.raises(ResultError, match="got a result of 1 hits, but its campaign and the files it names give 2"):
+        replay(result, 0, folder=tmp_path)
 
 
 def test_command_writes_history_and_figures(

@@ -12,18 +12,15 @@ import xarray
 import warpimpact
 from warpimpact import simulate
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.results import (
-    OUTCOME_VARIABLES,
-    SHOT_VARIABLES,
-    ResultError,
-    history_dataset,
-    to_dataset,
-)
-from warpimpact.scene import make_shots
+from warpimpact.discretisation import Fidelity
+from warpimpact.refine import level
+from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, ResultError, history_dataset, to_dataset
+from warpimpact.scene import Numerics, make_shots
 
 ROUNDING = {"residual_velocity": 0.1, "deflection": 0.5, "tilt": 0.5}
 """How far another device's rounding may move an outcome [m/s, degree]. Between single and double precision, 6144
-hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most *(measured)*."""
+hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
+_OF_A_MAP = ("count", "compute_time", "hits_per_second")
 
 
 def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
@@ -47,57 +44,54 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     if not 0 <= hit < hits:
         raise ResultError(f"hit: got {hit}, but the result has hits 0 to {hits - 1}")
     campaign = _campaign(result, folder)
-    shots = make_shots(campaign.impact, campaign.hits, campaign.plate)[hit : hit + 1]
+    shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
+    if len(shots) != hits:
+        raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(shots)}")
+    shot = shots[hit : hit + 1]
     again = simulate.replay(
         campaign.core,
         campaign.plate,
-        shots,
+        shot,
         interaction=campaign.interaction,
-        numerics=campaign.numerics,
+        numerics=_numerics(campaign, result, hit),
         standoffs=list(campaign.output.standoffs),
         standoff_point=campaign.output.standoff_point,
     )
     reach = [(float(cells.min()), float(cells.max())) for cells in (again.cell_y, again.cell_z)]
     end = to_dataset(
-        shots,
+        shot,
         again.outcomes,
         standoffs=np.array(campaign.output.standoffs),
-        outlines=campaign.plate.pattern.outlines(reach[0], reach[1]),
+        outlines=campaign.plate.pattern.outlines(*reach),
         period=campaign.plate.sampled_cell,
         attributes={},
     ).isel(hit=0)
     stored = result.isel(hit=hit)
     if not _same(end, stored, ("hit_y", "hit_z", *SHOT_VARIABLES)):
         raise ResultError(f"hit: got {hit}, whose shot is no longer what the campaign and the files it names give")
-    attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP}
-    return history_dataset(
-        end,
-        again,
-        campaign.core,
-        campaign.plate,
-        attributes=attributes
-        | {
-            "history": f"{result.attrs['history']}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
-            "hit": hit,
-            "agreement": _agreement(end, stored),
-            "warpimpact_version": warpimpact.__version__,
-            "warp_version": warp.__version__,
-            "device": "cpu",
-        },
-    )
+    attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
+        "history": f"{result.attrs['history']}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
+        "hit": hit,
+        "agreement": _agreement(end, stored),
+        "warpimpact_version": warpimpact.__version__,
+        "warp_version": warp.__version__,
+        "device": "cpu",
+    }
+    return history_dataset(end, again, campaign.core, campaign.plate, attributes=attributes)
 
 
-_OF_A_MAP = ("count", "compute_time", "hits_per_second")
+def _numerics(campaign: Campaign, result: xarray.Dataset, hit: int) -> Numerics | Fidelity:
+    """What the hit was computed with: of a run to a tolerance, the level that it ended on."""
+    if campaign.numerics.tolerance is None:
+        return campaign.numerics
+    return level(int(result["level"][hit]), campaign.numerics)
 
 
 def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
-    try:
-        text, count = result.attrs["campaign"], result.attrs.get("count")
-        return Campaign.from_text(
-            text, name="the campaign in the result", folder=folder, count=None if count is None else int(count)
-        )
-    except KeyError:
-        raise ResultError("the result does not carry its campaign") from None
+    if "campaign" not in result.attrs:
+        raise ResultError("the result does not carry its campaign")
+    count = int(result.attrs["count"]) if "count" in result.attrs else None  # a list of hits has none
+    return Campaign.from_text(result.attrs["campaign"], name="the campaign in the result", folder=folder, count=count)
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import fields
 from datetime import UTC, datetime
+from typing import Any
 
 import numpy as np
 import psutil
@@ -13,7 +15,8 @@ import xarray
 
 import warpimpact
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.discretisation import Resolution, resolve
+from warpimpact.discretisation import resolve
+from warpimpact.refine import LADDER, Estimates, simulate_to_tolerance
 from warpimpact.results import to_dataset
 from warpimpact.scene import Shots, make_shots
 from warpimpact.simulate import Outcomes, Progress, find_device, simulate
@@ -40,7 +43,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None =
     _check_memory(campaign)
     shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
     begin = time.perf_counter()
-    outcomes = _in_batches(campaign, shots, str(chosen), progress or (lambda done, total: None))
+    outcomes, estimates = _in_batches(campaign, shots, str(chosen), progress or (lambda done, total: None))
     elapsed = time.perf_counter() - begin
     period = campaign.plate.sampled_cell
     return to_dataset(
@@ -65,6 +68,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None =
             "hits_per_second": len(shots) / elapsed,
         }
         | ({} if campaign.hits.count is None else {"count": campaign.hits.count}),
+        estimates=estimates,
     )
 
 
@@ -81,34 +85,51 @@ def _check_memory(campaign: Campaign) -> None:
         )
 
 
-def _in_batches(campaign: Campaign, shots: Shots, device: str, progress: Progress) -> Outcomes:
-    parts = [
-        simulate(
-            campaign.core,
-            campaign.plate,
-            shots[first : first + BATCH],
-            interaction=campaign.interaction,
-            numerics=campaign.numerics,
-            standoffs=list(campaign.output.standoffs),
-            standoff_point=campaign.output.standoff_point,
-            device=device,
-            progress=lambda done, _, first=first: progress(first + done, len(shots)),  # type: ignore[misc]
-        )
-        for first in range(0, len(shots), BATCH)
-    ]
-    return Outcomes(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Outcomes)})
+def _in_batches(campaign: Campaign, shots: Shots, device: str, progress: Progress) -> tuple[Outcomes, Estimates | None]:
+    parts = []
+    for first in range(0, len(shots), BATCH):
+        parts.append(_batch(campaign, shots[first : first + BATCH], device, _after(first, len(shots), progress)))
+    outcomes, estimates = zip(*parts, strict=True)
+    return _joined(outcomes), None if estimates[0] is None else _joined(estimates)
+
+
+def _batch(campaign: Campaign, shots: Shots, device: str, progress: Progress) -> tuple[Outcomes, Estimates | None]:
+    how: dict[str, Any] = {
+        "interaction": campaign.interaction,
+        "numerics": campaign.numerics,
+        "standoffs": campaign.output.standoffs,
+        "standoff_point": campaign.output.standoff_point,
+        "device": device,
+        "progress": progress,
+    }
+    if campaign.numerics.tolerance is None:
+        return simulate(campaign.core, campaign.plate, shots, **how), None
+    return simulate_to_tolerance(campaign.core, campaign.plate, shots, **how)
+
+
+def _joined(parts: Sequence[Any]) -> Any:
+    """One dataclass of arrays from several of the same type."""
+    names = [field.name for field in fields(parts[0])]
+    return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
+
+
+def _after(first: int, total: int, progress: Progress) -> Progress:
+    """Progress of a batch that comes after the first shots."""
+    return lambda done, _: progress(first + done, total)
 
 
 def _numerics(campaign: Campaign) -> str:
     """The numerics in force, every choice made, as one line."""
+    tolerance = campaign.numerics.tolerance
+    if tolerance is not None:
+        return (
+            f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg, "
+            f"at most {LADDER[-1].patches_axial} by {LADDER[-1].patches_around} patches"
+        )
     resolution = resolve(campaign.numerics, campaign.core, campaign.plate)
-    step = resolution.time_step or resolution.way / campaign.impact.velocity
     return (
-        f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, time_step {step:.4g} s, "
+        f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
+        f"time_step {resolution.step_at(campaign.impact.velocity):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
-        f"grid_spacing {resolution.grid_spacing:.4g} m, precision {_precision(resolution)}"
+        f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
     )
-
-
-def _precision(resolution: Resolution) -> str:
-    return "double" if resolution.double else "single"

@@ -2,7 +2,7 @@
 
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction
-from .numerics import Numerics
+from .numerics import Numerics, Tolerance
 from .patterns import (
     AnyPattern,
     CirclePattern,
@@ -37,6 +37,7 @@ __all__ = [
     "ProfileCore",
     "Shots",
     "SlotPattern",
+    "Tolerance",
     "TrianglePattern",
     "make_shots",
 ]

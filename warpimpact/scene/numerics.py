@@ -1,11 +1,29 @@
 """How finely and by which scheme a shot is computed."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from .model import Model
-from .units import PositiveLength, PositiveTime
+from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime
+
+
+class Tolerance(Model):
+    """What an outcome may be off by; what is not given does not count.
+
+    Attributes:
+        residual_velocity: [m/s].
+        tilt: at every stand-off [rad].
+    """
+
+    residual_velocity: PositiveSpeed = float("inf")
+    tilt: PositiveAngle = float("inf")
+
+    @model_validator(mode="after")
+    def _asks_for_something(self) -> Self:
+        if not self.model_fields_set:
+            raise ValueError("got neither residual_velocity nor tilt, but at least one of them must be given")
+        return self
 
 
 class Numerics(Model):
@@ -19,6 +37,7 @@ class Numerics(Model):
             makes mirrored shots mirror exactly.
         grid_spacing: spacing of the plate grid [m].
         precision: of the arithmetic.
+        tolerance: instead of a fidelity: each hit is refined until its estimated error meets it.
     """
 
     fidelity: Literal["draft", "standard", "reference"] = "standard"
@@ -28,3 +47,11 @@ class Numerics(Model):
     patches_around: Annotated[int, Field(strict=True, ge=8, le=4096, multiple_of=4)] | None = None
     grid_spacing: PositiveLength | None = None
     precision: Literal["single", "double"] | None = None
+    tolerance: Tolerance | None = None
+
+    @model_validator(mode="after")
+    def _tolerance_chooses(self) -> Self:
+        chosen = self.model_fields_set - {"tolerance", "precision"}
+        if self.tolerance is not None and chosen:
+            raise ValueError(f"got {min(chosen)} beside tolerance, which chooses the resolution itself")
+        return self
