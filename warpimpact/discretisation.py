@@ -121,10 +121,12 @@ class Rings:
 def rings_of(core: Core, axial: int, around: int, *, discs: bool = True) -> Rings:
     """Divide a core's surface into `axial` rings of the profile, and rings of the discs that close it.
 
+    Without `discs` it is the literal scheme's: the profile alone, evenly divided.
+
     Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the closed
     surface sum to zero and the work of a straight shot is exact (MODEL.md §6.1).
     """
-    stations = _stations(core, axial)
+    stations = _stations(core, axial) if discs else np.linspace(0.0, core.length, axial + 1)
     widest = core.length / axial
     parts = [_profile_rings(core, stations)]
     if discs:
