@@ -114,15 +114,15 @@ def build(variant: Variant) -> SimpleNamespace:
         dv = (dt / body.mass) * load.force
         dw = dt * angular_velocity(body, axis, load.moment)
         if load.damped:
+            # In units of m and I_t, so that the determinants of a small core do not underflow.
             identity = wp.identity(3, dtype=real)
-            inertia = body.inertia_transverse * identity + (body.inertia_axial - body.inertia_transverse) * wp.outer(
-                axis, axis
-            )
-            vv = wp.inverse(body.mass * identity + dt * load.damping_vv)
-            vw = dt * load.damping_vw
-            schur = inertia + dt * load.damping_ww - wp.transpose(vw) * vv * vw
-            dw = wp.inverse(schur) * (dt * (load.moment - wp.transpose(load.damping_vw) * (vv * (dt * load.force))))
-            dv = vv * (dt * load.force - vw * dw)
+            light, agile = dt / body.mass, dt / body.inertia_transverse
+            inertia = identity + (body.inertia_axial / body.inertia_transverse - one) * wp.outer(axis, axis)
+            vv = wp.inverse(identity + light * load.damping_vv)
+            wv = wp.transpose(load.damping_vw)
+            schur = inertia + agile * (load.damping_ww - light * (wv * vv * load.damping_vw))
+            dw = wp.inverse(schur) * (agile * (load.moment - wv * (vv * (light * load.force))))
+            dv = vv * (light * (load.force - load.damping_vw * dw))
         return dv, dw
 
     @wp.func
