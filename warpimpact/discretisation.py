@@ -35,7 +35,7 @@ class Fidelity:
 SLENDER = 1.0 / 7.0
 
 FIDELITIES = {
-    "draft": Fidelity(16, 32, 1.0, 0.2),
+    "draft": Fidelity(16, 32, 2.0, 0.4),
     "standard": Fidelity(32, 64, 3.0, 0.2),
     "reference": Fidelity(96, 192, 8.0, 0.05),
 }
@@ -153,7 +153,9 @@ def _stations(core: Core, count: int) -> Array:
     """Edges of the profile's rings: even, with the widest station and, unless they outnumber the rings, the jumps
     of the slope on edges."""
     breaks = core.breaks if len(core.breaks) < count else ()
-    knots = np.unique([0.0, *breaks, _widest_station(core), core.length])
+    inner = np.unique([*breaks, _widest_station(core)])
+    apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
+    knots = np.array([0.0, *inner[apart[:-1] & apart[1:]], core.length])
     spans = np.diff(knots)
     shares = np.maximum(1, np.round(count * spans / core.length)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
@@ -166,7 +168,7 @@ def _widest_station(core: Core) -> float:
     peak = int(core.radius(stations).argmax())
     low, high = stations[max(peak - 1, 0)], stations[min(peak + 1, len(stations) - 1)]
     found = minimize_scalar(lambda s: -core.radius(np.array(s)), bounds=(low, high), method="bounded")
-    candidates = np.array([stations[peak], found.x, *(b for b in core.breaks if low <= b <= high)])
+    candidates = np.array([*(b for b in core.breaks if low <= b <= high), found.x, stations[peak]])
     return float(candidates[core.radius(candidates).argmax()])
 
 
@@ -183,7 +185,7 @@ def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
 
 def _disc_rings(station: float, radius: float, widest: float, *, facing: float) -> tuple[Array, ...]:
     """The same of a disc that faces along the axis (+1 towards the nose)."""
-    count = int(np.ceil(radius / widest)) if radius > 0.0 else 0
+    count = int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # below that it is a point
     edges = np.linspace(0.0, radius, count + 1)
     low, high = edges[:-1], edges[1:]
     nothing = np.zeros(count)

@@ -236,7 +236,9 @@ def study_text(dataset: xarray.Dataset) -> str:
         f"{change['tilt_change'].item():.2g}° (90 % of {dataset.sizes['hit']} hits)",
     ]
     if unsettled:
-        lines.append(f"{unsettled} hits are left out: how they end still depends on the numerics")
+        lines.append(
+            f"left out, as their status still depends on the numerics: {unsettled} of {dataset.sizes['hit']} hits"
+        )
     return "\n".join(lines)
 
 
