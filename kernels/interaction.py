@@ -15,13 +15,14 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, one = real(0.0), real(1.0)
     # A wall sliding along itself has v_p·n = 0 up to rounding; below this share of |v_p| it does not touch.
     at_rest = real(1.0e-5)
+    smallest_onset = real(1.0e-4)  # of the impact velocity: keeps the ramp's slope finite
 
     @wp.struct
     class Law:
         """Normal stress a0 + a1 v_n + a2 v_n² [Pa], friction η and ln(β)/Δt_β [1/s].
 
-        `onset` is the closing speed [m/s] over which contact sets in: a multiple, `onset_jump` [m/s²], of the
-        time step, so that it vanishes in the limit, and at most the share `onset_limit` of the impact velocity.
+        `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): a multiple, `onset_jump`
+        [m/s²], of the time step, and at most the share `onset_limit` of the core's velocity.
         """
 
         a0: real
@@ -32,6 +33,12 @@ def build(variant: Variant) -> SimpleNamespace:
         onset_jump: real
         onset_limit: real
         onset: real
+
+    @wp.func
+    def onset_speed(law: Law, dt: real, velocity: real, impact_velocity: real):
+        """Closing speed over which contact sets in [m/s]: vanishes with the time step, and follows a core that
+        slows down, so that it is arrested where it should be."""
+        return wp.max(wp.min(law.onset_jump * dt, law.onset_limit * velocity), smallest_onset * impact_velocity)
 
     @wp.func
     def contact_fraction(law: Law, closing: real, speed: real):
@@ -71,6 +78,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     return SimpleNamespace(
         Law=Law,
+        onset_speed=onset_speed,
         contact_fraction=contact_fraction,
         normal_stress=normal_stress,
         stress_slope=stress_slope,

@@ -185,7 +185,6 @@ def build(variant: Variant) -> SimpleNamespace:
         if dt == zero:
             dt = real(pace.way / speed)
         max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
-        law.onset = wp.min(law.onset_jump * dt, law.onset_limit * real(speed))
         window = grid.open_window(plate, fields, wp.tid() % slots, shots.hit_y[shot], shots.hit_z[shot])
         state = launch_state(surface, body, shots, shot)
         axis = motion.axis_of(state.attitude)
@@ -202,6 +201,7 @@ def build(variant: Variant) -> SimpleNamespace:
             found = contacts.footprint_of(surface, plate, fields, window, pose, dt)
             status = ended(surface, body, state, pose, found, touched, initial_energy, plate.thickness)
             if status == RUNNING:
+                law.onset = laws.onset_speed(law, dt, wp.length(state.velocity), real(speed))
                 load = Load()
                 before = state
                 if found.last_ring >= 0:

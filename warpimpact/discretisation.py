@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,12 @@ class Fidelity:
     core's length where the plate is thicker than that."""
     double: bool = False
 
+    @property
+    def patch_width(self) -> float:
+        """Widest patch as the plate sees it, in degradation lengths: wider ones leave gaps in the exposure, and
+        weaken the plate under themselves too much. It is that of the paper's core (R = 3.02 mm, ℓ = 0.5 mm)."""
+        return 38.0 / self.patches_around
+
 
 SLENDER = 1.0 / 7.0
 
@@ -59,6 +66,8 @@ class Resolution:
     patches_around: int
     grid_spacing: float
     double: bool
+    patch_width: float
+    """No ring is wider than this radially [m]."""
 
     def step_at(self, velocity: float) -> float:
         """Time step [s] at an impact velocity [m/s]."""
@@ -73,10 +82,11 @@ def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resoluti
         fidelity = FIDELITIES[numerics.fidelity]
     if numerics.tolerance is not None:
         raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
+    width = fidelity.patch_width * plate.degradation_length if plate.degradation < 1.0 else math.inf
     defaults: dict[str, Any] = {
         "time_step": None,
         "patches_axial": fidelity.patches_axial,
-        "patches_around": fidelity.patches_around,
+        "patches_around": max(fidelity.patches_around, 4 * math.ceil(0.5 * math.pi * core.max_radius / width)),
         "grid_spacing": plate.degradation_length / fidelity.cells_per_length,
     }
     if numerics.scheme == "nodal":
@@ -86,6 +96,7 @@ def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resoluti
         nodal=numerics.scheme == "nodal",
         double=fidelity.double if numerics.precision is None else numerics.precision == "double",
         way=_way(fidelity.travel, core, plate),
+        patch_width=math.inf if numerics.scheme == "nodal" else width,
         **(defaults | given),
     )
 
@@ -118,24 +129,25 @@ class Rings:
     half_radial: Array
 
 
-def rings_of(core: Core, axial: int, around: int, *, discs: bool = True) -> Rings:
+def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, discs: bool = True) -> Rings:
     """Divide a core's surface into `axial` rings of the profile, and rings of the discs that close it.
 
-    Without `discs` it is the literal scheme's: the profile alone, evenly divided.
+    Rings wider than `widest` [m] radially are divided. Without `discs` it is the literal scheme's: the profile
+    alone, evenly divided.
 
-    Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the closed
-    surface sum to zero and the work of a straight shot is exact (MODEL.md §6.1).
+    Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the
+    closed surface sum to zero and the work of a straight shot is exact (MODEL.md §6.1).
     """
-    stations = _stations(core, axial) if discs else np.linspace(0.0, core.length, axial + 1)
-    widest = core.length / axial
-    parts = [_profile_rings(core, stations)]
     if discs:
         nose, base = (float(r) for r in core.radius(np.array([0.0, core.length])))
+        across = min(widest, core.length / axial)
         parts = [
-            _disc_rings(0.0, nose, widest, facing=1.0),
-            *parts,
-            _disc_rings(core.length, base, widest, facing=-1.0),
+            _disc_rings(0.0, nose, across, facing=1.0),
+            _profile_rings(core, _divided(core, _stations(core, axial), widest)),
+            _disc_rings(core.length, base, across, facing=-1.0),
         ]
+    else:
+        parts = [_profile_rings(core, np.linspace(0.0, core.length, axial + 1))]
     s, r, axial_area, radial_area, half_s, half_r = (np.concatenate(column) for column in zip(*parts, strict=True))
     sector = 2.0 * np.pi / around
     chord = 2.0 * np.sin(0.5 * sector)
@@ -160,6 +172,13 @@ def _stations(core: Core, count: int) -> Array:
     shares = np.maximum(1, np.round(count * spans / core.length)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
     return np.append(np.concatenate(edges), core.length)
+
+
+def _divided(core: Core, edges: Array, widest: float) -> Array:
+    """The edges, with more of them where the radius changes by more than `widest` [m] from one to the next."""
+    counts = np.maximum(1, np.ceil(np.abs(np.diff(core.radius(edges))) / widest - 1e-9)).astype(int)
+    finer = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
+    return np.append(np.concatenate(finer), core.length)
 
 
 def _widest_station(core: Core) -> float:

@@ -176,7 +176,7 @@ def _traced_task(
 
 def find_device(name: str) -> Any:
     """The Warp device of a name; "auto" takes CUDA where there is one."""
-    _quieten()
+    _start_warp()
     if name == "auto":
         return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
     try:
@@ -186,13 +186,15 @@ def find_device(name: str) -> Any:
         raise DeviceError(f'device: got "{name}", which this machine lacks; allowed: auto, {present}') from None
 
 
-def _quieten() -> None:
-    """Start Warp without its banner, and without its word that there is no CUDA driver.
+def _start_warp() -> None:
+    """Start Warp, quietly and fit for launches from several threads.
 
-    That word is no concern of who asked for no GPU, and Warp's native code writes it straight to file
-    descriptor 2; everything else written there is passed on.
+    Warp writes its word that there is no CUDA driver straight to file descriptor 2, where it is no concern of who
+    asked for no GPU; everything else written there is passed on. Tile storage on the stack, which no kernel here
+    uses, goes through one unguarded static and crashes threads in debug mode.
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
+    wp.config.enable_tiles_in_stack_memory = False
     kept = os.dup(2)
     with tempfile.TemporaryFile() as aside:
         os.dup2(aside.fileno(), 2)
@@ -250,7 +252,7 @@ class _Task:
 
     def _surface(self) -> Any:
         r = self.resolution
-        rings = discretisation.rings_of(self.core, r.patches_axial, r.patches_around, discs=not r.nodal)
+        rings = discretisation.rings_of(self.core, r.patches_axial, r.patches_around, r.patch_width, discs=not r.nodal)
         azimuth = (np.arange(r.patches_around) + 0.5) * (2.0 * np.pi / r.patches_around)
         surface = self.stage.Surface()
         for name in ("station", "radius", "half_axial", "half_radial"):
