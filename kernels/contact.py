@@ -1,7 +1,8 @@
 """One step's load on a core: the consistent law (MODEL.md §4), exposure taken at mid-step.
 
-Two passes over the patches in the slab: the first tells the plate what touches it, the second reads the
-weakened plate and sums the load. Both see the same pose, so a patch touches in one as in the other.
+Two passes over the patches in the slab: the first finds what touches and tells the plate, the second reads the
+weakened plate and sums the load. Their inner loops run over the patches of a ring without a branch, so that a CPU
+computes a vector of them at a time.
 """
 
 from functools import cache
@@ -9,25 +10,28 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, interaction, plate_grid, rigid_body
+from . import core_surface, interaction, memory, plate_grid, rigid_body
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
-    real = variant.real
+    real, vec3, mat33 = variant.real, variant.vec3, variant.mat33
     zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    Surface, Pose, Patch = surfaces.Surface, surfaces.Pose, surfaces.Patch
+    Surface, Pose, Ring, Patch = surfaces.Surface, surfaces.Pose, surfaces.Ring, surfaces.Patch
     Plate, Fields, Window, Box = grid.Plate, grid.Fields, grid.Window, grid.Box
     Law, Load = laws.Law, motion.Load
     ring_at, patch_at = surfaces.ring_at, surfaces.patch_at
+    reals, integers = memory.build(real), memory.build(wp.int32)
+    read, write, read_index, write_index = reals.read, reals.write, integers.read, integers.write
+    tiny = real(1.0e-30)
 
     @wp.struct
     class Footprint:
         """What a step can touch: the first and last ring that can be in the slab (none: last < first), the span
-        of the core along x [m], and the cells under those rings; `inside` tells whether the window holds them."""
+        of the core along x [m], and the nodes around those rings; `inside` tells whether the window holds them."""
 
         first_ring: wp.int32
         last_ring: wp.int32
@@ -36,143 +40,261 @@ def build(variant: Variant) -> SimpleNamespace:
         front: real
         box: Box
 
+    @wp.struct
+    class Touches:
+        """What the first pass finds, for every patch of every slot: area [m²] of material that it immerses, exposure
+        per node [s] that it is about to give, cell of the tile, and cell of the grid with the place in it; and the
+        area of every ring's patches together."""
+
+        area: wp.array(dtype=real)
+        gain: wp.array(dtype=real)
+        tile: wp.array(dtype=wp.int32)
+        cell: wp.array(dtype=wp.int32)
+        y: wp.array(dtype=real)
+        z: wp.array(dtype=real)
+        ring_area: wp.array(dtype=real)
+
+    @wp.struct
+    class Grip:
+        """How a patch touches: the share of it in contact; the normal (axial, outwards, around) of that share and
+        its closing speed [m/s]; and the range of closing speeds over which contact sets in [m/s]."""
+
+        share: real
+        axial: real
+        outward: real
+        around: real
+        closing: real
+        width: real
+
+    @wp.struct
+    class Sums:
+        """Over a ring: force [N] and moment [N m] along the body axes; the tractions' derivative by the closing speed
+        [N s/m], weighted by 1, cos, sin, cos² and cos sin of the azimuth."""
+
+        force: vec3
+        moment: vec3
+        slopes: real
+        slopes_c: real
+        slopes_s: real
+        slopes_cc: real
+        slopes_cs: real
+
     @wp.func
     def footprint_of(surface: Surface, plate: Plate, fields: Fields, window: Window, pose: Pose, dt: real):
         """The footprint in mid-step; patches act at their centres, so a ring covers centre ± radius."""
         found = Footprint()
-        found.inside = True
         found.first_ring = surface.rings
         found.last_ring = -1
-        home_y = fields.cells_y // 2
-        home_z = fields.cells_z // 2
-        found.box.y_low = fields.cells_y
-        found.box.z_low = fields.cells_z
-        found.box.y_high = -1
-        found.box.z_high = -1
         found.rear = real(wp.inf)
         found.front = -real(wp.inf)
+        broadside = surfaces.broadside(pose)
         across_y = wp.sqrt(wp.max(zero, one - pose.axis[1] * pose.axis[1]))
         across_z = wp.sqrt(wp.max(zero, one - pose.axis[2] * pose.axis[2]))
+        advance = half * dt * wp.abs(wp.dot(pose.velocity, vec3(pose.axis[0], pose.right[0], pose.up[0])))
+        turning = half * dt * wp.length(pose.omega)
+        low_y, high_y = real(wp.inf), -real(wp.inf)
+        low_z, high_z = real(wp.inf), -real(wp.inf)
         for index in range(surface.rings):
-            ring = ring_at(surface, pose, index, dt)
-            reach = surfaces.reach_along_x(surface, ring, pose, dt)
+            ring = ring_at(surface, pose, index)
+            reach = surfaces.reach_along_x(ring, pose, broadside, advance, turning)
             found.rear = wp.min(found.rear, ring.centre[0] - reach)
             found.front = wp.max(found.front, ring.centre[0] + reach)
             if ring.centre[0] + reach > zero and ring.centre[0] - reach < plate.thickness:
                 found.first_ring = wp.min(found.first_ring, index)
                 found.last_ring = index
-                y = (ring.centre[1] - window.y0) * window.per_y
-                z = (ring.centre[2] - window.z0) * window.per_z
-                spread_y = ring.radius * across_y * window.per_y
-                spread_z = ring.radius * across_z * window.per_z
-                found.box.y_low = wp.min(found.box.y_low, home_y + wp.int32(wp.floor(y - spread_y)))
-                found.box.z_low = wp.min(found.box.z_low, home_z + wp.int32(wp.floor(z - spread_z)))
-                found.box.y_high = wp.max(found.box.y_high, home_y + wp.int32(wp.floor(y + spread_y)) + 1)
-                found.box.z_high = wp.max(found.box.z_high, home_z + wp.int32(wp.floor(z + spread_z)) + 1)
-        # One cell of slack: rounding of a patch on the ring's outermost point must stay inside.
-        margin_y = plate.reach_y + 1
-        margin_z = plate.reach_z + 1
+                low_y = wp.min(low_y, ring.centre[1] - ring.radius * across_y)
+                high_y = wp.max(high_y, ring.centre[1] + ring.radius * across_y)
+                low_z = wp.min(low_z, ring.centre[2] - ring.radius * across_z)
+                high_z = wp.max(high_z, ring.centre[2] + ring.radius * across_z)
+        found.inside = True
         if found.last_ring >= 0:
+            # One node of slack: rounding of a patch on the ring's outermost point must stay inside.
+            home_y, home_z = fields.cells_y // 2, fields.cells_z // 2
+            found.box.y_low = home_y + wp.int32(wp.floor(low_y * window.per_cell)) - 1
+            found.box.z_low = home_z + wp.int32(wp.floor(low_z * window.per_cell)) - 1
+            found.box.y_high = home_y + wp.int32(wp.floor(high_y * window.per_cell)) + 2
+            found.box.z_high = home_z + wp.int32(wp.floor(high_z * window.per_cell)) + 2
             found.inside = (
-                found.box.y_low >= margin_y
-                and found.box.z_low >= margin_z
-                and found.box.y_high < fields.cells_y - margin_y
-                and found.box.z_high < fields.cells_z - margin_z
+                found.box.y_low >= plate.reach
+                and found.box.z_low >= plate.reach
+                and found.box.y_high < fields.cells_y - plate.reach
+                and found.box.z_high < fields.cells_z - plate.reach
             )
-            found.box.y_low -= 1
-            found.box.z_low -= 1
-            found.box.y_high += 1
-            found.box.z_high += 1
         return found
 
     @wp.func
-    def cell_under(fields: Fields, window: Window, pose: Pose, patch: Patch):
-        return grid.cell_at(fields, window, pose.position[1] + patch.arm[1], pose.position[2] + patch.arm[2])
+    def grip_of(law: Law, pose: Pose, ring: Ring, patch: Patch):
+        """Contact of a curved patch: normal and closing speed vary linearly over it, and only the part that closes in
+        touches. Without this, contact along a shank would come and go by whole patches."""
+        meridian = ring.turn_axial * patch.velocity_axial + ring.turn_radial * patch.velocity_outward
+        sideways = ring.sector * ring.normal_radial
+        around = sideways * patch.velocity_around
+        variation = wp.sqrt(meridian * meridian + around * around)
+        # From the patch's centre to that of the part in contact, in halves of the patch: 0 if all of it touches.
+        beyond = wp.clamp(half - half * patch.closing / (variation + tiny), zero, one)
+        shift = beyond / (variation + tiny)
+        grip = Grip()
+        grip.width = laws.onset_width(law, variation)
+        grip.share = laws.contact_fraction(law, patch.closing, variation, pose.speed)
+        grip.axial = ring.normal_axial + shift * meridian * ring.turn_axial
+        grip.outward = ring.normal_radial + shift * meridian * ring.turn_radial
+        grip.around = shift * around * sideways
+        grip.closing = patch.closing + shift * variation * variation
+        return grip
 
     @wp.func
-    def expose(
+    def normal_along_x(pose: Pose, patch: Patch, grip: Grip):
+        return grip.axial * pose.axis[0] + grip.outward * patch.outward_x + grip.around * patch.around_x
+
+    @wp.func
+    def open_window(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
+        """A slot's window about a hit, on a plate that nothing has touched."""
+        window = grid.window_at(plate, fields, slot, hit_y, hit_z)
+        if wp.static(variant.degrades):
+            grid.blank(fields, window)
+        return window
+
+    @wp.func
+    def find_touches(
         surface: Surface,
         plate: Plate,
         law: Law,
         fields: Fields,
         window: Window,
-        found: Footprint,
+        touches: Touches,
         pose: Pose,
+        ring: Ring,
+        first: wp.int32,
         dt: real,
     ):
-        """First pass: exposure gained per cell [s], ∫ρ dt before the tent is spread over it."""
-        per_cell = dt * window.per_y * window.per_z
-        for index in range(found.first_ring, found.last_ring + 1):
-            ring = ring_at(surface, pose, index, dt)
-            for j in range(surface.around):
-                patch = patch_at(surface, pose, ring, j)
-                share = laws.contact_fraction(law, patch.closing, pose.speed)
-                if share > zero:
-                    immersed = surfaces.immersed_area(pose, ring, patch, plate.thickness, dt)
-                    if immersed > zero:
-                        cell = cell_under(fields, window, pose, patch)
-                        projected = share * immersed * wp.abs(patch.normal[0])
-                        material = grid.gather(fields.material, fields.cells_z, cell)
-                        grid.scatter(fields.gain, fields.cells_z, cell, per_cell * projected * material)
+        """Fill in the patches of a ring, from index `first` on, as if the plate had no holes."""
+        per_node = dt * window.per_cell * window.per_cell
+        j = int(0)
+        while j < surface.around:
+            patch = patch_at(pose, ring, read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j))
+            grip = grip_of(law, pose, ring, patch)
+            area = surfaces.immersed_area(pose, ring, patch, plate.thickness, dt)
+            area = wp.where(grip.share > zero, area, zero)
+            if wp.static(variant.rimmed):
+                area *= grid.on_plate(plate, window, patch.y, patch.z)
+            cell = grid.cell_at(fields, window, patch.y, patch.z)
+            write(touches.area, first + j, area)
+            write(touches.gain, first + j, per_node * grip.share * area * wp.abs(normal_along_x(pose, patch, grip)))
+            write_index(touches.tile, first + j, grid.tile_under(plate, window, patch.y, patch.z))
+            write_index(touches.cell, first + j, cell.index)
+            write(touches.y, first + j, cell.y)
+            write(touches.z, first + j, cell.z)
+            j += 1
 
     @wp.func
-    def force_of(law: Law, pose: Pose, patch: Patch, share: real, area: real):
-        """Force [N] on a patch that touches `area` [m²] of undamaged material, `share` of it in contact."""
-        stress = laws.normal_stress(law, patch.closing)
-        direction = laws.traction_direction(law, patch.normal, patch.velocity, patch.closing, pose.speed)
-        return (area * share * stress) * direction
+    def meet_plate(surface: Surface, plate: Plate, fields: Fields, touches: Touches, first: wp.int32):
+        """Leave of a ring's touches what meets material, and give the plate its exposure; the area left [m²]."""
+        total = zero
+        j = int(first)
+        while j < first + surface.around:
+            area = read(touches.area, j)
+            if area > zero:
+                material = read(plate.tile, read_index(touches.tile, j))
+                write(touches.area, j, material * area)
+                total += material * area
+                if wp.static(variant.degrades):
+                    gain = material * read(touches.gain, j)
+                    if gain > zero:
+                        cell, y, z = read_index(touches.cell, j), read(touches.y, j), read(touches.z, j)
+                        grid.scatter(fields.gain, fields.cells_z, cell, y, z, gain)
+            j += 1
+        return total
 
     @wp.func
-    def damping_of(law: Law, patch: Patch, share: real, area: real):
-        """Half of how fast a patch's normal force grows with its closing speed [N s/m].
-
-        Half of it makes the step the trapezoid rule: second order where the stress depends on the rate, and
-        stable where a wall rests on the steep ramp of the contact.
-        """
-        slope = zero
-        if share < one:
-            slope += laws.normal_stress(law, patch.closing) / law.onset
-        if wp.static(variant.rate_dependent):
-            slope += share * laws.stress_slope(law, patch.closing)
-        return half * area * slope
-
-    @wp.func
-    def total_load(
-        surface: Surface,
-        plate: Plate,
-        law: Law,
-        fields: Fields,
-        window: Window,
-        found: Footprint,
-        pose: Pose,
-        dt: real,
+    def sum_ring(
+        surface: Surface, law: Law, fields: Fields, touches: Touches, pose: Pose, ring: Ring, first: wp.int32
     ):
-        """Second pass: the load [N, N m] of all patches on the plate as it is at mid-step."""
-        load = Load()
-        for index in range(found.first_ring, found.last_ring + 1):
-            ring = ring_at(surface, pose, index, dt)
-            for j in range(surface.around):
-                patch = patch_at(surface, pose, ring, j)
-                share = laws.contact_fraction(law, patch.closing, pose.speed)
-                if share > zero:
-                    immersed = surfaces.immersed_area(pose, ring, patch, plate.thickness, dt)
-                    if immersed > zero:
-                        cell = cell_under(fields, window, pose, patch)
-                        area = immersed * grid.gather(fields.material, fields.cells_z, cell)
-                        load.touching = load.touching or area > zero
-                        if wp.static(variant.degrades):
-                            area *= laws.remaining(law, grid.gather(fields.exposure, fields.cells_z, cell))
-                        force = force_of(law, pose, patch, share, area)
-                        load.force += force
-                        load.moment += wp.cross(patch.arm, force)
-                        damping = damping_of(law, patch, share, area)
-                        if damping > zero:
-                            turning = wp.cross(patch.arm, patch.normal)
-                            load.damping_vv += damping * wp.outer(patch.normal, patch.normal)
-                            load.damping_vw += damping * wp.outer(patch.normal, turning)
-                            load.damping_ww += damping * wp.outer(turning, turning)
-                            load.damped = True
-        return load
+        """Sum tractions and their slopes over a ring's touches."""
+        axial, right, up, around = real(0.0), real(0.0), real(0.0), real(0.0)
+        axial_c, axial_s = real(0.0), real(0.0)
+        slopes, slopes_c, slopes_s, slopes_cc, slopes_cs = real(0.0), real(0.0), real(0.0), real(0.0), real(0.0)
+        j = int(0)
+        while j < surface.around:
+            cosine, sine = read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j)
+            patch = patch_at(pose, ring, cosine, sine)
+            grip = grip_of(law, pose, ring, patch)
+            area = read(touches.area, first + j)
+            if wp.static(variant.degrades):
+                cell = read_index(touches.cell, first + j)
+                y, z = read(touches.y, first + j), read(touches.z, first + j)
+                area *= laws.remaining(law, grid.gather(fields.exposure, fields.cells_z, cell, y, z))
+            static_slope = wp.where(grip.share < one, laws.normal_stress(law, grip.closing) / grip.width, zero)
+            slope = area * static_slope
+            if wp.static(variant.rate_dependent):
+                slope += area * grip.share * laws.stress_slope(law, grip.closing)
+            # Traction = stress × (−n + η t), t against the sliding velocity.
+            f_axial, f_outward, f_around = -grip.axial, -grip.outward, -grip.around
+            if wp.static(variant.rubs):
+                s_axial = patch.velocity_axial - grip.closing * grip.axial
+                s_outward = patch.velocity_outward - grip.closing * grip.outward
+                s_around = patch.velocity_around - grip.closing * grip.around
+                sliding = wp.sqrt(s_axial * s_axial + s_outward * s_outward + s_around * s_around)
+                rubbing = laws.friction_per_speed(law, sliding, pose.speed)
+                f_axial -= rubbing * s_axial
+                f_outward -= rubbing * s_outward
+                f_around -= rubbing * s_around
+            force = area * grip.share * laws.normal_stress(law, grip.closing)
+            axial += force * f_axial
+            axial_c += force * f_axial * cosine
+            axial_s += force * f_axial * sine
+            right += force * (f_outward * cosine - f_around * sine)
+            up += force * (f_outward * sine + f_around * cosine)
+            around += force * f_around
+            slopes += slope
+            slopes_c += slope * cosine
+            slopes_s += slope * sine
+            slopes_cc += slope * cosine * cosine
+            slopes_cs += slope * cosine * sine
+            j += 1
+        sums = Sums()
+        sums.force = vec3(axial, right, up)
+        sums.moment = vec3(
+            ring.radius * around, ring.radius * axial_s - ring.station * up, ring.station * right - ring.radius * axial_c
+        )
+        sums.slopes = slopes
+        sums.slopes_c = slopes_c
+        sums.slopes_s = slopes_s
+        sums.slopes_cc = slopes_cc
+        sums.slopes_cs = slopes_cs
+        return sums
+
+    @wp.func
+    def damping_vv(ring: Ring, s: Sums):
+        """Σ slope n nᵀ, n = (axial, radial cos, radial sin)."""
+        a, r = ring.normal_axial, ring.normal_radial
+        aa, ar, rr = a * a * s.slopes, a * r, r * r
+        return mat33(
+            aa, ar * s.slopes_c, ar * s.slopes_s,
+            ar * s.slopes_c, rr * s.slopes_cc, rr * s.slopes_cs,
+            ar * s.slopes_s, rr * s.slopes_cs, rr * (s.slopes - s.slopes_cc),
+        )  # fmt: skip
+
+    @wp.func
+    def damping_vw(ring: Ring, s: Sums):
+        """Σ slope n (arm × n)ᵀ, arm × n = lever (0, −sin, cos)."""
+        lever = ring.station * ring.normal_radial - ring.radius * ring.normal_axial
+        a, r = lever * ring.normal_axial, lever * ring.normal_radial
+        return mat33(
+            zero, -a * s.slopes_s, a * s.slopes_c,
+            zero, -r * s.slopes_cs, r * s.slopes_cc,
+            zero, -r * (s.slopes - s.slopes_cc), r * s.slopes_cs,
+        )  # fmt: skip
+
+    @wp.func
+    def damping_ww(ring: Ring, s: Sums):
+        """Σ slope (arm × n)(arm × n)ᵀ."""
+        lever = ring.station * ring.normal_radial - ring.radius * ring.normal_axial
+        square = lever * lever
+        return mat33(
+            zero, zero, zero,
+            zero, square * (s.slopes - s.slopes_cc), -square * s.slopes_cs,
+            zero, -square * s.slopes_cs, square * s.slopes_cc,
+        )  # fmt: skip
 
     @wp.func
     def load_on(
@@ -181,17 +303,44 @@ def build(variant: Variant) -> SimpleNamespace:
         law: Law,
         fields: Fields,
         window: Window,
+        touches: Touches,
+        slot: wp.int32,
         found: Footprint,
         pose: Pose,
         dt: real,
     ):
-        """The load over one step; the plate's exposure moves on by the step."""
-        if wp.static(variant.degrades):
-            expose(surface, plate, law, fields, window, found, pose, dt)
-            grid.spread(plate, fields, window, found.box)
-        load = total_load(surface, plate, law, fields, window, found, pose, dt)
-        if wp.static(variant.degrades):
-            grid.settle(plate, fields, window, found.box)
+        """The load over one step; the plate's exposure moves on by the step.
+
+        Half of the slope of the traction is the load's damping: the step is the trapezoid rule, second order where
+        the stress depends on the rate, and stable where a wall rests on the steep ramp of the contact.
+        """
+        base = slot * surface.rings * surface.around
+        load = Load()
+        for index in range(found.first_ring, found.last_ring + 1):
+            ring = ring_at(surface, pose, index)
+            first = base + index * surface.around
+            find_touches(surface, plate, law, fields, window, touches, pose, ring, first, dt)
+            area = meet_plate(surface, plate, fields, touches, first)
+            touches.ring_area[slot * surface.rings + index] = area
+            load.touching = load.touching or area > zero
+        if load.touching:
+            if wp.static(variant.degrades):
+                grid.spread(plate, fields, window, found.box)
+            for index in range(found.first_ring, found.last_ring + 1):
+                if touches.ring_area[slot * surface.rings + index] > zero:
+                    ring = ring_at(surface, pose, index)
+                    sums = sum_ring(surface, law, fields, touches, pose, ring, base + index * surface.around)
+                    load.force += sums.force
+                    load.moment += sums.moment
+                    if sums.slopes > zero:
+                        load.damped = True
+                        load.damping_vv += half * damping_vv(ring, sums)
+                        load.damping_vw += half * damping_vw(ring, sums)
+                        load.damping_ww += half * damping_ww(ring, sums)
+            if wp.static(variant.degrades):
+                grid.settle(plate, fields, window, found.box)
         return load
 
-    return SimpleNamespace(Footprint=Footprint, footprint_of=footprint_of, load_on=load_on)
+    return SimpleNamespace(
+        Footprint=Footprint, Touches=Touches, open_window=open_window, footprint_of=footprint_of, load_on=load_on
+    )

@@ -22,8 +22,10 @@ def build(variant: Variant) -> SimpleNamespace:
         """Rings from nose to base, the discs that close them included.
 
         Per ring: station ahead of the centre of mass and radius [m], area of one patch [m²], its normal along
-        the axis and outwards, half of the ring's extent along the meridian, axially and radially [m].
-        Per patch of a ring: cosine and sine of its azimuth.
+        the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of
+        the change of the normal over it.
+        Cosine and sine of the patches' azimuths: those of even rings, then those of odd rings, half a patch on, so
+        that neighbours do not all miss the same edge.
         """
 
         station: wp.array(dtype=real)
@@ -33,6 +35,8 @@ def build(variant: Variant) -> SimpleNamespace:
         normal_radial: wp.array(dtype=real)
         half_axial: wp.array(dtype=real)
         half_radial: wp.array(dtype=real)
+        turn_axial: wp.array(dtype=real)
+        turn_radial: wp.array(dtype=real)
         cosine: wp.array(dtype=real)
         sine: wp.array(dtype=real)
         rings: wp.int32
@@ -41,10 +45,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Pose:
-        """Where the core is and how it moves: body axes in the plate frame, centre of mass, velocities.
-
-        No point of the core is faster than `speed`.
-        """
+        """Where the core is and how it moves: body axes and centre of mass in the plate frame; velocity and
+        angular velocity along the body axes (axis, right, up). No point of the core is faster than `speed`."""
 
         position: vec3
         axis: vec3
@@ -56,7 +58,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Ring:
-        """One ring in a pose. `motion` is the half-way along x that it makes within the step [m]."""
+        """One ring in a pose; `first` is the index of its first azimuth, `sector` half the angle of a patch."""
 
         centre: vec3
         station: real
@@ -66,19 +68,25 @@ def build(variant: Variant) -> SimpleNamespace:
         normal_radial: real
         half_axial: real
         half_radial: real
-        half_around: real
-        motion: real
+        turn_axial: real
+        turn_radial: real
+        sector: real
+        first: wp.int32
 
     @wp.struct
     class Patch:
-        """One patch: arm about the centre of mass [m], outward unit normal, velocity and its part along the
-        normal [m/s], and the radial direction it lies in."""
+        """The centre of one patch: place in the plate frame [m], components along x of the directions outwards and
+        around, velocity along the axis, outwards and around [m/s], and its part along the outward normal."""
 
-        arm: vec3
-        normal: vec3
-        velocity: vec3
+        x: real
+        y: real
+        z: real
+        outward_x: real
+        around_x: real
+        velocity_axial: real
+        velocity_outward: real
+        velocity_around: real
         closing: real
-        outward: vec3
 
     @wp.func
     def pose_of(surface: Surface, position: vec3, attitude: quat, velocity: vec3, omega: vec3):
@@ -87,13 +95,13 @@ def build(variant: Variant) -> SimpleNamespace:
         pose.axis = wp.quat_rotate(attitude, vec3(one, zero, zero))
         pose.right = wp.quat_rotate(attitude, vec3(zero, one, zero))
         pose.up = wp.quat_rotate(attitude, vec3(zero, zero, one))
-        pose.velocity = velocity
-        pose.omega = omega
+        pose.velocity = wp.quat_rotate_inv(attitude, velocity)
+        pose.omega = wp.quat_rotate_inv(attitude, omega)
         pose.speed = wp.length(velocity) + surface.bounding_radius * wp.length(omega)
         return pose
 
     @wp.func
-    def ring_at(surface: Surface, pose: Pose, index: wp.int32, dt: real):
+    def ring_at(surface: Surface, pose: Pose, index: wp.int32):
         ring = Ring()
         ring.station = surface.station[index]
         ring.radius = surface.radius[index]
@@ -102,10 +110,11 @@ def build(variant: Variant) -> SimpleNamespace:
         ring.normal_radial = surface.normal_radial[index]
         ring.half_axial = surface.half_axial[index]
         ring.half_radial = surface.half_radial[index]
-        ring.half_around = ring.radius * half_turn / real(surface.around)
-        offset = ring.station * pose.axis
-        ring.centre = pose.position + offset
-        ring.motion = half * dt * wp.abs(pose.velocity[0] + wp.cross(pose.omega, offset)[0])
+        ring.turn_axial = surface.turn_axial[index]
+        ring.turn_radial = surface.turn_radial[index]
+        ring.centre = pose.position + ring.station * pose.axis
+        ring.sector = half_turn / real(surface.around)
+        ring.first = (index % 2) * surface.around
         return ring
 
     @wp.func
@@ -114,52 +123,65 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.sqrt(wp.max(zero, one - pose.axis[0] * pose.axis[0]))
 
     @wp.func
-    def reach_along_x(surface: Surface, ring: Ring, pose: Pose, dt: real):
-        """How far from its centre along x any part of the ring can get within the step [m]."""
-        turning = half * dt * ring.radius * wp.length(pose.omega)
+    def reach_along_x(ring: Ring, pose: Pose, broadside: real, advance: real, turning: real):
+        """How far from its centre along x any part of the ring can get within the step [m]: the half-ways
+        `advance` of the centre of mass along x, and `turning` of a point 1 m away."""
+        around = (one + ring.sector) * ring.radius
         return (
-            (ring.radius + wp.abs(ring.half_radial) + ring.half_around) * broadside(pose)
+            (around + wp.abs(ring.half_radial)) * broadside
             + wp.abs(ring.half_axial * pose.axis[0])
-            + ring.motion
-            + turning
+            + advance
+            + turning * (wp.abs(ring.station) * broadside + ring.radius)
         )
 
     @wp.func
-    def behind_face(depth: real, extent: real, motion: real):
-        """Share of a patch beyond a face at x = 0, averaged over the step.
-
-        The patch spreads evenly over ±extent about its mid-step depth and moves evenly by ±motion; their
-        convolution keeps the sum over steps of what is immersed exact in straight flight.
-        """
-        wide = wp.max(extent, motion)
-        narrow = wp.max(wp.min(extent, motion), widest_ratio * wide)
-        rest = wp.max(zero, wide + narrow - wp.abs(depth))
-        edge = half - rest * rest / (eight * wide * narrow)
-        share = wp.where(depth < zero, -edge, edge)
-        if wp.abs(depth) < wide - narrow:
-            share = depth / (two * wide)
-        return half + share
+    def patch_at(pose: Pose, ring: Ring, cosine: real, sine: real):
+        patch = Patch()
+        patch.outward_x = cosine * pose.right[0] + sine * pose.up[0]
+        patch.around_x = cosine * pose.up[0] - sine * pose.right[0]
+        patch.x = ring.centre[0] + ring.radius * patch.outward_x
+        patch.y = ring.centre[1] + ring.radius * (cosine * pose.right[1] + sine * pose.up[1])
+        patch.z = ring.centre[2] + ring.radius * (cosine * pose.right[2] + sine * pose.up[2])
+        # v + ω × arm, arm = station along the axis + radius outwards.
+        swing = cosine * pose.omega[2] - sine * pose.omega[1]
+        lift = cosine * pose.omega[1] + sine * pose.omega[2]
+        patch.velocity_axial = pose.velocity[0] - ring.radius * swing
+        patch.velocity_outward = cosine * pose.velocity[1] + sine * pose.velocity[2] + ring.station * swing
+        patch.velocity_around = (
+            cosine * pose.velocity[2] - sine * pose.velocity[1] + ring.radius * pose.omega[0] - ring.station * lift
+        )
+        patch.closing = ring.normal_axial * patch.velocity_axial + ring.normal_radial * patch.velocity_outward
+        return patch
 
     @wp.func
-    def patch_at(surface: Surface, pose: Pose, ring: Ring, index: wp.int32):
-        patch = Patch()
-        patch.outward = surface.cosine[index] * pose.right + surface.sine[index] * pose.up
-        patch.arm = ring.station * pose.axis + ring.radius * patch.outward
-        patch.normal = ring.normal_axial * pose.axis + ring.normal_radial * patch.outward
-        patch.velocity = pose.velocity + wp.cross(pose.omega, patch.arm)
-        patch.closing = wp.dot(patch.velocity, patch.normal)
-        return patch
+    def behind_face(depth: real, wide: real, narrow: real):
+        """Share of a patch beyond a face at x = 0, averaged over the step, less a half.
+
+        The patch spreads evenly over ±extent about its mid-step depth and moves evenly by ±motion, `wide` and
+        `narrow` being the larger and the smaller; their convolution keeps the sum over steps of what is immersed
+        exact in straight flight.
+        """
+        rest = wp.max(zero, wide + narrow - wp.abs(depth))
+        edge = half - rest * rest / (eight * wide * narrow)
+        corner = wp.where(depth < zero, -edge, edge)
+        return wp.where(wp.abs(depth) < wide - narrow, depth / (two * wide), corner)
 
     @wp.func
     def immersed_area(pose: Pose, ring: Ring, patch: Patch, thickness: real, dt: real):
         """Area of a patch within the slab, averaged over the step [m²]."""
-        depth = pose.position[0] + patch.arm[0]
-        meridian = ring.half_axial * pose.axis[0] + ring.half_radial * patch.outward[0]
-        around = ring.half_around * wp.cross(pose.axis, patch.outward)[0]
+        meridian = ring.half_axial * pose.axis[0] + ring.half_radial * patch.outward_x
+        around = ring.sector * ring.radius * patch.around_x
         smallest = flattest * (wp.abs(ring.half_axial) + wp.abs(ring.half_radial))
         extent = wp.max(wp.sqrt(meridian * meridian + around * around), smallest)
-        motion = half * dt * wp.abs(patch.velocity[0])
-        return ring.area * (behind_face(depth, extent, motion) - behind_face(depth - thickness, extent, motion))
+        advance = (
+            patch.velocity_axial * pose.axis[0]
+            + patch.velocity_outward * patch.outward_x
+            + patch.velocity_around * patch.around_x
+        )
+        motion = half * dt * wp.abs(advance)
+        wide = wp.max(extent, motion)
+        narrow = wp.max(wp.min(extent, motion), widest_ratio * wide)
+        return ring.area * (behind_face(patch.x, wide, narrow) - behind_face(patch.x - thickness, wide, narrow))
 
     return SimpleNamespace(
         Surface=Surface,

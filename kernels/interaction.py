@@ -11,7 +11,7 @@ from .variant import Variant
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the contact law for one variant."""
-    real, vec3 = variant.real, variant.vec3
+    real = variant.real
     zero, one = real(0.0), real(1.0)
     # A wall sliding along itself has v_p·n = 0 up to rounding; below this share of |v_p| it does not touch.
     at_rest = real(1.0e-5)
@@ -41,13 +41,15 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.max(wp.min(law.onset_jump * dt, law.onset_limit * velocity), smallest_onset * impact_velocity)
 
     @wp.func
-    def contact_fraction(law: Law, closing: real, speed: real):
-        """Share of the traction at closing speed v_p·n: 0 at rest, 1 from the onset speed on.
+    def onset_width(law: Law, variation: real):
+        """Range of closing speeds [m/s] over which a patch comes into contact: its own range, ±variation, or the
+        onset speed if that is wider. The law jumps at v_p·n = 0; a wall pressed sideways rests on the ramp."""
+        return wp.max(real(2.0) * variation, law.onset)
 
-        The law jumps at v_p·n = 0; a wall pressed sideways rests within the ramp. The onset speed vanishes
-        with the time step.
-        """
-        return wp.clamp((closing - at_rest * speed) / law.onset, zero, one)
+    @wp.func
+    def contact_fraction(law: Law, closing: real, variation: real, speed: real):
+        """Share of a patch in contact, its closing speeds spread evenly over closing ± variation."""
+        return wp.clamp((closing + variation - at_rest * speed) / onset_width(law, variation), zero, one)
 
     @wp.func
     def normal_stress(law: Law, closing: real):
@@ -63,25 +65,46 @@ def build(variant: Variant) -> SimpleNamespace:
         return law.a1 + real(2.0) * law.a2 * closing
 
     @wp.func
-    def traction_direction(law: Law, normal: vec3, velocity: vec3, closing: real, speed: real):
-        """−n + η t with t against the sliding velocity; traction = stress × this."""
-        direction = -normal
-        if wp.static(variant.rubs):
-            sliding = velocity - closing * normal
-            direction -= sliding * (law.friction / wp.max(wp.length(sliding), at_rest * speed))
-        return direction
+    def friction_per_speed(law: Law, sliding: real, speed: real):
+        """Friction over normal stress and sliding speed [s/m]: η / |v_t|, finite where nothing slides."""
+        return law.friction / wp.max(sliding, at_rest * speed)
+
+    # Native, because the library's exponential is a call that no compiler vectorises; wp.exp's bits but for 2 ulp.
+    @wp.func_native("""
+    #if defined(__CUDA_ARCH__)
+        return expf(x);
+    #else
+        float t = x * 1.44269504f;
+        t = t < -126.0f ? -126.0f : (t > 126.0f ? 126.0f : t);
+        const float whole = __builtin_floorf(t + 0.5f);
+        const float f = t - whole;
+        const float p = 1.0f + f * (0.693147181f + f * (0.240226507f + f * (0.0555041087f
+                      + f * (0.00961812911f + f * (0.00133335581f + f * 0.000154035304f)))));
+        const int bits = ((int)whole + 127) << 23;
+        float scale;
+        __builtin_memcpy(&scale, &bits, 4);
+        return p * scale;
+    #endif
+    """)
+    def exp_single(x: wp.float32) -> wp.float32:
+        """e^x between 2^-126 and 2^126, NaN for NaN."""
+        ...
 
     @wp.func
     def remaining(law: Law, exposure: real):
         """Share of the resistance left after an exposure T [s]: β^(T/Δt_β)."""
-        return wp.exp(law.decay_rate * exposure)
+        if wp.static(variant.double):
+            return wp.exp(law.decay_rate * exposure)
+        else:
+            return exp_single(law.decay_rate * exposure)
 
     return SimpleNamespace(
         Law=Law,
         onset_speed=onset_speed,
+        onset_width=onset_width,
         contact_fraction=contact_fraction,
         normal_stress=normal_stress,
         stress_slope=stress_slope,
-        traction_direction=traction_direction,
+        friction_per_speed=friction_per_speed,
         remaining=remaining,
     )

@@ -25,7 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
     scheme = nodal.build(variant) if variant.nodal else contacts
     Surface, Pose, Plate, Fields, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Fields, laws.Law
     Body, State, Load = motion.Body, motion.State, motion.Load
-    Footprint = contacts.Footprint
+    Footprint, Touches = contacts.Footprint, contacts.Touches
     PERFORATED, ARRESTED, RICOCHETED = (
         wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
     )
@@ -85,7 +85,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """How far the core reaches ahead of its centre of mass along x [m]."""
         front = -surface.bounding_radius
         for index in range(surface.rings):
-            ring = surfaces.ring_at(surface, pose, index, zero)
+            ring = surfaces.ring_at(surface, pose, index)
             broadside = surfaces.broadside(pose)
             middle = ring.station * pose.axis[0] + ring.radius * broadside
             front = wp.max(front, middle + wp.abs(ring.half_axial * pose.axis[0] + ring.half_radial * broadside))
@@ -150,7 +150,9 @@ def build(variant: Variant) -> SimpleNamespace:
             trace[row, column + k] = value[k]
 
     @wp.func
-    def record(trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, load: Load):
+    def record(
+        trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, force: vec3, moment: vec3
+    ):
         """One traced step, in the order of TRACE_COLUMNS: the state after its kick, and the load that made it."""
         trace[row, 0] = time
         write_vec3(trace, row, 1, state.position)
@@ -158,8 +160,8 @@ def build(variant: Variant) -> SimpleNamespace:
             trace[row, 4 + k] = state.attitude[k]
         write_vec3(trace, row, 8, state.velocity)
         write_vec3(trace, row, 11, state.angular_momentum)
-        write_vec3(trace, row, 14, load.force)
-        write_vec3(trace, row, 17, load.moment)
+        write_vec3(trace, row, 14, force)
+        write_vec3(trace, row, 17, moment)
 
     def march(
         # inputs
@@ -174,6 +176,7 @@ def build(variant: Variant) -> SimpleNamespace:
         pace: Pace,
         # scratch
         fields: Fields,
+        touches: Touches,
         # outputs
         outcomes: Outcomes,
         trace: wp.array2d(dtype=real),
@@ -185,7 +188,8 @@ def build(variant: Variant) -> SimpleNamespace:
         if dt == zero:
             dt = real(pace.way / speed)
         max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
-        window = grid.open_window(plate, fields, wp.tid() % slots, shots.hit_y[shot], shots.hit_z[shot])
+        slot = wp.tid() % slots
+        window = scheme.open_window(plate, fields, slot, shots.hit_y[shot], shots.hit_z[shot])
         state = launch_state(surface, body, shots, shot)
         axis = motion.axis_of(state.attitude)
         initial_energy = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
@@ -205,18 +209,18 @@ def build(variant: Variant) -> SimpleNamespace:
                 load = Load()
                 before = state
                 if found.last_ring >= 0:
-                    load = scheme.load_on(surface, plate, law, fields, window, found, pose, dt)
+                    load = scheme.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
                     if load.touching:
                         touched = True
                         contact_steps += 1
                         state = motion.kick(body, state, load, dt)
                 if wp.static(variant.traced):
-                    mean = motion.mean_load(body, before, load, dt)
-                    record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, mean)
+                    force, moment = motion.mean_load(body, before, load, dt)
+                    record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, force, moment)
                 state = motion.drift(body, state, dt)
                 step += 1
         if wp.static(variant.traced):
-            record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, Load())
+            record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, vec3(), vec3())
         if status == RUNNING:
             status = UNFINISHED
         axis = motion.axis_of(state.attitude)
@@ -238,6 +242,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Body=Body,
         Plate=Plate,
         Fields=Fields,
+        Touches=Touches,
         Law=Law,
         Shots=Shots,
         Outcomes=Outcomes,

@@ -21,27 +21,44 @@ def build(variant: Variant) -> SimpleNamespace:
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     Surface, Pose, Plate, Fields = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Fields
     Window, Law, Load = grid.Window, laws.Law, motion.Load
-    Footprint = contact.build(variant).Footprint
+    contacts = contact.build(variant)
+    Footprint, Touches = contacts.Footprint, contacts.Touches
 
     @wp.func
     def outward_of(surface: Surface, pose: Pose, index: wp.int32):
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func
+    def open_window(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
+        """A slot's window about a hit: each node's share of the resistance, from the tile; nothing touched."""
+        window = grid.window_at(plate, fields, slot, hit_y, hit_z)
+        for i in range(fields.cells_y):
+            y = real(i - fields.cells_y // 2) * plate.spacing
+            for j in range(fields.cells_z):
+                z = real(j - fields.cells_z // 2) * plate.spacing
+                index = window.first + i * fields.cells_z + j
+                share = plate.tile[grid.tile_under(plate, window, y, z)]
+                if wp.static(variant.rimmed):
+                    share *= grid.on_plate(plate, window, y, z)
+                fields.exposure[index] = share
+                fields.gain[index] = zero
+        return window
+
+    @wp.func
     def node_under(fields: Fields, window: Window, point: vec3):
         """Index of the nearest node."""
-        row = wp.int32(wp.floor((point[1] - window.y0) * window.per_y + half))
-        column = wp.int32(wp.floor((point[2] - window.z0) * window.per_z + half))
+        row = wp.int32(wp.floor(point[1] * window.per_cell + half))
+        column = wp.int32(wp.floor(point[2] * window.per_cell + half))
         return window.home + row * fields.cells_z + column
 
     @wp.func
     def total_load(
-        surface: Surface, plate: Plate, law: Law, fields: Fields, window: Window, found: Footprint, pose: Pose, dt: real
+        surface: Surface, plate: Plate, law: Law, fields: Fields, window: Window, found: Footprint, pose: Pose
     ):
         """Σ Y (−n + η t) dS over the points in the slab, t the meridian tangent towards the base."""
         load = Load()
         for index in range(found.first_ring, found.last_ring + 1):
-            ring = surfaces.ring_at(surface, pose, index, dt)
+            ring = surfaces.ring_at(surface, pose, index)
             for j in range(surface.around):
                 outward = outward_of(surface, pose, j)
                 arm = ring.station * pose.axis + ring.radius * outward
@@ -50,13 +67,16 @@ def build(variant: Variant) -> SimpleNamespace:
                     node = node_under(fields, window, point)
                     normal = ring.normal_axial * pose.axis + ring.normal_radial * outward
                     tangent = ring.normal_axial * outward - ring.normal_radial * pose.axis
-                    resistance = law.a0 * fields.material[node]
+                    resistance = law.a0 * fields.exposure[node]
                     force = (resistance * ring.area) * (law.friction * tangent - normal)
-                    load.touching = load.touching or fields.material[node] > zero
+                    load.touching = load.touching or fields.exposure[node] > zero
                     load.force += force
                     load.moment += wp.cross(arm, force)
                     if wp.static(variant.degrades):
                         fields.gain[node] = one
+        to_body = wp.transpose(wp.matrix_from_cols(pose.axis, pose.right, pose.up))
+        load.force = to_body * load.force
+        load.moment = to_body * load.moment
         return load
 
     @wp.func
@@ -68,18 +88,17 @@ def build(variant: Variant) -> SimpleNamespace:
         found: Footprint,
         pose: Pose,
         factor: real,
-        dt: real,
     ):
         """Multiply every node that was touched in this step by β, once however many points share it (eq. 6)."""
         for index in range(found.first_ring, found.last_ring + 1):
-            ring = surfaces.ring_at(surface, pose, index, dt)
+            ring = surfaces.ring_at(surface, pose, index)
             for j in range(surface.around):
                 arm = ring.station * pose.axis + ring.radius * outward_of(surface, pose, j)
                 point = pose.position + arm
                 if point[0] >= zero and point[0] <= plate.thickness:
                     node = node_under(fields, window, point)
                     if fields.gain[node] > zero:
-                        fields.material[node] = fields.material[node] * factor
+                        fields.exposure[node] = fields.exposure[node] * factor
                         fields.gain[node] = zero
 
     @wp.func
@@ -89,14 +108,16 @@ def build(variant: Variant) -> SimpleNamespace:
         law: Law,
         fields: Fields,
         window: Window,
+        touches: Touches,
+        slot: wp.int32,
         found: Footprint,
         pose: Pose,
         dt: real,
     ):
         """The load over one step; touched nodes weaken. `law.decay_rate` carries β itself here."""
-        load = total_load(surface, plate, law, fields, window, found, pose, dt)
+        load = total_load(surface, plate, law, fields, window, found, pose)
         if wp.static(variant.degrades):
-            degrade(surface, plate, fields, window, found, pose, law.decay_rate, dt)
+            degrade(surface, plate, fields, window, found, pose, law.decay_rate)
         return load
 
-    return SimpleNamespace(load_on=load_on)
+    return SimpleNamespace(open_window=open_window, load_on=load_on)

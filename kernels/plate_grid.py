@@ -1,7 +1,7 @@
-"""The plate as a grid: the shared pristine pattern, and each shot's own window with its exposure.
+"""The plate: the shared pristine pattern, and each shot's own window of exposure.
 
-The pattern is a periodic tile of material fractions. A window is the part of the plate that one core can
-reach, aligned with the tile; it remembers each cell's exposure T [s].
+The pattern is a periodic tile of material fractions, finer than the grid of the window. A window is the part of
+the plate that one core can reach, a grid about the hit; it remembers each node's exposure T [s].
 """
 
 from functools import cache
@@ -9,40 +9,40 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from . import memory
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
-    """Device functions of the grid for one variant."""
+    """Device functions of the plate for one variant."""
     real = variant.real
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    double_half, double_zero, double_one = wp.float64(0.5), wp.float64(0.0), wp.float64(1.0)
+    read, write = memory.build(real).read, memory.build(real).write
 
     @wp.struct
     class Plate:
-        """Pristine plate: period tile [tile_y × tile_z] of material fractions, cells of dy × dz [m]; the
-        half extents [m] of a finite plate (infinite if there is no rim); tent filter of the exposure."""
+        """Pristine plate: one period [m] as a tile [tile_y × tile_z] of material fractions, corner at the origin;
+        the half extents [m] of a finite plate (infinite if there is no rim); the spacing [m] of the exposure's
+        grid and the tent filter on it."""
 
         tile: wp.array(dtype=real)
         tile_y: wp.int32
         tile_z: wp.int32
-        dy: wp.float64
-        dz: wp.float64
+        period_y: wp.float64
+        period_z: wp.float64
         half_y: wp.float64
         half_z: wp.float64
         thickness: real
-        taps_y: wp.array(dtype=real)
-        taps_z: wp.array(dtype=real)
-        reach_y: wp.int32
-        reach_z: wp.int32
+        spacing: real
+        taps: wp.array(dtype=real)
+        reach: wp.int32
 
     @wp.struct
     class Fields:
-        """Scratch of all slots, each cells_y × cells_z: material fraction, exposure [s], exposure gained in
-        the step [s], and room for the filter."""
+        """Scratch of all slots, each cells_y × cells_z: exposure [s], exposure gained in the step [s], and room for
+        the filter; the literal scheme keeps each node's resistance and whether it was touched instead."""
 
-        material: wp.array(dtype=real)
         exposure: wp.array(dtype=real)
         gain: wp.array(dtype=real)
         filtered: wp.array(dtype=real)
@@ -51,19 +51,25 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Window:
-        """One slot's part of the fields. (y0, z0) is the centre of the cell under the hit, relative to the
-        hit [m], and `home` that cell's index: a shot computes the same bits in a window of any size."""
+        """One slot's part of the fields, and how to find the tile. The hit is the node of index `home`: a shot
+        computes the same bits in a window of any size. The hit's place in the tile and what brings a way there,
+        in periods; the rims of a finite plate [m], seen from the hit."""
 
         first: wp.int32
         home: wp.int32
-        y0: real
-        z0: real
-        per_y: real
-        per_z: real
+        per_cell: real
+        tile_y: real
+        tile_z: real
+        per_period_y: real
+        per_period_z: real
+        low_y: real
+        high_y: real
+        low_z: real
+        high_z: real
 
     @wp.struct
     class Cell:
-        """The four cells around a point: index of the first, and the point's place between them, 0 to 1."""
+        """The four nodes around a point: index of the first, and the point's place between them, 0 to 1."""
 
         index: wp.int32
         y: real
@@ -71,7 +77,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Box:
-        """Cell rows and columns, ends included, that a step may touch."""
+        """Rows and columns of nodes, ends included, that a step may touch."""
 
         y_low: wp.int32
         y_high: wp.int32
@@ -79,62 +85,45 @@ def build(variant: Variant) -> SimpleNamespace:
         z_high: wp.int32
 
     @wp.func
-    def covered(centre: wp.float64, width: wp.float64, half_extent: wp.float64):
-        """Share of a cell's width that lies on a finite plate."""
-        low = wp.max(centre - double_half * width, -half_extent)
-        high = wp.min(centre + double_half * width, half_extent)
-        return wp.clamp((high - low) / width, double_zero, double_one)
-
-    @wp.func
-    def open_window(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
-        """Lay a fresh window about the hit: material from the tile, no exposure.
-
-        Cell indices are found in float64, so that a hit far from the origin loses nothing.
-        """
-        home_y = wp.int32(wp.floor(hit_y / plate.dy))
-        home_z = wp.int32(wp.floor(hit_z / plate.dz))
-        first_y = home_y - fields.cells_y // 2
-        first_z = home_z - fields.cells_z // 2
+    def window_at(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
+        """The window about a hit, found in float64, so that a hit far from the origin loses nothing."""
         window = Window()
         window.first = slot * fields.cells_y * fields.cells_z
         window.home = window.first + (fields.cells_y // 2) * fields.cells_z + fields.cells_z // 2
-        window.y0 = real((wp.float64(home_y) + double_half) * plate.dy - hit_y)
-        window.z0 = real((wp.float64(home_z) + double_half) * plate.dz - hit_z)
-        window.per_y = real(double_one / plate.dy)
-        window.per_z = real(double_one / plate.dz)
-        index = window.first
-        for i in range(fields.cells_y):
-            row = (first_y + i) % plate.tile_y
-            if row < 0:
-                row += plate.tile_y
-            column = first_z % plate.tile_z
-            if column < 0:
-                column += plate.tile_z
-            on_y = covered((wp.float64(first_y + i) + double_half) * plate.dy, plate.dy, plate.half_y)
-            for j in range(fields.cells_z):
-                share = plate.tile[row * plate.tile_z + column]
-                if wp.isfinite(plate.half_y):
-                    share *= real(
-                        on_y * covered((wp.float64(first_z + j) + double_half) * plate.dz, plate.dz, plate.half_z)
-                    )
-                fields.material[index] = share
-                if wp.static(variant.degrades):
-                    fields.gain[index] = zero
-                if wp.static(variant.degrades and not variant.nodal):
-                    fields.exposure[index] = zero
-                index += 1
-                column += 1
-                if column == plate.tile_z:
-                    column = 0
+        window.per_cell = one / plate.spacing
+        across, along = hit_y / plate.period_y, hit_z / plate.period_z
+        window.tile_y = real(across - wp.floor(across))
+        window.tile_z = real(along - wp.floor(along))
+        window.per_period_y = real(wp.float64(1.0) / plate.period_y)
+        window.per_period_z = real(wp.float64(1.0) / plate.period_z)
+        window.low_y = real(-plate.half_y - hit_y)
+        window.high_y = real(plate.half_y - hit_y)
+        window.low_z = real(-plate.half_z - hit_z)
+        window.high_z = real(plate.half_z - hit_z)
         return window
 
     @wp.func
+    def tile_under(plate: Plate, window: Window, y: real, z: real):
+        """Index of the tile's cell under a point."""
+        across = window.tile_y + y * window.per_period_y
+        along = window.tile_z + z * window.per_period_z
+        row = wp.min(wp.int32((across - wp.floor(across)) * real(plate.tile_y)), plate.tile_y - 1)
+        column = wp.min(wp.int32((along - wp.floor(along)) * real(plate.tile_z)), plate.tile_z - 1)
+        return row * plate.tile_z + column
+
+    @wp.func
+    def on_plate(plate: Plate, window: Window, y: real, z: real):
+        """Share of a grid cell's width about a point that lies on a finite plate."""
+        width = plate.spacing
+        inside_y = wp.min(y - window.low_y, window.high_y - y) / width + half
+        inside_z = wp.min(z - window.low_z, window.high_z - z) / width + half
+        return wp.clamp(inside_y, zero, one) * wp.clamp(inside_z, zero, one)
+
+    @wp.func
     def cell_at(fields: Fields, window: Window, y: real, z: real):
-        """The cell whose centre and the next ones' enclose a point; the caller keeps it inside the window."""
-        across = (y - window.y0) * window.per_y
-        along = (z - window.z0) * window.per_z
-        row = wp.floor(across)
-        column = wp.floor(along)
+        """The cell of the grid around a point; the caller keeps it inside the window."""
+        across, along = y * window.per_cell, z * window.per_cell
+        row, column = wp.floor(across), wp.floor(along)
         cell = Cell()
         cell.index = window.home + wp.int32(row) * fields.cells_z + wp.int32(column)
         cell.y = across - row
@@ -142,39 +131,74 @@ def build(variant: Variant) -> SimpleNamespace:
         return cell
 
     @wp.func
-    def gather(field: wp.array(dtype=real), stride: wp.int32, cell: Cell):
-        """Bilinear interpolation."""
-        low = field[cell.index] + cell.z * (field[cell.index + 1] - field[cell.index])
-        next = cell.index + stride
-        high = field[next] + cell.z * (field[next + 1] - field[next])
-        return low + cell.y * (high - low)
+    def gather(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
+        """Bilinear interpolation between the four nodes from `index` on."""
+        next = index + stride
+        low, high = read(field, index), read(field, next)
+        low += z * (read(field, index + 1) - low)
+        high += z * (read(field, next + 1) - high)
+        return low + y * (high - low)
 
     @wp.func
-    def scatter(field: wp.array(dtype=real), stride: wp.int32, cell: Cell, amount: real):
-        """Share an amount out over the four cells, by the weights of the interpolation."""
-        high = amount * cell.y
+    def scatter(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real, amount: real):
+        """Share an amount out over the four nodes, by the weights of the interpolation."""
+        high = amount * y
         low = amount - high
-        next = cell.index + stride
-        field[cell.index] = field[cell.index] + low * (one - cell.z)
-        field[cell.index + 1] = field[cell.index + 1] + low * cell.z
-        field[next] = field[next] + high * (one - cell.z)
-        field[next + 1] = field[next + 1] + high * cell.z
+        next = index + stride
+        write(field, index, read(field, index) + low * (one - z))
+        write(field, index + 1, read(field, index + 1) + low * z)
+        write(field, next, read(field, next) + high * (one - z))
+        write(field, next + 1, read(field, next + 1) + high * z)
 
-    # Native, because only with pointers that do not alias does a CPU run these two loops in vector registers.
+    # Native, because only with pointers that do not alias does a CPU run these loops in vector registers.
     @wp.func_native("""
-    auto* __restrict__ into = target.data + to;
+    assert(start - step >= 0 && start + count + step <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    const auto* __restrict__ from = source.data + start;
+    const auto* __restrict__ before = from - step;
+    const auto* __restrict__ after = from + step;
+    for (int j = 0; j < count; ++j) into[j] = middle * from[j] + side * (before[j] + after[j]);
+    """)
+    def filter_near(
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        start: wp.int32,
+        count: wp.int32,
+        step: wp.int32,
+        middle: real,
+        side: real,
+    ):
+        """target[j] = middle × source[j] + side × (source[j − step] + source[j + step]), start ≤ j < start + count."""
+        ...
+
+    @wp.func_native("""
+    assert(start - step >= 0 && start + count + step <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    const auto* __restrict__ before = source.data + start - step;
+    const auto* __restrict__ after = source.data + start + step;
+    for (int j = 0; j < count; ++j) into[j] += side * (before[j] + after[j]);
+    """)
+    def filter_far(
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        start: wp.int32,
+        count: wp.int32,
+        step: wp.int32,
+        side: real,
+    ):
+        """target[j] += side × (source[j − step] + source[j + step]) for start ≤ j < start + count."""
+        ...
+
+    @wp.func_native("""
+    assert(start >= 0 && start + count <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
     const auto* __restrict__ from = source.data + start;
     for (int j = 0; j < count; ++j) into[j] += factor * from[j];
     """)
     def add_scaled(
-        target: wp.array(dtype=real),
-        to: wp.int32,
-        source: wp.array(dtype=real),
-        start: wp.int32,
-        count: wp.int32,
-        factor: real,
+        target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
     ):
-        """target[to + j] += factor × source[start + j] for j < count; target and source are different arrays."""
+        """target[j] += factor × source[j] for start ≤ j < start + count; target and source are different arrays."""
         ...
 
     @wp.func_native("""
@@ -186,36 +210,52 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func
+    def blank(fields: Fields, window: Window):
+        """A plate that nothing has touched."""
+        nodes = fields.cells_y * fields.cells_z
+        clear(fields.exposure, window.first, nodes)
+        clear(fields.gain, window.first, nodes)
+        clear(fields.filtered, window.first, nodes)
+
+    @wp.func
+    def filter_(
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        plate: Plate,
+        start: wp.int32,
+        count: wp.int32,
+        step: wp.int32,
+    ):
+        """target = the tent's taps along one direction, `step` apart, applied to source."""
+        filter_near(target, source, start, count, step, plate.taps[0], plate.taps[1])
+        for k in range(2, plate.reach + 1):
+            filter_far(target, source, start, count, k * step, plate.taps[k])
+
+    @wp.func
     def spread(plate: Plate, fields: Fields, window: Window, box: Box):
         """Filter the gained exposure with the tent K of the law, one direction after the other, and add half
-        of it to the exposure: what the mid-step sees."""
+        of it to the exposure: what the mid-step sees.
+
+        Whole rows at once: what wraps round from one row to the next is zero, for the box keeps the filter's
+        reach away from the window's edge.
+        """
         stride = fields.cells_z
-        inner = box.z_high - box.z_low + 1
-        outer = inner + 2 * plate.reach_z
-        left = window.first + box.z_low - plate.reach_z
-        for i in range(box.y_low, box.y_high + 1):
-            clear(fields.filtered, left + i * stride, outer)
-            for k in range(2 * plate.reach_z + 1):
-                to = left + k + i * stride
-                from_ = left + plate.reach_z + i * stride
-                add_scaled(fields.filtered, to, fields.gain, from_, inner, plate.taps_z[k])
-        for i in range(box.y_low - plate.reach_y, box.y_high + plate.reach_y + 1):
-            row = left + i * stride
-            clear(fields.gain, row, outer)
-            for k in range(2 * plate.reach_y + 1):
-                source = i + k - plate.reach_y
-                if source >= box.y_low and source <= box.y_high:
-                    add_scaled(fields.gain, row, fields.filtered, left + source * stride, outer, plate.taps_y[k])
-            add_scaled(fields.exposure, row, fields.gain, row, outer, half)
+        start = window.first + box.y_low * stride
+        count = (box.y_high - box.y_low + 1) * stride
+        filter_(fields.filtered, fields.gain, plate, start, count, 1)
+        start -= plate.reach * stride
+        count += 2 * plate.reach * stride
+        filter_(fields.gain, fields.filtered, plate, start, count, stride)
+        add_scaled(fields.exposure, fields.gain, start, count, half)
 
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
-        """Add the other half of the gained exposure and clear it for the next step."""
-        outer = box.z_high - box.z_low + 1 + 2 * plate.reach_z
-        for i in range(box.y_low - plate.reach_y, box.y_high + plate.reach_y + 1):
-            row = window.first + i * fields.cells_z + box.z_low - plate.reach_z
-            add_scaled(fields.exposure, row, fields.gain, row, outer, half)
-            clear(fields.gain, row, outer)
+        """Add the other half of the gained exposure and clear both for the next step."""
+        start = window.first + (box.y_low - plate.reach) * fields.cells_z
+        count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * fields.cells_z
+        add_scaled(fields.exposure, fields.gain, start, count, half)
+        clear(fields.gain, start, count)
+        clear(fields.filtered, start, count)
 
     return SimpleNamespace(
         Plate=Plate,
@@ -223,10 +263,13 @@ def build(variant: Variant) -> SimpleNamespace:
         Window=Window,
         Cell=Cell,
         Box=Box,
-        open_window=open_window,
+        window_at=window_at,
+        tile_under=tile_under,
+        on_plate=on_plate,
         cell_at=cell_at,
         gather=gather,
         scatter=scatter,
+        blank=blank,
         spread=spread,
         settle=settle,
     )

@@ -38,9 +38,10 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Load:
-        """Force [N], moment about the centre of mass [N m], and their resistance to a change of velocity.
+        """Force [N], moment about the centre of mass [N m], and their resistance to a change of velocity; along the
+        body axes.
 
-        The damping blocks are −∂(force, moment)/∂(velocity, angular velocity); `damped` tells whether they
+        The damping blocks are −½ ∂(force, moment)/∂(velocity, angular velocity); `damped` tells whether they
         are not all zero, and `touching` whether any surface touched material at all.
         """
 
@@ -109,17 +110,17 @@ def build(variant: Variant) -> SimpleNamespace:
         return moved
 
     @wp.func
-    def velocity_change(body: Body, axis: vec3, load: Load, dt: real):
-        """Solve (M + dt D) Δu = dt F for Δu = (Δv, Δω): linearly implicit in the damping D."""
-        dv = (dt / body.mass) * load.force
-        dw = dt * angular_velocity(body, axis, load.moment)
+    def velocity_change(body: Body, load: Load, dt: real):
+        """Solve (M + dt D) Δu = dt F for Δu = (Δv, Δω), along the body axes: linearly implicit in the damping D."""
+        # In units of m and I_t, so that the determinants of a small core do not underflow.
+        light, agile = dt / body.mass, dt / body.inertia_transverse
+        ratio = body.inertia_axial / body.inertia_transverse
+        dv = light * load.force
+        dw = agile * vec3(load.moment[0] / ratio, load.moment[1], load.moment[2])
         if load.damped:
-            # In units of m and I_t, so that the determinants of a small core do not underflow.
-            identity = wp.identity(3, dtype=real)
-            light, agile = dt / body.mass, dt / body.inertia_transverse
-            inertia = identity + (body.inertia_axial / body.inertia_transverse - one) * wp.outer(axis, axis)
-            vv = wp.inverse(identity + light * load.damping_vv)
+            vv = wp.inverse(wp.identity(3, dtype=real) + light * load.damping_vv)
             wv = wp.transpose(load.damping_vw)
+            inertia = mat33(ratio, zero, zero, zero, one, zero, zero, zero, one)
             schur = inertia + agile * (load.damping_ww - light * (wv * vv * load.damping_vw))
             dw = wp.inverse(schur) * (agile * (load.moment - wv * (vv * (light * load.force))))
             dv = vv * (light * (load.force - load.damping_vw * dw))
@@ -127,7 +128,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def restraint(body: Body, axis: vec3, state: State, dv: vec3, dw: vec3):
-        """Share of a change of velocities to apply, so that it never raises the kinetic energy.
+        """Share of a change of velocities, in the plate frame, to apply, so that it never raises the kinetic energy.
 
         Every surface element takes power from the core, so the continuous energy cannot grow; where a finite
         step would overshoot (a core coming to rest), it ends at the least energy along its direction.
@@ -145,7 +146,8 @@ def build(variant: Variant) -> SimpleNamespace:
     def kick(body: Body, state: State, load: Load, dt: real):
         """Change the velocities by the load over dt."""
         axis = axis_of(state.attitude)
-        dv, dw = velocity_change(body, axis, load, dt)
+        dv_body, dw_body = velocity_change(body, load, dt)
+        dv, dw = wp.quat_rotate(state.attitude, dv_body), wp.quat_rotate(state.attitude, dw_body)
         share = restraint(body, axis, state, dv, dw)
         kicked = State()
         kicked.position = state.position
@@ -156,14 +158,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def mean_load(body: Body, state: State, load: Load, dt: real):
-        """The force and moment that a kick applies on average over its step: λ (F − D Δu)."""
-        axis = axis_of(state.attitude)
-        dv, dw = velocity_change(body, axis, load, dt)
-        share = restraint(body, axis, state, dv, dw)
-        mean = Load()
-        mean.force = share * (load.force - load.damping_vv * dv - load.damping_vw * dw)
-        mean.moment = share * (load.moment - wp.transpose(load.damping_vw) * dv - load.damping_ww * dw)
-        return mean
+        """The force and moment, in the plate frame, that a kick applies on average over its step: λ (F − D Δu)."""
+        dv, dw = velocity_change(body, load, dt)
+        force = load.force - load.damping_vv * dv - load.damping_vw * dw
+        moment = load.moment - wp.transpose(load.damping_vw) * dv - load.damping_ww * dw
+        dv, dw = wp.quat_rotate(state.attitude, dv), wp.quat_rotate(state.attitude, dw)
+        share = restraint(body, axis_of(state.attitude), state, dv, dw)
+        return share * wp.quat_rotate(state.attitude, force), share * wp.quat_rotate(state.attitude, moment)
 
     return SimpleNamespace(
         Body=Body,

@@ -15,8 +15,10 @@ from warpimpact.scene import Core, Numerics, Plate
 
 Array = NDArray[np.float64]
 
-SUBSAMPLES = 16
-"""Points per cell and direction behind a material fraction."""
+FINER = 4
+"""Cells of the tile per cell of the exposure's grid, in each direction: the tile is read without interpolation."""
+SUBSAMPLES = 4
+"""Points per cell of the tile and direction behind a material fraction."""
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,17 @@ class Rings:
     area_radial: Array
     half_axial: Array
     half_radial: Array
+    turn_axial: Array
+    turn_radial: Array
+
+
+def azimuths_of(around: int) -> Array:
+    """Azimuths [rad] of the patches of even rings, then of odd rings, half a patch on; shape [2 around].
+
+    Both sets are their own mirror images, as the core is.
+    """
+    even = np.arange(around) + 0.5
+    return np.asarray(np.concatenate([even, even - 0.5]) * (2.0 * np.pi / around))
 
 
 def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, discs: bool = True) -> Rings:
@@ -148,7 +161,9 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
         ]
     else:
         parts = [_profile_rings(core, np.linspace(0.0, core.length, axial + 1))]
-    s, r, axial_area, radial_area, half_s, half_r = (np.concatenate(column) for column in zip(*parts, strict=True))
+    s, r, axial_area, radial_area, half_s, half_r, turn_s, turn_r = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
+    )
     sector = 2.0 * np.pi / around
     chord = 2.0 * np.sin(0.5 * sector)
     return Rings(
@@ -158,6 +173,8 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
         area_radial=radial_area * chord,
         half_axial=-half_s,
         half_radial=half_r,
+        turn_axial=turn_s,
+        turn_radial=turn_r,
     )
 
 
@@ -192,14 +209,25 @@ def _widest_station(core: Core) -> float:
 
 
 def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
-    """Station, radius, ∫ r dr and ∫ r ds (per radian), half extents, of the rings between edges."""
+    """Station, radius, ∫ r dr and ∫ r ds (per radian), half extents and half turns of the normal, of the rings
+    between edges."""
     low, high = edges[:-1], edges[1:]
     nodes, weights = np.polynomial.legendre.leggauss(6)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     inside = core.radius(middle[:, None] + half[:, None] * nodes)
     r_low, r_high = core.radius(low), core.radius(high)
     lateral = (inside * weights).sum(axis=1) * half
-    return middle, core.radius(middle), 0.5 * (r_high**2 - r_low**2), lateral, half, 0.5 * (r_high - r_low)
+    at_low, at_high = _normals(core, low, 1e-3 * half), _normals(core, high, -1e-3 * half)
+    turn_axial, turn_radial = 0.5 * (at_high - at_low)
+    half_radial = 0.5 * (r_high - r_low)
+    return middle, core.radius(middle), half_radial * (r_high + r_low), lateral, half, half_radial, turn_axial, turn_radial
+
+
+def _normals(core: Core, stations: Array, step: Array) -> Array:
+    """Outward unit normals (axial, radial) of the profile, seen from the side of `step`; shape [2, stations]."""
+    here, next_, beyond = (core.radius(stations + k * step) for k in range(3))
+    slope = (4.0 * next_ - 3.0 * here - beyond) / (2.0 * step)
+    return np.stack([slope, np.ones_like(slope)]) / np.hypot(slope, 1.0)
 
 
 def _disc_rings(station: float, radius: float, widest: float, *, facing: float) -> tuple[Array, ...]:
@@ -215,6 +243,8 @@ def _disc_rings(station: float, radius: float, widest: float, *, facing: float) 
         nothing,
         nothing,
         0.5 * (high - low),
+        nothing,
+        nothing,
     )
 
 
@@ -257,12 +287,13 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
 
 
 def tent_taps(length: float, cell: float) -> Array:
-    """Weights of the discrete filter that, after bilinear scattering, acts as the tent K of half-width ℓ.
+    """Weights of the discrete filter that, between bilinear scattering and bilinear reading, acts as the tent K of
+    half-width ℓ.
 
-    For ℓ a multiple of the cell it is K itself at the nodes; else its half-width is adjusted so
-    that mass and second moment, ℓ²/6, stay exact. With ℓ below the cell nothing is left to filter.
+    Its half-width is adjusted so that mass and second moment, ℓ²/6, are exact: scattering and reading each add
+    cell²/6 on average. With ℓ below √2 cells nothing is left to filter.
     """
-    if length <= cell * (1.0 + 1e-9):
+    if length <= math.sqrt(2.0) * cell:
         return np.ones(1)
 
     def taps(half_width: float) -> tuple[Array, Array]:
@@ -273,11 +304,8 @@ def tent_taps(length: float, cell: float) -> Array:
 
     def excess(half_width: float) -> float:
         weights, offsets = taps(half_width)
-        return float(weights @ offsets**2 + cell**2 / 6.0 - length**2 / 6.0)
+        return float(weights @ offsets**2 + cell**2 / 3.0 - length**2 / 6.0)
 
-    ratio = length / cell
-    if abs(ratio - round(ratio)) < 1e-6:
-        return taps(round(ratio) * cell)[0]
     return taps(brentq(excess, cell, length + cell))[0]
 
 

@@ -32,6 +32,8 @@ Progress1 = Callable[[int], None]
 CPU_CHUNK = 32
 """Shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
 CUDA_CHUNK = 65536
+WINDOW_SLACK = 1.2
+"""Half the width of a first window in radii of the core, for a straight shot."""
 MAX_DOUBLINGS = 6
 """How often a shot that leaves its window is computed again in one twice as wide."""
 STEP_ALLOWANCE = 200
@@ -156,7 +158,7 @@ def replay(
     (trace,) = task.traces(contact)
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
-    cell_y, cell_z = task.cell_centres()
+    cell_y, cell_z = task.nodes()
     return Replay(
         outcomes=task.report(contact, np.asarray(standoffs, dtype=float), standoff_point),
         history=History.from_trace(trace, core),
@@ -232,11 +234,12 @@ class _Task:
             degrades=plate.degradation < 1.0,
             rubs=plate.shear_coefficient > 0.0,
             rate_dependent=a1 > 0.0 or a2 > 0.0,
+            rimmed=plate.size is not None,
             traced=traced,
         )
         self.stage = march.build(self.variant)
         self.real = np.float64 if self.resolution.double else np.float32
-        self.tile = discretisation.tile_of(plate, self.resolution.grid_spacing, sharp=self.resolution.nodal)
+        self.spacing = self.resolution.grid_spacing
         self.surface = self._surface()
         self.body = self._body()
         self.device_plate = self._plate()
@@ -253,15 +256,15 @@ class _Task:
     def _surface(self) -> Any:
         r = self.resolution
         rings = discretisation.rings_of(self.core, r.patches_axial, r.patches_around, r.patch_width, discs=not r.nodal)
-        azimuth = (np.arange(r.patches_around) + 0.5) * (2.0 * np.pi / r.patches_around)
+        azimuths = discretisation.azimuths_of(r.patches_around)
         surface = self.stage.Surface()
-        for name in ("station", "radius", "half_axial", "half_radial"):
+        for name in ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial"):
             setattr(surface, name, self._array(getattr(rings, name)))
         area = np.hypot(rings.area_axial, rings.area_radial)
         surface.area = self._array(area)
         surface.normal_axial = self._array(rings.area_axial / area)
         surface.normal_radial = self._array(rings.area_radial / area)
-        surface.cosine, surface.sine = self._array(np.cos(azimuth)), self._array(np.sin(azimuth))
+        surface.cosine, surface.sine = self._array(np.cos(azimuths)), self._array(np.sin(azimuths))
         surface.rings, surface.around = len(rings.station), r.patches_around
         surface.bounding_radius = self.core.bounding_radius
         return surface
@@ -274,17 +277,20 @@ class _Task:
         return body
 
     def _plate(self) -> Any:
-        plate, tile = self.stage.Plate(), self.tile
+        nodal = self.resolution.nodal
+        finer = 1 if nodal else discretisation.FINER
+        tile = discretisation.tile_of(self.plate, self.spacing / finer, sharp=nodal)
+        plate = self.stage.Plate()
         plate.tile = self._array(tile.material.reshape(-1))
         plate.tile_y, plate.tile_z = tile.material.shape
-        plate.dy, plate.dz = tile.dy, tile.dz
+        plate.period_y, plate.period_z = self.plate.pattern.period
+        plate.spacing = self.spacing
         size = self.plate.size or (math.inf, math.inf)
         plate.half_y, plate.half_z = 0.5 * size[0], 0.5 * size[1]
         plate.thickness = self.plate.thickness
-        length = 0.0 if self.resolution.nodal else self.plate.degradation_length
-        taps_y, taps_z = (discretisation.tent_taps(length, cell) for cell in (tile.dy, tile.dz))
-        plate.taps_y, plate.taps_z = self._array(taps_y), self._array(taps_z)
-        plate.reach_y, plate.reach_z = len(taps_y) // 2, len(taps_z) // 2
+        taps = discretisation.tent_taps(0.0 if nodal else self.plate.degradation_length, self.spacing)
+        plate.reach = len(taps) // 2
+        plate.taps = self._array(np.append(taps[plate.reach :], 0.0))
         return plate
 
     def _law(self, a0: float, a1: float, a2: float) -> Any:
@@ -338,24 +344,33 @@ class _Task:
 
     def plate_after(self, steps: int, time_step: float) -> Array:
         """Share of the resistance left for the first shot after some steps on the CPU, in its window once marched."""
-        scratch = self._fields(1, *self.cells)
+        scratch = self._scratch(1, *self.cells)
         pace = self._pace()
         pace.longest_way = (steps - 0.5) * time_step * self.shots.velocity[0]
         stopped = self._empty(self.stage.Outcomes, (1,))
         self._launch(self._array(np.zeros(1), dtype=wp.int32), stopped, pace, scratch, 1, 0, 1)
-        share = _host(scratch.material)
-        if self.variant.degrades and not self.variant.nodal:
-            share *= np.exp(self.law.decay_rate * _host(scratch.exposure))
-        return share.reshape(self.cells)
+        if self.resolution.nodal:
+            return _host(scratch[0].exposure).reshape(self.cells)
+        share = self._material()
+        if self.variant.degrades:
+            share *= np.exp(self.law.decay_rate * _host(scratch[0].exposure).reshape(self.cells))
+        return share
 
-    def cell_centres(self) -> tuple[Array, Array]:
-        """Where the cells of the first shot's window are in the plate [m], along y and z."""
+    def nodes(self) -> tuple[Array, Array]:
+        """Where the nodes of the first shot's window are in the plate [m], along y and z."""
         hit = self.shots.hit_y[0], self.shots.hit_z[0]
         y, z = (
-            (math.floor(at / width) + np.arange(count) - count // 2 + 0.5) * width
-            for at, width, count in zip(hit, (self.tile.dy, self.tile.dz), self.cells, strict=True)
+            at + (np.arange(count) - count // 2) * self.spacing for at, count in zip(hit, self.cells, strict=True)
         )
         return y, z
+
+    def _material(self) -> Array:
+        """Share of material about every node of the first shot's window."""
+        fine = (np.arange(discretisation.FINER) + 0.5) / discretisation.FINER - 0.5
+        y, z = ((nodes[:, None] + self.spacing * fine).reshape(-1) for nodes in self.nodes())
+        solid = self.plate.is_solid(y[:, None], z[None, :])
+        shape = (self.cells[0], discretisation.FINER, self.cells[1], discretisation.FINER)
+        return np.asarray(solid.reshape(shape).mean(axis=(1, 3)))
 
     def report(self, contact: Any, standoffs: Array, standoff_point: str) -> Outcomes:
         """Free flight to the stand-offs, and everything back on the host."""
@@ -389,20 +404,25 @@ class _Task:
         steepest = float(shots.obliquity.max())
         turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
         half = (
-            1.3 * self.core.max_radius / math.cos(steepest)
+            WINDOW_SLACK * self.core.max_radius / math.cos(steepest)
             + plate.thickness * math.tan(steepest)
             + self.core.bounding_radius * turned
-            + plate.degradation_length
         )
-        reach = max(self.device_plate.reach_y, self.device_plate.reach_z)
-        cells_y, cells_z = (2 * (math.ceil(half / cell) + reach + 3) for cell in (self.tile.dy, self.tile.dz))
+        cells_y = cells_z = 2 * (math.ceil(half / self.spacing) + self.device_plate.reach + 3)
         while not self._fits(cells_y, cells_z):  # what leaves a smaller window gets its named status
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
-        arrays = 1 if not self.variant.degrades else 2 if self.resolution.nodal else 4
-        return arrays * cells_y * cells_z * np.dtype(self.real).itemsize
+        size = np.dtype(self.real).itemsize
+        return self._field_count() * cells_y * cells_z * size + self._patches() * (4 * size + 2 * 4)
+
+    def _field_count(self) -> int:
+        return 2 if self.resolution.nodal else 3 if self.variant.degrades else 0
+
+    def _patches(self) -> int:
+        """Patches of a slot's touches."""
+        return 0 if self.resolution.nodal else self.surface.rings * self.surface.around
 
     def _slots(self, cells_y: int, cells_z: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow."""
@@ -414,19 +434,20 @@ class _Task:
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
 
-    def _fields(self, slots: int, cells_y: int, cells_z: int) -> Any:
-        scratch = self.stage.Fields()
+    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, Any]:
+        """Fields and touches of some slots."""
+        empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
+        scratch, touches = self.stage.Fields(), self.stage.Touches()
         scratch.cells_y, scratch.cells_z = cells_y, cells_z
-        size, degrades, nodal = slots * cells_y * cells_z, self.variant.degrades, self.resolution.nodal
-        needed = {
-            "material": True,
-            "gain": degrades,
-            "exposure": degrades and not nodal,
-            "filtered": degrades and not nodal,
-        }
-        for name, used in needed.items():
-            setattr(scratch, name, wp.empty(size if used else 0, dtype=self.variant.real, device=self.device))
-        return scratch
+        for name in ("exposure", "gain", "filtered")[: self._field_count()]:
+            setattr(scratch, name, empty(slots * cells_y * cells_z))
+        patches = slots * self._patches()
+        for name in ("area", "gain", "y", "z"):
+            setattr(touches, name, empty(patches))
+        for name in ("tile", "cell"):
+            setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
+        touches.ring_area = empty(slots * self.surface.rings)
+        return scratch, touches
 
     def _launch(self, order: Any, outcomes: Any, pace: Any, scratch: Any, slots: int, first: int, count: int) -> int:
         """March `count` shots from order[first] on; returns `count`."""
@@ -443,7 +464,7 @@ class _Task:
                 self.law,
                 self.device_shots,
                 pace,
-                scratch,
+                *scratch,
             ],
             outputs=[outcomes, self.history],
             device=self.device,
@@ -458,7 +479,7 @@ class _Task:
         if self.device.is_cpu:
             self._on_threads(launch, slots, len(which), progress)
         else:
-            scratch = self._fields(slots, *self.cells)
+            scratch = self._scratch(slots, *self.cells)
             for first, count in _chunks(len(which), slots):
                 launch(scratch, slots, first, count)
                 wp.synchronize_device(self.device)
@@ -469,7 +490,7 @@ class _Task:
         the calling thread, without the interpreter lock."""
         idle = SimpleQueue[Any]()
         for _ in range(slots):
-            idle.put(self._fields(1, *self.cells))
+            idle.put(self._scratch(1, *self.cells))
 
         def work(chunk: tuple[int, int]) -> int:
             scratch = idle.get()

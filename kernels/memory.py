@@ -1,0 +1,34 @@
+"""Access to flat arrays that a CPU can compute in vector registers."""
+
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+
+@cache
+def build(dtype: Any) -> SimpleNamespace:
+    """Element access for contiguous arrays of one scalar type.
+
+    Warp's own indexing takes any stride and counts negative indices from the end, so that a compiler cannot see
+    that neighbours lie side by side. Bounds are checked in Warp's debug mode, as in Warp's own.
+    """
+
+    @wp.func_native("""
+    assert(index >= 0 && index < array.shape[0]);
+    return array.data[index];
+    """)
+    def read(array: wp.array(dtype=dtype), index: wp.int32) -> dtype:
+        """array[index]"""
+        ...
+
+    @wp.func_native("""
+    assert(index >= 0 && index < array.shape[0]);
+    array.data[index] = value;
+    """)
+    def write(array: wp.array(dtype=dtype), index: wp.int32, value: dtype):
+        """array[index] = value"""
+        ...
+
+    return SimpleNamespace(read=read, write=write)
