@@ -131,8 +131,9 @@ def build(variant: Variant) -> SimpleNamespace:
         around = sideways * patch.velocity_around
         variation = wp.sqrt(meridian * meridian + around * around)
         # From the patch's centre to that of the part in contact, in halves of the patch: 0 if all of it touches.
-        beyond = wp.clamp(half - half * patch.closing / (variation + tiny), zero, one)
-        shift = beyond / (variation + tiny)
+        per_speed = one / (variation + tiny)
+        beyond = wp.clamp(half - half * patch.closing * per_speed, zero, one)
+        shift = beyond * per_speed
         grip = Grip()
         grip.width = laws.onset_width(law, variation)
         grip.share = laws.contact_fraction(law, patch.closing, variation, pose.speed)
@@ -206,9 +207,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return total
 
     @wp.func
-    def sum_ring(
-        surface: Surface, law: Law, fields: Fields, touches: Touches, pose: Pose, ring: Ring, first: wp.int32
-    ):
+    def sum_ring(surface: Surface, law: Law, fields: Fields, touches: Touches, pose: Pose, ring: Ring, first: wp.int32):
         """Sum tractions and their slopes over a ring's touches."""
         axial, right, up, around = real(0.0), real(0.0), real(0.0), real(0.0)
         axial_c, axial_s = real(0.0), real(0.0)
@@ -254,7 +253,9 @@ def build(variant: Variant) -> SimpleNamespace:
         sums = Sums()
         sums.force = vec3(axial, right, up)
         sums.moment = vec3(
-            ring.radius * around, ring.radius * axial_s - ring.station * up, ring.station * right - ring.radius * axial_c
+            ring.radius * around,
+            ring.radius * axial_s - ring.station * up,
+            ring.station * right - ring.radius * axial_c,
         )
         sums.slopes = slopes
         sums.slopes_c = slopes_c
@@ -319,8 +320,10 @@ def build(variant: Variant) -> SimpleNamespace:
         for index in range(found.first_ring, found.last_ring + 1):
             ring = ring_at(surface, pose, index)
             first = base + index * surface.around
-            find_touches(surface, plate, law, fields, window, touches, pose, ring, first, dt)
-            area = meet_plate(surface, plate, fields, touches, first)
+            area = zero
+            if surfaces.closes(pose, ring):
+                find_touches(surface, plate, law, fields, window, touches, pose, ring, first, dt)
+                area = meet_plate(surface, plate, fields, touches, first)
             touches.ring_area[slot * surface.rings + index] = area
             load.touching = load.touching or area > zero
         if load.touching:

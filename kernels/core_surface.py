@@ -14,7 +14,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the surface for one variant."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    two, eight, half_turn = real(2.0), real(8.0), real(math.pi)
+    quarter, half_turn = real(0.25), real(math.pi)
     widest_ratio, flattest = real(0.02), real(1.0e-3)  # floors that keep the convolution's quotient finite
 
     @wp.struct
@@ -41,6 +41,7 @@ def build(variant: Variant) -> SimpleNamespace:
         sine: wp.array(dtype=real)
         rings: wp.int32
         around: wp.int32
+        max_radius: real
         bounding_radius: real
 
     @wp.struct
@@ -154,17 +155,34 @@ def build(variant: Variant) -> SimpleNamespace:
         return patch
 
     @wp.func
-    def behind_face(depth: real, wide: real, narrow: real):
+    def closes(pose: Pose, ring: Ring):
+        """Whether any part of a ring can advance along its normal: a bound, for rings that only trail behind."""
+        along = pose.velocity[0]
+        across = wp.sqrt(pose.velocity[1] * pose.velocity[1] + pose.velocity[2] * pose.velocity[2])
+        rate = wp.sqrt(pose.omega[1] * pose.omega[1] + pose.omega[2] * pose.omega[2])
+        outwards = across + wp.abs(ring.station) * rate
+        around = outwards + ring.radius * wp.abs(pose.omega[0])
+        swing = ring.radius * rate
+        return (
+            ring.normal_axial * along
+            + wp.abs(ring.normal_axial) * swing
+            + ring.normal_radial * (outwards + ring.sector * around)
+            + wp.abs(ring.turn_axial) * (wp.abs(along) + swing)
+            + wp.abs(ring.turn_radial) * outwards
+        ) > zero
+
+    @wp.func
+    def behind_face(depth: real, wide: real, narrow: real, per_area: real):
         """Share of a patch beyond a face at x = 0, averaged over the step, less a half.
 
         The patch spreads evenly over ±extent about its mid-step depth and moves evenly by ±motion, `wide` and
-        `narrow` being the larger and the smaller; their convolution keeps the sum over steps of what is immersed
-        exact in straight flight.
+        `narrow` being the larger and the smaller, per_area = 1 / (2 wide narrow); their convolution keeps the sum
+        over steps of what is immersed exact in straight flight.
         """
         rest = wp.max(zero, wide + narrow - wp.abs(depth))
-        edge = half - rest * rest / (eight * wide * narrow)
+        edge = half - quarter * rest * rest * per_area
         corner = wp.where(depth < zero, -edge, edge)
-        return wp.where(wp.abs(depth) < wide - narrow, depth / (two * wide), corner)
+        return wp.where(wp.abs(depth) < wide - narrow, depth * narrow * per_area, corner)
 
     @wp.func
     def immersed_area(pose: Pose, ring: Ring, patch: Patch, thickness: real, dt: real):
@@ -181,7 +199,9 @@ def build(variant: Variant) -> SimpleNamespace:
         motion = half * dt * wp.abs(advance)
         wide = wp.max(extent, motion)
         narrow = wp.max(wp.min(extent, motion), widest_ratio * wide)
-        return ring.area * (behind_face(patch.x, wide, narrow) - behind_face(patch.x - thickness, wide, narrow))
+        per_area = half / (wide * narrow)
+        front = behind_face(patch.x, wide, narrow, per_area)
+        return ring.area * (front - behind_face(patch.x - thickness, wide, narrow, per_area))
 
     return SimpleNamespace(
         Surface=Surface,
@@ -194,5 +214,6 @@ def build(variant: Variant) -> SimpleNamespace:
         reach_along_x=reach_along_x,
         behind_face=behind_face,
         patch_at=patch_at,
+        closes=closes,
         immersed_area=immersed_area,
     )

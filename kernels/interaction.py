@@ -95,8 +95,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Share of the resistance left after an exposure T [s]: β^(T/Δt_β)."""
         if wp.static(variant.double):
             return wp.exp(law.decay_rate * exposure)
-        else:
-            return exp_single(law.decay_rate * exposure)
+        return exp_single(law.decay_rate * exposure)
 
     return SimpleNamespace(
         Law=Law,

@@ -62,11 +62,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Pace:
-        """The time step [s], or if that is 0 the way per step [m] at impact velocity; and the way [m], at impact
-        velocity, after which a shot that has not ended is given up. `rows` of the trace belong to each shot."""
+        """The time step [s], or if that is 0 the way per step [m] at impact velocity, of which `way_along` at most may
+        lie in the plane of the plate; the most that any step may take; and the way [m], at impact velocity, after
+        which a shot that has not ended is given up. `rows` of the trace belong to each shot."""
 
         time_step: wp.float64
         way: wp.float64
+        way_along: wp.float64
+        longest_step: wp.float64
         longest_way: wp.float64
         rows: wp.int32
 
@@ -79,6 +82,27 @@ def build(variant: Variant) -> SimpleNamespace:
     def attitude_of(axis: wp.vec3d):
         """The shortest turn that takes the plate normal to the axis (axis_x > 0)."""
         return wp.normalize(wp.quatd(wp.float64(0.0), -axis[2], axis[1], wp.float64(1.0) + axis[0]))
+
+    @wp.func
+    def step_of(pace: Pace, speed: wp.float64, obliquity: wp.float64):
+        """Time step of a shot [s]."""
+        way = pace.time_step * speed
+        if way == wp.float64(0.0):
+            way = wp.min(pace.way, pace.way_along / wp.max(wp.sin(obliquity), wp.float64(1.0e-9)))
+        return real(wp.min(way, pace.longest_step) / speed)
+
+    @wp.func
+    def reach_of(surface: Surface, plate: Plate, state: State):
+        """How far from the hit [m], in the plane of the plate, any part of a core that touches nothing can get."""
+        axis = motion.axis_of(state.attitude)
+        slope = vec3(zero, state.velocity[1], state.velocity[2]) / state.velocity[0]
+        lean = axis - axis[0] * slope  # of the axis against the line of flight
+        steep = wp.length(slope)
+        return (
+            surface.max_radius * (real(1.0) + steep)
+            + surface.bounding_radius * wp.length(vec3(zero, lean[1], lean[2]))
+            + plate.thickness * steep
+        )
 
     @wp.func
     def foremost(surface: Surface, pose: Pose):
@@ -150,9 +174,7 @@ def build(variant: Variant) -> SimpleNamespace:
             trace[row, column + k] = value[k]
 
     @wp.func
-    def record(
-        trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, force: vec3, moment: vec3
-    ):
+    def record(trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, force: vec3, moment: vec3):
         """One traced step, in the order of TRACE_COLUMNS: the state after its kick, and the load that made it."""
         trace[row, 0] = time
         write_vec3(trace, row, 1, state.position)
@@ -184,9 +206,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots."""
         shot = order[first + wp.tid()]
         speed = shots.velocity[shot]
-        dt = real(pace.time_step)
-        if dt == zero:
-            dt = real(pace.way / speed)
+        dt = step_of(pace, speed, shots.obliquity[shot])
         max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
         slot = wp.tid() % slots
         window = scheme.open_window(plate, fields, slot, shots.hit_y[shot], shots.hit_z[shot])
@@ -196,6 +216,8 @@ def build(variant: Variant) -> SimpleNamespace:
         # Positions are those of mid-step from here on: kicks at mid-step, exact drifts between them.
         state = motion.drift(body, state, half * dt)
         status = int(RUNNING)
+        if grid.clearance(plate, window) > reach_of(surface, plate, state):
+            status = int(MISSED)
         touched = bool(False)
         contact_steps = int(0)
         step = int(0)

@@ -1,7 +1,9 @@
 """The paper's literal scheme (its eqs. 4 to 6): points, nearest nodes, β once per node and step.
 
 Kept because the published rows came from it. It has no limit in the time step or the grid (MODEL.md §4),
-has no condition on the direction of motion and may feed energy into the core.
+has no condition on the direction of motion. Its forces may feed energy into the core: what a step would add beyond
+the kinetic energy that was there, the kick withholds (rigid_body.restraint), as in every scheme here.
+Nodes lie about the hit, 10 µm apart, each with the resistance of the plate under it.
 """
 
 from functools import cache

@@ -22,11 +22,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Plate:
-        """Pristine plate: one period [m] as a tile [tile_y × tile_z] of material fractions, corner at the origin;
-        the half extents [m] of a finite plate (infinite if there is no rim); the spacing [m] of the exposure's
+        """Pristine plate: one period [m] as a tile [tile_y × tile_z] of material fractions, corner at the origin, and
+        how far at least each of its cells is from any material [m]; the half extents [m] of a finite plate (infinite if there is no rim); the spacing [m] of the exposure's
         grid and the tent filter on it."""
 
         tile: wp.array(dtype=real)
+        clear: wp.array(dtype=real)
         tile_y: wp.int32
         tile_z: wp.int32
         period_y: wp.float64
@@ -41,7 +42,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Fields:
         """Scratch of all slots, each cells_y × cells_z: exposure [s], exposure gained in the step [s], and room for
-        the filter; the literal scheme keeps each node's resistance and whether it was touched instead."""
+        the filter. The literal scheme keeps each node's share of the resistance there, and whether it was touched."""
 
         exposure: wp.array(dtype=real)
         gain: wp.array(dtype=real)
@@ -110,6 +111,11 @@ def build(variant: Variant) -> SimpleNamespace:
         row = wp.min(wp.int32((across - wp.floor(across)) * real(plate.tile_y)), plate.tile_y - 1)
         column = wp.min(wp.int32((along - wp.floor(along)) * real(plate.tile_z)), plate.tile_z - 1)
         return row * plate.tile_z + column
+
+    @wp.func
+    def clearance(plate: Plate, window: Window):
+        """How far at least the hit is from any material [m]."""
+        return plate.clear[tile_under(plate, window, zero, zero)]
 
     @wp.func
     def on_plate(plate: Plate, window: Window, y: real, z: real):
@@ -265,6 +271,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Box=Box,
         window_at=window_at,
         tile_under=tile_under,
+        clearance=clearance,
         on_plate=on_plate,
         cell_at=cell_at,
         gather=gather,

@@ -7,7 +7,6 @@ from typing import Any
 
 import warp as wp
 
-
 CPU_FLAGS = (
     "-march=native -mllvm=-inline-threshold=9000 -mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )

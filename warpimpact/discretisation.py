@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import psutil
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 from scipy.optimize import brentq, minimize_scalar
 
-from warpimpact.scene import Core, Numerics, Plate
+from warpimpact.scene import Core, Impact, Numerics, Plate
 
 Array = NDArray[np.float64]
 
@@ -37,16 +38,20 @@ class Fidelity:
     @property
     def patch_width(self) -> float:
         """Widest patch as the plate sees it, in degradation lengths: wider ones leave gaps in the exposure, and
-        weaken the plate under themselves too much. It is that of the paper's core (R = 3.02 mm, ℓ = 0.5 mm)."""
-        return 38.0 / self.patches_around
+        weaken the plate under themselves too much. It is that of the paper's core (R = 3.02 mm, ℓ = 0.5 mm), for
+        which the patches of two neighbouring rings together go round."""
+        return 19.0 / self.patches_around
 
 
 SLENDER = 1.0 / 7.0
+ALONG = 1.6
+"""Way of a step in the plane of the plate, in degradation lengths and per unit of `travel`: contact that sweeps
+sideways by more than that leaves gaps in the exposure."""
 
 FIDELITIES = {
-    "draft": Fidelity(16, 32, 2.0, 0.4),
-    "standard": Fidelity(32, 64, 3.0, 0.2),
-    "reference": Fidelity(96, 192, 8.0, 0.05),
+    "draft": Fidelity(16, 16, 1.0, 0.5),
+    "standard": Fidelity(32, 32, 1.5, 0.3),
+    "reference": Fidelity(72, 56, 5.0, 0.05),
 }
 NODAL: dict[str, Any] = {
     "patches_axial": 36,
@@ -64,6 +69,10 @@ class Resolution:
     nodal: bool
     time_step: float | None
     way: float
+    way_along: float
+    """The most of a step's way that may lie in the plane of the plate [m]."""
+    longest_step: float
+    """The most that any step, also a given one, may take [m]: a longer one jumps over what happens in the plate."""
     patches_axial: int
     patches_around: int
     grid_spacing: float
@@ -71,9 +80,12 @@ class Resolution:
     patch_width: float
     """No ring is wider than this radially [m]."""
 
-    def step_at(self, velocity: float) -> float:
-        """Time step [s] at an impact velocity [m/s]."""
-        return self.time_step or self.way / velocity
+    def step_at(self, velocity: float, obliquity: float = 0.0) -> float:
+        """Time step [s] at an impact velocity [m/s] and an obliquity [rad]."""
+        way = min(self.way, self.way_along / max(math.sin(obliquity), 1e-9))
+        if self.time_step is not None:
+            way = self.time_step * velocity
+        return min(way, self.longest_step) / velocity
 
 
 def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resolution:
@@ -84,11 +96,12 @@ def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resoluti
         fidelity = FIDELITIES[numerics.fidelity]
     if numerics.tolerance is not None:
         raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
+    passage = min(plate.thickness, SLENDER * core.length)
     width = fidelity.patch_width * plate.degradation_length if plate.degradation < 1.0 else math.inf
     defaults: dict[str, Any] = {
         "time_step": None,
         "patches_axial": fidelity.patches_axial,
-        "patches_around": max(fidelity.patches_around, 4 * math.ceil(0.5 * math.pi * core.max_radius / width)),
+        "patches_around": max(fidelity.patches_around, 4 * math.ceil(0.25 * math.pi * core.max_radius / width)),
         "grid_spacing": plate.degradation_length / fidelity.cells_per_length,
     }
     if numerics.scheme == "nodal":
@@ -97,26 +110,23 @@ def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resoluti
     return Resolution(
         nodal=numerics.scheme == "nodal",
         double=fidelity.double if numerics.precision is None else numerics.precision == "double",
-        way=_way(fidelity.travel, core, plate),
+        way=fidelity.travel * passage,
+        way_along=ALONG * fidelity.travel * plate.degradation_length,
+        longest_step=passage,
         patch_width=math.inf if numerics.scheme == "nodal" else width,
         **(defaults | given),
     )
 
 
-def spelt_out(fidelity: Fidelity, core: Core, plate: Plate, velocity: float) -> Numerics:
-    """Numerics that give, at an impact velocity [m/s], what `resolve` would make of the fidelity if it had a name."""
+def spelt_out(fidelity: Fidelity, core: Core, plate: Plate, impact: Impact) -> Numerics:
+    """Numerics that give, for one impact, what `resolve` would make of the fidelity if it had a name."""
     return Numerics(
-        time_step=_way(fidelity.travel, core, plate) / velocity,
+        time_step=resolve(fidelity, core, plate).step_at(impact.velocity, impact.obliquity),
         patches_axial=fidelity.patches_axial,
         patches_around=fidelity.patches_around,
         grid_spacing=plate.degradation_length / fidelity.cells_per_length,
         precision="double" if fidelity.double else "single",
     )
-
-
-def _way(travel: float, core: Core, plate: Plate) -> float:
-    """Way per time step at impact velocity [m]."""
-    return travel * min(plate.thickness, SLENDER * core.length)
 
 
 @dataclass(frozen=True)
@@ -220,7 +230,16 @@ def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
     at_low, at_high = _normals(core, low, 1e-3 * half), _normals(core, high, -1e-3 * half)
     turn_axial, turn_radial = 0.5 * (at_high - at_low)
     half_radial = 0.5 * (r_high - r_low)
-    return middle, core.radius(middle), half_radial * (r_high + r_low), lateral, half, half_radial, turn_axial, turn_radial
+    return (
+        middle,
+        core.radius(middle),
+        half_radial * (r_high + r_low),
+        lateral,
+        half,
+        half_radial,
+        turn_axial,
+        turn_radial,
+    )
 
 
 def _normals(core: Core, stations: Array, step: Array) -> Array:
@@ -255,6 +274,15 @@ class Tile:
     material: Array
     dy: float
     dz: float
+
+    @property
+    def clearance(self) -> Array:
+        """Distance [m] that every cell keeps at least from the material of the whole lattice, shape of `material`."""
+        # Seen from one period amid eight others; no hole is wider than the period, so the nearest wall is among them.
+        free = distance_transform_edt(np.tile(self.material, (3, 3)) == 0.0, sampling=(self.dy, self.dz))
+        rows, columns = self.material.shape
+        own = free[rows : 2 * rows, columns : 2 * columns]
+        return np.asarray(np.maximum(0.0, own - np.hypot(self.dy, self.dz)))
 
 
 def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
@@ -309,7 +337,7 @@ def tent_taps(length: float, cell: float) -> Array:
     return taps(brentq(excess, cell, length + cell))[0]
 
 
-ONSET = 0.1
+ONSET = 0.05
 """Onset speed of contact in units of what full contact of a wall as deep as the plate does in one step."""
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""

@@ -16,11 +16,11 @@ from warpimpact.simulate import Outcomes, Progress, simulate
 Array = NDArray[np.float64]
 
 LADDER = (
-    Fidelity(24, 48, 2.0, 0.2),
-    Fidelity(36, 72, 3.0, 0.15),
-    Fidelity(54, 108, 5.0, 0.1),
-    Fidelity(80, 160, 8.0, 0.07),
-    Fidelity(120, 240, 12.0, 0.045),
+    Fidelity(24, 24, 1.5, 0.35),
+    Fidelity(36, 36, 2.2, 0.22),
+    Fidelity(54, 52, 3.5, 0.13),
+    Fidelity(80, 76, 5.5, 0.08),
+    Fidelity(120, 112, 9.0, 0.05),
 )
 """Levels of resolution, coarse to fine, each about three times as expensive as the one before it. A shot that does
 not meet its tolerance on the last is told as not converged."""

@@ -266,6 +266,7 @@ class _Task:
         surface.normal_radial = self._array(rings.area_radial / area)
         surface.cosine, surface.sine = self._array(np.cos(azimuths)), self._array(np.sin(azimuths))
         surface.rings, surface.around = len(rings.station), r.patches_around
+        surface.max_radius = self.core.max_radius
         surface.bounding_radius = self.core.bounding_radius
         return surface
 
@@ -282,6 +283,7 @@ class _Task:
         tile = discretisation.tile_of(self.plate, self.spacing / finer, sharp=nodal)
         plate = self.stage.Plate()
         plate.tile = self._array(tile.material.reshape(-1))
+        plate.clear = self._array(tile.clearance.reshape(-1))
         plate.tile_y, plate.tile_z = tile.material.shape
         plate.period_y, plate.period_z = self.plate.pattern.period
         plate.spacing = self.spacing
@@ -317,9 +319,13 @@ class _Task:
     def _pace(self) -> Any:
         pace, passage = self.stage.Pace(), self.plate.thickness + 2.0 * self.core.bounding_radius
         pace.time_step = self.resolution.time_step or 0.0
-        pace.way = self.resolution.way
+        pace.way, pace.way_along = self.resolution.way, self.resolution.way_along
+        pace.longest_step = self.resolution.longest_step
         pace.longest_way = STEP_ALLOWANCE * passage
-        shortest = min(pace.way, self.shots.velocity.min() * (self.resolution.time_step or math.inf))
+        steps = [
+            self.resolution.step_at(v, o) * v for v, o in zip(self.shots.velocity, self.shots.obliquity, strict=True)
+        ]
+        shortest = min(steps) if self.variant.traced else math.inf
         pace.rows = math.ceil(pace.longest_way / shortest) + 2  # the end, and a step that rounding may add
         return pace
 
@@ -359,9 +365,7 @@ class _Task:
     def nodes(self) -> tuple[Array, Array]:
         """Where the nodes of the first shot's window are in the plate [m], along y and z."""
         hit = self.shots.hit_y[0], self.shots.hit_z[0]
-        y, z = (
-            at + (np.arange(count) - count // 2) * self.spacing for at, count in zip(hit, self.cells, strict=True)
-        )
+        y, z = (at + (np.arange(count) - count // 2) * self.spacing for at, count in zip(hit, self.cells, strict=True))
         return y, z
 
     def _material(self) -> Array:

@@ -31,26 +31,25 @@ from warpimpact.simulate import Outcomes, Progress, find_device, simulate
 Array = NDArray[np.float64]
 
 LEVELS = (
-    Fidelity(72, 144, 6.0, 0.06),
-    Fidelity(108, 216, 9.0, 0.04),
-    Fidelity(162, 324, 13.5, 0.0267),
+    Fidelity(72, 72, 5.0, 0.06),
+    Fidelity(108, 108, 7.5, 0.04),
+    Fidelity(162, 160, 11.0, 0.027),
 )
 """Refinements behind the converged answer, coarse to fine; the uncertainty is the change from the last but one."""
 
 SWEEP = (
-    Fidelity(8, 16, 0.5, 0.8),
-    Fidelity(8, 16, 1.0, 0.8),
-    Fidelity(12, 24, 1.0, 0.8),
-    Fidelity(16, 32, 1.0, 0.4),
-    Fidelity(16, 32, 2.0, 0.4),
-    Fidelity(24, 24, 2.0, 0.4),
-    Fidelity(32, 32, 2.0, 0.4),
-    Fidelity(24, 48, 3.0, 0.4),
-    Fidelity(32, 32, 3.0, 0.2),
-    Fidelity(32, 64, 4.0, 0.4),
-    Fidelity(48, 48, 4.0, 0.2),
-    Fidelity(48, 96, 4.0, 0.1),
-    Fidelity(72, 144, 6.0, 0.07),
+    Fidelity(8, 12, 0.7, 0.8),
+    Fidelity(12, 16, 1.0, 0.8),
+    Fidelity(12, 16, 1.0, 0.6),
+    Fidelity(16, 24, 1.0, 0.4),
+    Fidelity(24, 24, 1.0, 0.4),
+    Fidelity(24, 24, 1.5, 0.4),
+    Fidelity(24, 32, 2.0, 0.3),
+    Fidelity(32, 24, 1.5, 0.3),
+    Fidelity(40, 32, 2.0, 0.2),
+    Fidelity(48, 40, 2.5, 0.15),
+    Fidelity(56, 48, 4.0, 0.1),
+    Fidelity(72, 72, 6.0, 0.07),
 )
 """Settings beside the named fidelities: near the best of 280 on the slotted plate, coarse to fine."""
 
@@ -157,7 +156,7 @@ def study(
 def default_settings(campaign: Campaign) -> dict[str, Numerics]:
     """The fidelities by their names, and the sweep and the literal scheme by what they are."""
     fidelities = {name: Numerics(fidelity=name) for name in FIDELITIES}
-    sweep = [spelt_out(setting, campaign.core, campaign.plate, campaign.impact.velocity) for setting in SWEEP]
+    sweep = [spelt_out(setting, campaign.core, campaign.plate, campaign.impact) for setting in SWEEP]
     nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
     return fidelities | {label(campaign, numerics): numerics for numerics in sweep} | nodal
 
@@ -166,7 +165,7 @@ def label(campaign: Campaign, numerics: Numerics) -> str:
     """Patches, cells per degradation length and time step as one short name."""
     resolution = resolve(numerics, campaign.core, campaign.plate)
     cells = campaign.plate.degradation_length / resolution.grid_spacing
-    step = resolution.step_at(campaign.impact.velocity)
+    step = resolution.step_at(campaign.impact.velocity, campaign.impact.obliquity)
     return f"{resolution.patches_axial}×{resolution.patches_around}, ℓ/{cells:.3g}, {step * 1e6:.3g} µs"
 
 
@@ -271,7 +270,7 @@ class _Bench:
         self.shots = make_shots(campaign.impact, spread, campaign.plate)
 
     def numerics(self, fidelity: Fidelity) -> Numerics:
-        return spelt_out(fidelity, self.campaign.core, self.campaign.plate, self.campaign.impact.velocity)
+        return spelt_out(fidelity, self.campaign.core, self.campaign.plate, self.campaign.impact)
 
     def expect(self, runs: Sequence[Numerics]) -> None:
         """Say what is going to be computed, for the progress."""
@@ -310,7 +309,7 @@ class _Bench:
     def _work(self, numerics: Numerics) -> float:
         """Patches times steps of a hit, up to a factor."""
         resolution = resolve(numerics, self.campaign.core, self.campaign.plate)
-        steps = 1.0 / resolution.step_at(self.campaign.impact.velocity)
+        steps = 1.0 / resolution.step_at(self.campaign.impact.velocity, self.campaign.impact.obliquity)
         return resolution.patches_axial * resolution.patches_around * steps
 
     def _simulate(self, numerics: Numerics, shots: Shots, progress: Progress) -> Outcomes:
@@ -344,7 +343,7 @@ def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> di
         name: np.array([getattr(resolution, name) for resolution in resolutions])
         for name in ("patches_axial", "patches_around", "grid_spacing")
     }
-    steps = [resolution.step_at(campaign.impact.velocity) for resolution in resolutions]
+    steps = [resolution.step_at(campaign.impact.velocity, campaign.impact.obliquity) for resolution in resolutions]
     return values | {"scheme": [numerics.scheme for numerics in settings.values()], "time_step": np.array(steps)}
 
 

@@ -129,7 +129,7 @@ def _numerics(campaign: Campaign) -> str:
     resolution = resolve(campaign.numerics, campaign.core, campaign.plate)
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
-        f"time_step {resolution.step_at(campaign.impact.velocity):.4g} s, "
+        f"time_step {resolution.step_at(campaign.impact.velocity, campaign.impact.obliquity):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
     )
