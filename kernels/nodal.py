@@ -36,10 +36,11 @@ def build(variant: Variant) -> SimpleNamespace:
         window = grid.window_at(plate, fields, slot, hit_y, hit_z)
         for i in range(fields.cells_y):
             y = real(i - fields.cells_y // 2) * plate.spacing
+            row = grid.tile_row(plate, window, y) * plate.tile_z
             for j in range(fields.cells_z):
                 z = real(j - fields.cells_z // 2) * plate.spacing
                 index = window.first + i * fields.cells_z + j
-                share = plate.tile[grid.tile_under(plate, window, y, z)]
+                share = plate.tile[row + grid.tile_column(plate, window, z)]
                 if wp.static(variant.rimmed):
                     share *= grid.on_plate(plate, window, y, z)
                 fields.exposure[index] = share

@@ -23,8 +23,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Plate:
         """Pristine plate: one period [m] as a tile [tile_y × tile_z] of material fractions, corner at the origin, and
-        how far at least each of its cells is from any material [m]; the half extents [m] of a finite plate (infinite if there is no rim); the spacing [m] of the exposure's
-        grid and the tent filter on it."""
+        how far at least each of its cells is from any material [m]; the half extents [m] of a finite plate (infinite
+        if there is no rim); the spacing [m] of the exposure's grid and half of the tent filter on it."""
 
         tile: wp.array(dtype=real)
         clear: wp.array(dtype=real)
@@ -104,13 +104,19 @@ def build(variant: Variant) -> SimpleNamespace:
         return window
 
     @wp.func
+    def tile_row(plate: Plate, window: Window, y: real):
+        across = window.tile_y + y * window.per_period_y
+        return wp.min(wp.int32((across - wp.floor(across)) * real(plate.tile_y)), plate.tile_y - 1)
+
+    @wp.func
+    def tile_column(plate: Plate, window: Window, z: real):
+        along = window.tile_z + z * window.per_period_z
+        return wp.min(wp.int32((along - wp.floor(along)) * real(plate.tile_z)), plate.tile_z - 1)
+
+    @wp.func
     def tile_under(plate: Plate, window: Window, y: real, z: real):
         """Index of the tile's cell under a point."""
-        across = window.tile_y + y * window.per_period_y
-        along = window.tile_z + z * window.per_period_z
-        row = wp.min(wp.int32((across - wp.floor(across)) * real(plate.tile_y)), plate.tile_y - 1)
-        column = wp.min(wp.int32((along - wp.floor(along)) * real(plate.tile_z)), plate.tile_z - 1)
-        return row * plate.tile_z + column
+        return tile_row(plate, window, y) * plate.tile_z + tile_column(plate, window, z)
 
     @wp.func
     def clearance(plate: Plate, window: Window):
@@ -270,6 +276,8 @@ def build(variant: Variant) -> SimpleNamespace:
         Cell=Cell,
         Box=Box,
         window_at=window_at,
+        tile_row=tile_row,
+        tile_column=tile_column,
         tile_under=tile_under,
         clearance=clearance,
         on_plate=on_plate,

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 FINER = 4
 """Cells of the tile per cell of the exposure's grid, in each direction: the tile is read without interpolation."""
+BLOCKS = 256
+"""Most blocks, in each direction, in which a period is searched for room that no core fills."""
 SUBSAMPLES = 4
 """Points per cell of the tile and direction behind a material fraction."""
 
@@ -278,11 +280,20 @@ class Tile:
     @property
     def clearance(self) -> Array:
         """Distance [m] that every cell keeps at least from the material of the whole lattice, shape of `material`."""
-        # Seen from one period amid eight others; no hole is wider than the period, so the nearest wall is among them.
-        free = distance_transform_edt(np.tile(self.material, (3, 3)) == 0.0, sampling=(self.dy, self.dz))
+        # In blocks of cells, of which any material makes a wall; seen from one period amid eight others: no hole is
+        # wider than the period, so the nearest wall is among them.
         rows, columns = self.material.shape
-        own = free[rows : 2 * rows, columns : 2 * columns]
-        return np.asarray(np.maximum(0.0, own - np.hypot(self.dy, self.dz)))
+        block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
+        starts = [np.arange(0, count, size) for count, size in zip(self.material.shape, block, strict=True)]
+        wall = np.maximum.reduceat(np.maximum.reduceat(self.material > 0.0, starts[0], axis=0), starts[1], axis=1)
+        if not wall.any():
+            return np.full((rows, columns), math.inf)
+        widths = (self.dy * rows / len(starts[0]), self.dz * columns / len(starts[1]))
+        free = distance_transform_edt(~np.tile(wall, (3, 3)), sampling=widths)
+        own = free[len(starts[0]) : 2 * len(starts[0]), len(starts[1]) : 2 * len(starts[1])]
+        # Two blocks less: distances are from centre to centre, and the last block of a period may be narrower.
+        kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
+        return np.asarray(np.repeat(np.repeat(kept, block[0], axis=0), block[1], axis=1)[:rows, :columns])
 
 
 def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
