@@ -1,0 +1,125 @@
+"""What the benchmarks share: the checkout, the scene, the clock, the machine."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+CHECKOUT = Path(__file__).resolve().parents[2]
+if find_spec("warpimpact") is None:  # not installed: the checkout itself will do
+    sys.path.append(str(CHECKOUT))
+    import warpimpact
+
+    warpimpact.__path__.append(str(CHECKOUT))  # kernels/ and campaigns/ install inside the package
+
+from warpimpact.scene import Core, Hits, Shots, make_shots  # noqa: E402
+
+Array = NDArray[np.float64]
+CAMPAIGN = CHECKOUT / "campaigns" / "slotted_plate.toml"
+RESULTS = Path(__file__).resolve().parent / "results"
+
+
+def shots_of(campaign: Any, count: int) -> Shots:
+    """A campaign's shots at `count` Sobol points of its seed; those of a smaller count come first."""
+    return make_shots(campaign.impact, Hits(count=count, seed=campaign.hits.seed), campaign.plate)
+
+
+def copied(shots: Shots, copies: int) -> Shots:
+    """The shots `copies` times over."""
+    return Shots(*(np.tile(values, copies) for values in vars(shots).values()))
+
+
+def launch_state(core: Core, shots: Shots) -> tuple[Array, Array, Array]:
+    """Line of flight, axis, and position of the centre of mass relative to the hit [m], each of shape [shots, 3], when
+    the foremost point is at the front face (MODEL.md §1)."""
+    sine = np.sin(shots.obliquity)
+    flight = np.stack([np.cos(shots.obliquity), sine * np.cos(shots.azimuth), sine * np.sin(shots.azimuth)], axis=1)
+    yaw = np.arctan2(flight[:, 1], flight[:, 0]) + shots.yaw
+    pitch = np.arctan2(flight[:, 2], flight[:, 0]) + shots.pitch
+    axis = np.stack([np.ones(len(shots)), np.tan(yaw), np.tan(pitch)], axis=1)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    s = np.linspace(0.0, core.length, 4097)
+    ahead = core.mass_properties.centre_of_mass - s
+    across = np.sqrt(np.maximum(0.0, 1.0 - axis[:, :1] ** 2))
+    foremost = (ahead * axis[:, :1] + core.radius(s) * across).max(axis=1)
+    return flight, axis, -(foremost / flight[:, 0])[:, None] * flight
+
+
+def tilt_behind(
+    core: Core, thickness: float, standoff: float, flight: Array, state: tuple[Array, Array, Array, Array]
+) -> Array:
+    """Tilt [rad], shape [shots], when the centre of mass has passed a stand-off [m] in torque-free flight.
+
+    Args:
+        state: position, axis, velocity, angular momentum after contact, each of shape [shots, 3].
+    """
+    position, axis, velocity, momentum = state
+    time_of_flight = (thickness + standoff - position[:, 0]) / velocity[:, 0]
+    size = np.maximum(np.linalg.norm(momentum, axis=1, keepdims=True), 1e-30)
+    about = momentum / size
+    angle = size * time_of_flight[:, None] / core.mass_properties.inertia_transverse
+    along = (about * axis).sum(axis=1, keepdims=True) * about
+    then = along + np.cos(angle) * (axis - along) + np.sin(angle) * np.cross(about, axis)
+    return np.arctan2(np.linalg.norm(np.cross(then, flight), axis=1), (then * flight).sum(axis=1))
+
+
+def seconds(work: Callable[[], Any]) -> float:
+    """How long one call takes [s]."""
+    begin = time.perf_counter()
+    work()
+    return time.perf_counter() - begin
+
+
+@contextmanager
+def on_cores(count: int) -> Iterator[None]:
+    """This thread, and those it starts meanwhile, on `count` of the cores it may use."""
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, set(sorted(allowed)[:count]))
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0))
+
+
+def machine() -> dict[str, str | int]:
+    """What the figures were measured on, and when."""
+    names = [line.split(":", 1)[1].strip() for line in _cpuinfo() if line.startswith("model name")]
+    return {
+        "processor": names[0] if names else platform.processor(),
+        "cores": cores(),
+        "python": platform.python_version(),
+        "date": f"{datetime.now(UTC):%Y-%m-%d}",
+    }
+
+
+def _cpuinfo() -> list[str]:
+    path = Path("/proc/cpuinfo")
+    return path.read_text().splitlines() if path.exists() else []
+
+
+def store(name: str, values: dict[str, Any], figure: Any = None) -> None:
+    """Write results/NAME.json and, of a figure, results/NAME.png; say where."""
+    RESULTS.mkdir(exist_ok=True)
+    path = RESULTS / f"{name}.json"
+    path.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    print(path)
+    if figure is not None:
+        figure.savefig(path.with_suffix(".png"), dpi=130)
+        print(path.with_suffix(".png"))
