@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 CHECKOUT = Path(__file__).resolve().parents[2]
-if find_spec("warpimpact") is None:  # not installed: the checkout itself will do
-    sys.path.append(str(CHECKOUT))
-    import warpimpact
+sys.path.append(str(CHECKOUT))  # an installed warpimpact comes first; without one the checkout will do
 
+import warpimpact  # noqa: E402
+
+if find_spec("warpimpact.kernels") is None:
     warpimpact.__path__.append(str(CHECKOUT))  # kernels/ and campaigns/ install inside the package
 
 from warpimpact.scene import Core, Hits, Shots, make_shots  # noqa: E402

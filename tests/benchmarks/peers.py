@@ -12,7 +12,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numba
@@ -21,6 +21,7 @@ import numpy as np
 import numpy_peer
 import xarray
 from bench import CAMPAIGN, copied, cores, machine, on_cores, seconds, shots_of, store
+from floor import cpu_peak, work_of
 from matplotlib.figure import Figure
 
 from warpimpact import Campaign, Numerics, Shots
@@ -31,7 +32,7 @@ STATED = {"draft": (1.0, 3.0), "standard": (1.0, 1.0), "reference": (0.1, 0.3)}
 """What warpimpact's fidelities stand for: 90 % errors in m/s and degrees of tilt at the last stand-off."""
 SAME = (0.01, 0.01)
 """How far warpimpact's literal scheme in double precision and NumPy's may be apart: m/s and degrees, 90 %."""
-LITERAL_HITS = 128
+LITERAL_HITS, FLOOR_HITS = 128, 8
 TIMED = 0.5
 """Length of one timed run [s]."""
 ROUNDS = 3
@@ -92,6 +93,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(table(contenders, truth))
     for pair in ratios:
         print(f"{pair['warpimpact']} / {pair['peer']}: {pair['ratio']:.3g}")
+    floors = floors_of(campaign, contenders, shots[:FLOOR_HITS])
+    for one in floors:
+        print(
+            f"{one['warpimpact']}: {one['operations']:.3g} operations per hit, {one['above_floor']:.3g} times "
+            f"the floor at {one['peak']:.3g} operations/s"
+        )
     print(f"literal scheme, warpimpact against NumPy: {apart[0]:.2g} m/s and {apart[1]:.2g}° apart (90 %)")
     values = {
         "machine": machine() | {"numba": numba.__version__, "numpy": np.__version__},
@@ -99,6 +106,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "converged_answer_uncertain_by": _uncertainty(truth),
         "contenders": [one.summary() for one in contenders],
         "ratios": ratios,
+        "floors": floors,
         "literal_difference": apart,
     }
     store("peers", values, draw(contenders, truth))
@@ -222,6 +230,18 @@ def compare(contenders: Sequence[Contender]) -> list[dict[str, Any]]:
         for name, one in ours.items()
     ]
     return rivals + scaling
+
+
+def floors_of(campaign: Campaign, contenders: Sequence[Contender], shots: Shots) -> list[dict[str, Any]]:
+    """How many times longer the fidelities take than their arithmetic would at the machine's peak (floor.py)."""
+    peak = cpu_peak(cores())
+    found = []
+    for one in contenders:
+        if one.program == "warpimpact" and one.setting in STATED:
+            work = work_of(campaign, shots, Numerics(fidelity=one.setting))
+            above = peak / work.operations / one.rate
+            found.append({"warpimpact": one.setting, "peak": peak, "above_floor": above} | asdict(work))
+    return found
 
 
 def table(contenders: Sequence[Contender], truth: xarray.Dataset) -> str:

@@ -1,0 +1,160 @@
+"""warpimpact on a CUDA device: hits per second at every fidelity, how far above the floor, and the same answers as on
+the CPU.
+
+    python tests/benchmarks/gpu.py              # writes results/gpu.json and .png beside it
+
+Needs the checkout and warpimpact's dependencies, no installation. Exit code 1 where the device's answers are further
+from the CPU's than stated, 2 where there is no CUDA device.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from bench import CAMPAIGN, copied, machine, seconds, shots_of, store
+from floor import work_of
+from matplotlib.figure import Figure
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.scene import Numerics, Shots
+from warpimpact.simulate import DeviceError, Outcomes, find_device, simulate
+
+FIDELITIES = ("draft", "standard", "reference")
+SMALLEST, GROWTH = 1024, 4
+LONGEST = 4.0
+"""A fidelity's counts grow until a run takes so long [s]."""
+DISTINCT = 2**16
+"""Different hits in a run; beyond that they repeat."""
+SAME_HITS, FLOOR_HITS = 512, 16
+TOLERANCE = {"90 %": (0.005, 0.02), "max": (0.1, 0.5)}
+"""Differences from the CPU in single precision: residual velocity [m/s] and tilt at the last stand-off [°]. Sums in
+another order differ like single from double precision: 0.012 m/s and 0.04° at most over 6144 hits."""
+LANES = 128
+"""float32 lanes per multiprocessor, as on compute capability 8.6, 8.9, 9.0, 10 and 12; 64 on 7.x and 8.0."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure, print, store."""
+    arguments = _parser().parse_args(argv)
+    try:
+        device = find_device(arguments.device)
+    except DeviceError:
+        device = None
+    if device is None or not device.is_cuda:
+        print(f'gpu.py: error: device: got "{arguments.device}", but this needs a CUDA device', file=sys.stderr)
+        return 2
+    clock = arguments.clock or clock_of(device)
+    lanes = 64 if device.arch in (70, 72, 75, 80) else LANES
+    peak = 2.0 * lanes * device.sm_count * clock * 1e6
+    print(
+        f"{device.name}: {device.sm_count} multiprocessors × {lanes} lanes × 2 operations × {clock:g} MHz = "
+        f"{peak / 1e12:.3g} TFLOP/s assumed"
+    )
+    values = measure(Campaign.from_toml(CAMPAIGN), arguments.device, peak)
+    values |= {"device": device.name, "clock_mhz": clock, "multiprocessors": device.sm_count, "lanes": lanes}
+    values |= {"peak_operations_per_second": peak, "machine": machine()}
+    store("gpu", values, draw(values))
+    if not values["same"]:
+        print("the device's answers are further from the CPU's than stated", file=sys.stderr)
+    return 0 if values["same"] else 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description="warpimpact on a CUDA device: speed, floor, equality with the CPU")
+    parser.add_argument("--device", default="cuda:0", help="(default: cuda:0)")
+    parser.add_argument(
+        "--clock", type=float, metavar="MHZ", help="multiprocessor clock (default: nvidia-smi's highest)"
+    )
+    return parser
+
+
+def clock_of(device: Any) -> float:
+    """Highest clock of the multiprocessors [MHz]; exits where nvidia-smi cannot tell."""
+    query = ["--query-gpu=clocks.max.sm", "--format=csv,noheader,nounits", f"--id={device.pci_bus_id}"]
+    if shutil.which("nvidia-smi") is None:
+        sys.exit("gpu.py: error: there is no nvidia-smi to ask for the clock; give --clock")
+    return float(subprocess.run(["nvidia-smi", *query], check=True, capture_output=True, text=True).stdout)
+
+
+def measure(campaign: Campaign, device: str, peak: float) -> dict[str, Any]:
+    """All figures of a device that can do `peak` operations per second; printed as they come."""
+    values: dict[str, Any] = {"fidelities": {}, "tolerance": TOLERANCE, "same": True}
+    for name in FIDELITIES:
+        numerics = Numerics(fidelity=name)
+        work = work_of(campaign, shots_of(campaign, FLOOR_HITS), numerics)
+        rates = growth(campaign, numerics, device)
+        floor = peak / work.operations
+        differences = difference(campaign, numerics, device)
+        same = all((np.array(differences[key]) <= TOLERANCE[key]).all() for key in TOLERANCE)
+        best = max(rates.values())
+        print(f"{name}: {best:.4g} hits/s; the floor allows {floor:.3g}, {floor / best:.3g} times as many")
+        print(f"  floor: {work.steps:.3g} steps, {work.operations:.3g} operations per hit")
+        print(f"  against the CPU on {SAME_HITS} hits: {_told(differences)}: {'same' if same else 'NOT THE SAME'}")
+        values["fidelities"][name] = {
+            "hits_per_second": rates,
+            "floor_hits_per_second": floor,
+            "above_floor": floor / best,
+            "work": asdict(work),
+            "difference": differences,
+        }
+        values["same"] &= same
+    return values
+
+
+def growth(campaign: Campaign, numerics: Numerics, device: str) -> dict[int, float]:
+    """Hits per second of ever more hits."""
+    shots, rates, count, taken = shots_of(campaign, DISTINCT), {}, SMALLEST, 0.0
+    _simulate(campaign, shots[:SMALLEST], numerics, device)  # builds the kernels
+    while taken * GROWTH < LONGEST:
+        some = copied(shots, -(-count // DISTINCT))[:count]
+        taken = min(seconds(lambda some=some: _simulate(campaign, some, numerics, device)) for _ in range(2))
+        rates[count] = count / taken
+        print(f"  {numerics.fidelity}: {count} hits at {rates[count]:.4g} hits/s", flush=True)
+        count *= GROWTH
+    return rates
+
+
+def _simulate(campaign: Campaign, shots: Shots, numerics: Numerics, device: str) -> Outcomes:
+    scene = campaign.core, campaign.plate
+    return simulate(*scene, shots, numerics=numerics, standoffs=campaign.output.standoffs[-1:], device=device)
+
+
+def difference(campaign: Campaign, numerics: Numerics, device: str) -> dict[str, tuple[float, float]]:
+    """Residual velocity [m/s] and tilt [°] on a device against the CPU; infinite where a status differs."""
+    shots = shots_of(campaign, SAME_HITS)
+    there, here = (_simulate(campaign, shots, numerics, name) for name in (device, "cpu"))
+    off = np.stack([there.residual_velocity - here.residual_velocity, np.degrees(there.tilt - here.tilt)[:, -1]])
+    off = np.abs(np.where(there.status == here.status, off, np.inf))
+    return {"90 %": tuple(np.quantile(off, 0.9, axis=1).tolist()), "max": tuple(off.max(axis=1).tolist())}
+
+
+def _told(differences: dict[str, tuple[float, float]]) -> str:
+    return ", ".join(f"{key} {one:.2g} m/s and {other:.2g}°" for key, (one, other) in differences.items())
+
+
+def draw(values: dict[str, Any]) -> Figure:
+    """Hits per second against hits, with the floors."""
+    figure = Figure(figsize=(7.5, 5), layout="constrained")
+    axes = figure.subplots()
+    for name, colour in zip(FIDELITIES, ("#009E73", "#0072B2", "#D55E00"), strict=True):
+        found = values["fidelities"][name]
+        axes.plot(
+            list(found["hits_per_second"]), list(found["hits_per_second"].values()), "o-", color=colour, label=name
+        )
+        axes.axhline(found["floor_hits_per_second"], color=colour, linestyle=":")
+    axes.set(xscale="log", yscale="log", xlabel="hits", ylabel="hits per second")
+    axes.grid(color="0.9")
+    axes.legend(title="dotted: what its arithmetic allows")
+    figure.suptitle(f"Slotted plate; {values['device']}, {values['machine']['date']}")
+    return figure
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,190 @@
+"""What a campaign costs besides the march: start, compilation, file, memory; and what its cost depends on.
+
+    python tests/benchmarks/overheads.py --largest 1000000    # writes results/overheads.json and .png beside it
+
+The commands are run as a user runs them. Nothing here fails for being slow; the targets stand beside the figures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from bench import CAMPAIGN, machine, seconds, shots_of, store
+from matplotlib.figure import Figure
+
+from warpimpact import Campaign, Plate, Shots, results
+from warpimpact.campaign.run import run
+from warpimpact.simulate import simulate
+
+COMMAND = [sys.executable, "-c", "import sys; from warpimpact.cli import main; sys.exit(main())"]
+TARGETS = {"help_seconds": 0.3, "warm_run_seconds": 2.0, "compilation_seconds": 5.0, "file_share": 0.1}
+SMALLEST, PER_DECADE = 1000, 2
+PLATE_SIDES = (0.1, 0.3, 1.0, 3.0, 10.0)  # [m]
+YAWS = (0.0, 15.0, 30.0, 60.0, 80.0)  # [°], of one shot among many, which widens the window of all
+SCENE_HITS = 1024
+REPEATS = 3
+
+
+class Usage(NamedTuple):
+    """Of one finished command: time on the clock [s], and the most memory it held [bytes]."""
+
+    seconds: float
+    peak_memory: int
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Measure, print, store."""
+    arguments = _parser().parse_args(argv)
+    campaign = Campaign.from_toml(CAMPAIGN)
+    values: dict[str, Any] = {"machine": machine()}
+    with tempfile.TemporaryDirectory() as folder:
+        values |= _starts(Path(folder))
+        values["hits"] = _hits(Path(folder), arguments.largest)
+        values["file_share"] = _file_share(campaign, Path(folder), arguments.largest)
+    straight = _shots(campaign, 0.0)
+    values["plate_side"] = _rates(campaign, {side: (_sized(campaign.plate, side), straight) for side in PLATE_SIDES})
+    values["widest_yaw"] = _rates(campaign, {yaw: (campaign.plate, _shots(campaign, yaw)) for yaw in YAWS})
+    for name, target in TARGETS.items():
+        print(f"{name}: {values[name]:.3g} (target: below {target:g})")
+    for row in values["hits"]:
+        print(f"{row['count']} hits: {row['hits_per_second']:.4g} hits/s, {row['peak_memory'] / 2**20:.0f} MiB at most")
+    for name in ("plate_side", "widest_yaw"):
+        rates = ", ".join(f"{key:g}: {rate:.4g}" for key, rate in values[name].items())
+        print(f"hits/s by {name}: {rates}")
+    store("overheads", values, draw(values))
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        description="what a campaign costs besides the march, and what its cost depends on"
+    )
+    parser.add_argument("--largest", type=int, default=30_000, metavar="N", help="hits at most (default: 30000)")
+    return parser
+
+
+def command(*arguments: str, **environment: str) -> Usage:
+    """Run the warpimpact command to its end."""
+    begin = time.perf_counter()
+    child = subprocess.Popen(
+        [*COMMAND, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ | environment
+    )
+    assert child.stderr is not None
+    complaint = child.stderr.read()
+    _, status, usage = os.wait4(child.pid, 0)
+    child.returncode = os.waitstatus_to_exitcode(status)  # waited for here, to learn of its memory
+    if child.returncode:
+        raise RuntimeError(f"warpimpact {' '.join(arguments)}: {complaint.decode()}")
+    return Usage(time.perf_counter() - begin, 1024 * usage.ru_maxrss)
+
+
+def _run(folder: Path, count: int, **environment: str) -> Usage:
+    output = str(folder / "result.nc")
+    return command("run", str(CAMPAIGN), "-o", output, "--overwrite", f"--count={count}", "--device=cpu", **environment)
+
+
+def _starts(folder: Path) -> dict[str, float]:
+    """Time of --help, of a run of 100 hits with kernels built, and what building them adds [s]."""
+    warm = min(_run(folder, 100).seconds for _ in range(REPEATS + 1))  # the first may build them
+    cold = _run(folder, 100, WARP_CACHE_PATH=str(folder / "kernels")).seconds
+    return {
+        "help_seconds": min(command("--help").seconds for _ in range(REPEATS)),
+        "warm_run_seconds": warm,
+        "compilation_seconds": cold - warm,
+    }
+
+
+def _hits(folder: Path, largest: int) -> list[dict[str, float]]:
+    """Whole commands with growing numbers of hits."""
+    rows = []
+    smallest = min(SMALLEST, largest)
+    for count in np.geomspace(smallest, largest, 1 + math.ceil(PER_DECADE * math.log10(largest / smallest))).astype(
+        int
+    ):
+        usage = _run(folder, int(count))
+        with results.read(folder / "result.nc") as dataset:
+            computing = dataset.attrs["compute_time"]
+        rows.append(
+            {
+                "count": int(count),
+                "seconds": usage.seconds,
+                "compute_seconds": computing,
+                "hits_per_second": count / computing,
+                "peak_memory": usage.peak_memory,
+            }
+        )
+    return rows
+
+
+def _file_share(campaign: Campaign, folder: Path, count: int) -> float:
+    """Share of a run that writing its file takes."""
+    campaign = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
+    begin = time.perf_counter()
+    dataset = run(campaign, device="cpu")
+    writing = seconds(lambda: results.write(dataset, folder / "share.nc"))
+    return writing / (time.perf_counter() - begin)
+
+
+def _sized(plate: Plate, side: float) -> Plate:
+    return plate.model_copy(update={"size": (side, side)})
+
+
+def _shots(campaign: Campaign, yaw: float) -> Shots:
+    """SCENE_HITS shots, the last one yawed [°]."""
+    shots = shots_of(campaign, SCENE_HITS)
+    yaws = shots.yaw.copy()
+    yaws[-1] = np.radians(yaw)
+    return Shots(**(vars(shots) | {"yaw": yaws}))
+
+
+def _rates(campaign: Campaign, scenes: dict[float, tuple[Plate, Shots]]) -> dict[float, float]:
+    """Best hits per second of scenes that take turns."""
+    rates = dict.fromkeys(scenes, 0.0)
+    for _ in range(REPEATS):
+        for name, (plate, shots) in scenes.items():
+
+            def march(plate: Plate = plate, shots: Shots = shots) -> None:
+                simulate(campaign.core, plate, shots, numerics=campaign.numerics, device="cpu")
+
+            rates[name] = max(rates[name], len(shots) / seconds(march))
+    return rates
+
+
+def draw(values: dict[str, Any]) -> Figure:
+    """Rate and memory against hits, rate against plate and window."""
+    figure = Figure(figsize=(11, 7), layout="constrained")
+    panels = figure.subplots(2, 2).flat
+    count = [row["count"] for row in values["hits"]]
+    curves = [
+        (count, {"march": [row["hits_per_second"] for row in values["hits"]]}, "hits"),
+        (count, {"memory": [row["peak_memory"] / 2**20 for row in values["hits"]]}, "hits"),
+        (list(values["plate_side"]), {"march": list(values["plate_side"].values())}, "side of the plate [m]"),
+        (list(values["widest_yaw"]), {"march": list(values["widest_yaw"].values())}, "yaw of one shot in 1024 [°]"),
+    ]
+    curves[0][1]["whole command"] = [row["count"] / row["seconds"] for row in values["hits"]]
+    for axes, (x, lines, label) in zip(panels, curves, strict=True):
+        for name, y in lines.items():
+            axes.plot(x, y, "o-", label=name)
+        axes.set(xlabel=label, ylabel="largest memory [MiB]" if "memory" in lines else "hits per second")
+        axes.set_xscale("linear" if "yaw" in label else "log")
+        axes.set_ylim(0.0, 1.15 * max(max(y) for y in lines.values()))
+        axes.grid(color="0.9")
+        if len(lines) > 1:
+            axes.legend()
+    what = values["machine"]
+    figure.suptitle(f"Slotted plate, standard fidelity; {what['processor']}, {what['cores']} cores, {what['date']}")
+    return figure
+
+
+if __name__ == "__main__":
+    sys.exit(main())
