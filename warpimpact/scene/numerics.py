@@ -1,14 +1,22 @@
 """How finely and by which scheme a shot is computed."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from .model import Model
 from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime
 
 
-class Tolerance(Model):
+class _AsGiven(Model):
+    """A model in which giving a key says something: only what was given is written."""
+
+    @model_serializer(mode="wrap")
+    def _given(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        return {name: value for name, value in write(self).items() if name in self.model_fields_set}
+
+
+class Tolerance(_AsGiven):
     """What an outcome may be off by; what is not given does not count.
 
     Attributes:
@@ -26,7 +34,7 @@ class Tolerance(Model):
         return self
 
 
-class Numerics(Model):
+class Numerics(_AsGiven):
     """A fidelity, and single settings that go before it; what is None follows from fidelity and scheme.
 
     Attributes:
