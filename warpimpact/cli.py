@@ -150,7 +150,7 @@ def _add_device(parser: argparse.ArgumentParser) -> None:
 
 def _run(arguments: argparse.Namespace) -> None:
     from . import results
-    from .analysis.summary import summary_text
+    from .analysis.summary import summary_text, symmetry_text
     from .campaign.campaign import Campaign, CampaignError
     from .campaign.run import run
 
@@ -164,6 +164,8 @@ def _run(arguments: argparse.Namespace) -> None:
         raise CampaignError(f"{arguments.campaign}: {error}") from None
     results.write(dataset, output)
     print(summary_text(dataset))
+    if "symmetries" in dataset.attrs:
+        print(symmetry_text(dataset))
     print(f"{dataset.attrs['hits_per_second']:.4g} hits per second on {dataset.attrs['device']}")
     print(f"written to {output}")
 

@@ -72,6 +72,14 @@ def summary_text(dataset: xarray.Dataset) -> str:
     return "\n".join(rows)
 
 
+def symmetry_text(dataset: xarray.Dataset) -> str:
+    """How many hits of a map with `hits.irreducible` were computed, and where the others come from."""
+    computed, hits = dataset.attrs["computed_hits"], dataset.sizes["hit"]
+    if computed == hits:
+        return f"all {hits} hits computed: plate and shot have no symmetry in common"
+    return f"{computed} of {hits} hits computed, the others are their images by {dataset.attrs['symmetries']}"
+
+
 def _count_row(meaning: str, count: int, hits: int) -> str:
     return f"{meaning.replace('_', ' '):<20}{count:>8d}   {count / hits:.1%}"
 

@@ -15,16 +15,19 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.discretisation import Fidelity
 from warpimpact.refine import level
 from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, ResultError, history_dataset, to_dataset
-from warpimpact.scene import Numerics, make_shots
+from warpimpact.scene import Numerics, make_shots, symmetries_used
+from warpimpact.unfold import image_of
 
 ROUNDING = {"residual_velocity": 0.1, "deflection": 0.5, "tilt": 0.5}
 """How far another device's rounding may move an outcome [m/s, degree]. Between single and double precision, 6144
 hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
-_OF_A_MAP = ("count", "compute_time", "hits_per_second")
+_OF_A_MAP = ("count", "compute_time", "hits_per_second", "computed_hits")
 
 
 def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     """Compute one hit of a result again, on the CPU, from the campaign that the result carries.
+
+    Of a hit unfolded by symmetry, the hit that was computed for it is computed again, and its history unfolded.
 
     Args:
         result: the Dataset of `run`.
@@ -47,16 +50,19 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
     if len(shots) != hits:
         raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(shots)}")
-    shot = shots[hit : hit + 1]
+    group = symmetries_used(campaign.impact, campaign.hits, campaign.plate)
+    shot, computed = shots[hit : hit + 1], shots[hit - hit % len(group) :][:1]
     again = simulate.replay(
         campaign.core,
         campaign.plate,
-        shot,
+        computed,
         interaction=campaign.interaction,
         numerics=_numerics(campaign, result, hit),
         standoffs=list(campaign.output.standoffs),
         standoff_point=campaign.output.standoff_point,
     )
+    home, image = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
+    again = image_of(again, group[hit % len(group)], home=home, image=image)
     reach = [(float(cells.min()), float(cells.max())) for cells in (again.cell_y, again.cell_z)]
     end = to_dataset(
         shot,

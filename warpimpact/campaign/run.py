@@ -18,15 +18,16 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.discretisation import resolve
 from warpimpact.refine import LADDER, Estimates, simulate_to_tolerance
 from warpimpact.results import to_dataset
-from warpimpact.scene import Shots, make_shots
+from warpimpact.scene import Shots, Symmetry, make_shots, symmetries_used
 from warpimpact.simulate import Outcomes, Progress, find_device, simulate
+from warpimpact.unfold import unfolded, unfolded_estimates
 
 BATCH = 2**18
 """Shots per call of `simulate`, so that what the device holds does not grow with the campaign."""
 
 
 def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None = None) -> xarray.Dataset:
-    """Compute every hit of a campaign.
+    """Compute every hit of a campaign, or those of the irreducible part of its unit cell and from them the others.
 
     Args:
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
@@ -42,13 +43,15 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None =
     chosen = find_device(device)
     _check_memory(campaign)
     shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
+    group = symmetries_used(campaign.impact, campaign.hits, campaign.plate)
+    computed = shots[:: len(group)]
     begin = time.perf_counter()
-    outcomes, estimates = _in_batches(campaign, shots, str(chosen), progress or (lambda done, total: None))
+    outcomes, estimates = _in_batches(campaign, computed, str(chosen), progress or (lambda done, total: None))
     elapsed = time.perf_counter() - begin
     period = campaign.plate.sampled_cell
     return to_dataset(
         shots,
-        outcomes,
+        unfolded(outcomes, group),
         standoffs=np.array(campaign.output.standoffs),
         outlines=campaign.plate.pattern.outlines(*((-0.5 * side, 0.5 * side) for side in period)),
         period=period,
@@ -65,11 +68,17 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None =
             "areal_density": campaign.plate.areal_density,
             "numerics": _numerics(campaign),
             "compute_time": elapsed,
-            "hits_per_second": len(shots) / elapsed,
+            "hits_per_second": len(computed) / elapsed,
         }
-        | ({} if campaign.hits.count is None else {"count": campaign.hits.count}),
-        estimates=estimates,
+        | ({} if campaign.hits.count is None else {"count": campaign.hits.count})
+        | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {}),
+        estimates=None if estimates is None else unfolded_estimates(estimates, group),
     )
+
+
+def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
+    """By which symmetries hits were unfolded, and how many were computed."""
+    return {"symmetries": ", ".join(map(str, group)), "computed_hits": computed}
 
 
 def _check_memory(campaign: Campaign) -> None:

@@ -14,9 +14,11 @@ from .patterns import (
     TrianglePattern,
 )
 from .plate import Plate
-from .shots import Hits, Impact, Shots, make_shots
+from .shots import Hits, Impact, Shots, make_shots, symmetries_used
+from .symmetry import IDENTITY, Symmetry
 
 __all__ = [
+    "IDENTITY",
     "AnyCore",
     "AnyPattern",
     "CirclePattern",
@@ -37,7 +39,9 @@ __all__ = [
     "ProfileCore",
     "Shots",
     "SlotPattern",
+    "Symmetry",
     "Tolerance",
     "TrianglePattern",
     "make_shots",
+    "symmetries_used",
 ]

@@ -19,6 +19,7 @@ Range = tuple[float, float]
 
 _MASK_LIMIT = 4096  # cells along one side; 16 million in all
 _ARC = np.linspace(0.0, np.pi, 33)
+_WITHIN = (np.arange(64) + 1.0 / np.e) / 64  # irrational, so that no probe lies on the edge of a hole of round numbers
 
 
 class Pattern(Model, ABC):
@@ -37,6 +38,12 @@ class Pattern(Model, ABC):
     @abstractmethod
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
+
+    @property
+    @abstractmethod
+    def probes(self) -> tuple[Array, Array]:
+        """Coordinates y and z [m] of a rectangular grid of points, none on an edge: two patterns of the kind and
+        period that have a hole at the same ones of them are the same."""
 
     @abstractmethod
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
@@ -61,6 +68,11 @@ class NoPattern(Pattern):
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         """False everywhere, of the broadcast shape of y and z."""
         return np.zeros(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
+
+    @property
+    def probes(self) -> tuple[Array, Array]:
+        """The origin: all points are alike."""
+        return np.zeros(1), np.zeros(1)
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """There are none."""
@@ -122,6 +134,14 @@ class LatticePattern(Pattern):
         shift = self._shift(row)
         column = np.round((z - middle_z - shift) / b)
         return self._in_hole(y - row * a, z - shift - column * b)
+
+    @property
+    def probes(self) -> tuple[Array, Array]:
+        """Coordinates y and z [m] of a grid as fine as the hole needs, over the holes of two rows."""
+        low, high = self._bounding_box
+        y, z = (low + _WITHIN[:, None] * (high - low)).T
+        shift = float(self._shift(np.array(1)))
+        return np.concatenate([y, y + self.spacing[0]]), np.concatenate([z, z + shift])
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """Closed outlines, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
@@ -276,6 +296,12 @@ class MaskPattern(Pattern):
             for coordinate, cells in zip((y, z), self.material.shape, strict=True)
         )
         return ~self.material[i, j]
+
+    @property
+    def probes(self) -> tuple[Array, Array]:
+        """Coordinates y and z [m] of two points in every row and column of cells, and in every half of one."""
+        y, z = ((np.arange(2 * cells) + 0.5 - cells) * (0.5 * self.cell_size) for cells in self.material.shape)
+        return y, z
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """Closed outlines, each of shape [points, 2] [m], of holes cut off at a rectangle."""

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from .files import InputFile, read_table
 from .model import Array, Model
 from .plate import Plate
+from .symmetry import IDENTITY, Symmetry, irreducible_part, symmetries
 from .units import Angle, AngularVelocity, PositiveSpeed
 
 _RIGHT_ANGLE = np.pi / 2
@@ -58,16 +59,19 @@ class Hits(Model):
         count: how many; a grid takes the most that a rectangle of nearly square cells gives.
         seed: of a sobol or random sampling.
         file: CSV file of a list, with the header hit_y,hit_z in metres.
+        irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
+            each hit there with its images, as many in all as `count` holds, or one hit's.
     """
 
     sampling: Literal["sobol", "grid", "random", "list"] = "sobol"
     count: Annotated[int, Field(strict=True, ge=1, le=2**30)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     file: InputFile | None = None
+    irreducible: Annotated[bool, Field(strict=True)] = False
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
-        needed, foreign = ("file", {"count", "seed"}) if self.sampling == "list" else ("count", {"file"})
+        needed, foreign = ("file", {"count", "seed", "irreducible"}) if self.sampling == "list" else ("count", {"file"})
         if getattr(self, needed) is None:
             raise ValueError(f'got sampling = "{self.sampling}" without {needed}, which it needs')
         for name in sorted(foreign):
@@ -149,8 +153,24 @@ class Shots:
         return type(self)(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
+def symmetries_used(impact: Impact, hits: Hits, plate: Plate) -> tuple[Symmetry, ...]:
+    """Symmetries by which the hits are images of each other; the identity alone where none is asked for or there."""
+    return symmetries(plate, impact) if hits.irreducible else (IDENTITY,)
+
+
 def make_shots(impact: Impact, hits: Hits, plate: Plate) -> Shots:
-    """Shots at the hit points over one unit cell of the plate, or over all of a plate smaller than that."""
-    hit_y, hit_z = hits.points(plate.sampled_cell)
+    """Shots at the hit points over one unit cell of the plate, or over all of a plate smaller than that.
+
+    With hits.irreducible each shot is followed by its images under `symmetries_used`, the first of which it is itself.
+    """
+    cell, group = plate.sampled_cell, symmetries_used(impact, hits, plate)
+    if hits.count is not None:
+        hits = hits.model_copy(update={"count": max(1, hits.count // len(group))})
+    part = irreducible_part(group)
+    extent_y, extent_z = (side * (high - low) for side, (low, high) in zip(cell, part, strict=True))
+    middle_y, middle_z = (0.5 * side * (high + low) for side, (low, high) in zip(cell, part, strict=True))
+    hit_y, hit_z = hits.points((extent_y, extent_z))
+    images = np.array([symmetry.image(hit_y + middle_y, hit_z + middle_z, cell) for symmetry in group])
+    hit_y, hit_z = images.transpose(1, 2, 0).reshape(2, -1)
     alike = {name: np.full(len(hit_y), value) for name, value in impact}
     return Shots(hit_y=hit_y, hit_z=hit_z, **alike)

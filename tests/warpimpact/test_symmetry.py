@@ -1,0 +1,205 @@
+"""Symmetries of plate and shot: those that are there, no others, and the part of the cell that they leave over."""
+
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from warpimpact.scene import (
+    CirclePattern,
+    Hits,
+    Impact,
+    MaskPattern,
+    NoPattern,
+    Pattern,
+    Plate,
+    SlotPattern,
+    Symmetry,
+    TrianglePattern,
+    make_shots,
+    symmetries_used,
+)
+from warpimpact.scene.symmetry import IDENTITY, SYMMETRIES, irreducible_part, symmetries
+
+MM = 1e-3
+HITS = Hits(count=1024, irreducible=True)
+STRAIGHT = Impact(velocity=825)
+SLOTS = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
+ROWS = SLOTS.model_copy(update={"staggered": False})
+HOLES = CirclePattern(diameter="9 mm", spacing=["12.5 mm", "21.65 mm"], staggered=True)
+TRIANGLES = TrianglePattern(side="6 mm", spacing=["7 mm", "5.5 mm"], staggered=True)
+SPECKS = TrianglePattern(side="5 um", spacing=["7 mm", "5.5 mm"])  # holes that a grid over the cell would miss
+
+
+def plate(pattern: Pattern, **changes: Any) -> Plate:
+    return Plate(**{"thickness": 4 * MM, "resistance": 2.6e9, "pattern": pattern} | changes)
+
+
+def found(plate: Plate, impact: Impact = STRAIGHT) -> set[str]:
+    return {str(symmetry) for symmetry in symmetries(plate, impact)}
+
+
+def centred(*names: str) -> set[str]:
+    return {*names, *(f"{name} + centring" for name in names)}
+
+
+ALL = ("(y, z)", "(-y, z)", "(y, -z)", "(-y, -z)")
+
+
+@pytest.mark.parametrize(
+    ("scene", "expected"),
+    [
+        (plate(SLOTS), centred(*ALL)),
+        (plate(HOLES), centred(*ALL)),
+        (plate(NoPattern()), centred(*ALL)),
+        (plate(ROWS), {*ALL}),
+        (plate(TRIANGLES), centred("(y, z)", "(-y, z)")),
+        (plate(SPECKS), {"(y, z)", "(-y, z)"}),
+        (plate(SLOTS, size=[40 * MM, 40 * MM]), {*ALL}),
+        (plate(TRIANGLES, size=[40 * MM, 4 * MM]), {"(y, z)", "(-y, z)"}),
+    ],
+    ids=["slots", "holes", "solid", "rows", "triangles", "specks", "slots with a rim", "triangles with a rim"],
+)
+def test_of_a_plate(scene: Plate, expected: set[str]) -> None:
+    assert found(scene) == expected
+
+
+@pytest.mark.parametrize(
+    ("impact", "expected"),
+    [
+        ({"obliquity": "20 deg", "azimuth": "0 deg"}, centred("(y, z)", "(y, -z)")),
+        ({"obliquity": "20 deg", "azimuth": "180 deg"}, centred("(y, z)", "(y, -z)")),
+        ({"obliquity": "20 deg", "azimuth": "90 deg"}, centred("(y, z)", "(-y, z)")),
+        ({"obliquity": "20 deg", "azimuth": "35 deg"}, centred("(y, z)")),
+        ({"azimuth": "35 deg"}, centred(*ALL)),
+        ({"pitch": "1 deg"}, centred("(y, z)", "(-y, z)")),
+        ({"yaw": "1 deg"}, centred("(y, z)", "(y, -z)")),
+        ({"pitch": "1 deg", "yaw": "1 deg"}, centred("(y, z)")),
+        ({"spin": 1e4}, centred("(y, z)", "(-y, -z)")),
+        ({"spin": 1e4, "pitch": "1 deg"}, centred("(y, z)")),
+        ({"obliquity": "20 deg", "azimuth": "90 deg", "pitch": "-1 deg"}, centred("(y, z)", "(-y, z)")),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_of_a_shot(impact: dict[str, Any], expected: set[str]) -> None:
+    assert found(plate(SLOTS), Impact(velocity=825, **impact)) == expected
+
+
+def mask(folder: Path, material: np.ndarray) -> Plate:
+    np.save(folder / "mask.npy", material.astype(np.uint8))
+    return plate(MaskPattern(file=folder / "mask.npy", cell_size=0.25 * MM))
+
+
+@pytest.mark.parametrize("sides", [(12, 16), (13, 16), (13, 17)])
+def test_of_a_mask_are_those_of_its_cells(tmp_path: Path, sides: tuple[int, int]) -> None:
+    blank = np.ones(sides)
+    blank[3:-3, 5:-5] = 0
+    assert found(mask(tmp_path, blank)) == {*ALL}
+    for notch, expected in (
+        ([(3, 5)], {"(y, z)"}),
+        ([(3, 5), (-4, -6)], {"(y, z)", "(-y, -z)"}),
+        ([(3, 5), (-4, 5)], {"(y, z)", "(-y, z)"}),
+        ([(3, 5), (3, -6)], {"(y, z)", "(y, -z)"}),
+    ):
+        notched = blank.copy()
+        for cell in notch:
+            notched[cell] = 1
+        assert found(mask(tmp_path, notched)) == expected
+
+
+def test_a_mask_may_be_centred_or_glide(tmp_path: Path) -> None:
+    material = np.ones((12, 16))
+    material[1:3, 6:10] = 0
+    material[7:9, [14, 15, 0, 1]] = 0  # the hole again, half a cell on along both sides
+    assert found(mask(tmp_path, material)) == centred("(y, z)", "(y, -z)")
+    material[1, 6] = material[7, 14] = 1
+    assert found(mask(tmp_path, material)) == centred("(y, z)")
+    material[7, 14], material[7, 1] = 0, 1
+    assert found(mask(tmp_path, material)) == {"(y, z)", "(y, -z) + centring"}
+
+
+def groups() -> list[tuple[Symmetry, ...]]:
+    """Every group that symmetries can form."""
+
+    def after(one: Symmetry, other: Symmetry) -> Symmetry:
+        return Symmetry(one.along_y * other.along_y, one.along_z * other.along_z, one.centred != other.centred)
+
+    subsets = (s for n in (1, 2, 4, 8) for s in combinations(SYMMETRIES, n))
+    return [s for s in subsets if all(after(a, b) in s for a in s for b in s)]
+
+
+def test_there_are_16_groups() -> None:
+    assert len(groups()) == 16
+
+
+@pytest.mark.parametrize("group", groups(), ids=lambda group: ", ".join(map(str, group)))
+def test_images_of_the_irreducible_part_cover_the_cell_once(group: tuple[Symmetry, ...]) -> None:
+    cell = (16 * MM, 9 * MM)
+    y, z = np.random.default_rng(3).uniform(-0.5, 0.5, (2, 500)) * np.array(cell)[:, None]
+    (low_y, high_y), (low_z, high_z) = irreducible_part(group)
+    times = np.zeros(500, dtype=int)
+    for symmetry in group:
+        at_y, at_z = symmetry.image(y, z, cell)
+        assert (np.abs(at_y) <= 0.5 * cell[0]).all()
+        assert (np.abs(at_z) <= 0.5 * cell[1]).all()
+        across, along = at_y / cell[0], at_z / cell[1]
+        times += (low_y < across) & (across < high_y) & (low_z < along) & (along < high_z)
+    assert (times == 1).all()
+
+
+@pytest.mark.parametrize("pattern", [SLOTS, TRIANGLES], ids=["slots", "triangles"])
+def test_images_of_a_hit_see_the_plate_alike(pattern: Pattern) -> None:
+    scene = plate(pattern)
+    group = symmetries_used(STRAIGHT, HITS, scene)
+    shots = make_shots(STRAIGHT, HITS, scene)
+    assert len(shots) == 1024
+    solid = scene.is_solid(shots.hit_y, shots.hit_z).reshape(-1, len(group))
+    assert 0.0 < solid.mean() < 1.0
+    assert (solid == solid[:, :1]).all()
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "random"])
+def test_hits_come_in_whole_orbits(sampling: str) -> None:
+    for count, expected in ((1024, 1024), (1023, 1016), (3, 8)):
+        hits = Hits(sampling=sampling, count=count, irreducible=True)
+        shots = make_shots(STRAIGHT, hits, plate(SLOTS))
+        assert len(shots) == expected
+        points = np.round(np.column_stack([shots.hit_y, shots.hit_z]) / MM, 9)
+        assert len(np.unique(points, axis=0)) == expected
+
+
+def test_sobol_hits_fill_the_cell_evenly() -> None:
+    shots = make_shots(STRAIGHT, HITS, plate(SLOTS))
+    boxes = np.histogram2d(shots.hit_y, shots.hit_z, bins=16, range=[[-8 * MM, 8 * MM]] * 2)[0]
+    assert (boxes == 4).all()
+
+
+def test_a_grid_is_the_grid_of_the_whole_cell() -> None:
+    part, whole = (
+        make_shots(STRAIGHT, Hits(sampling="grid", count=256, irreducible=irreducible), plate(SLOTS))
+        for irreducible in (True, False)
+    )
+    points = [np.column_stack([shots.hit_y, shots.hit_z]) for shots in (part, whole)]
+    in_order = [np.array(sorted(map(tuple, np.round(one / MM, 6)))) for one in points]
+    # Sixteen by sixteen either way: 32 of them, 4 by 8, lie in the part of 4 mm by 8 mm.
+    np.testing.assert_array_equal(*in_order)
+
+
+def test_without_a_symmetry_the_hits_are_the_plain_ones() -> None:
+    skew, rimmed = Impact(velocity=825, pitch=0.1, yaw=0.1), plate(SLOTS, size=[40 * MM, 40 * MM])
+    plain = make_shots(skew, HITS.model_copy(update={"irreducible": False}), rimmed)
+    assert symmetries_used(skew, HITS, rimmed) == (IDENTITY,)
+    asked = make_shots(skew, HITS, rimmed)
+    np.testing.assert_array_equal(asked.hit_y, plain.hit_y)
+    np.testing.assert_array_equal(asked.hit_z, plain.hit_z)
+
+
+def test_a_list_has_no_irreducible_part(tmp_path: Path) -> None:
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0,0\n")
+    with pytest.raises(ValidationError, match='got irreducible beside sampling = "list", which takes none'):
+        Hits(sampling="list", file=tmp_path / "hits.csv", irreducible=True)
+    with pytest.raises(ValidationError, match="valid boolean"):
+        Hits(count=3, irreducible="yes")

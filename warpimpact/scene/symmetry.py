@@ -1,0 +1,100 @@
+"""Symmetry: the mirror images and shifts under which plate and shot both stay as they are."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .model import Array
+from .plate import Plate
+
+if TYPE_CHECKING:
+    from .shots import Impact
+
+_ROUNDING = 1e-12
+"""A component of the unit vector along the line of flight, or an angle [rad], below this is none: cos 90° is 6e-17."""
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """The map (y, z) → (along_y·y, along_z·z) of the plate plane, then half a unit cell along both if `centred`.
+
+    Attributes:
+        along_y, along_z: 1, or −1 for a mirror image; both −1 are a half turn about the plate normal.
+        centred: whether the centring translation of the lattice follows.
+    """
+
+    along_y: int
+    along_z: int
+    centred: bool
+
+    def __str__(self) -> str:
+        """Such as "(-y, z)" or "(y, z) + centring"."""
+        signs = {1: "", -1: "-"}
+        return f"({signs[self.along_y]}y, {signs[self.along_z]}z)" + (" + centring" if self.centred else "")
+
+    @property
+    def polar(self) -> Array:
+        """Factors of the components of a polar vector (position, velocity, force), shape [3]."""
+        return np.array([1.0, self.along_y, self.along_z])
+
+    @property
+    def axial(self) -> Array:
+        """Factors of the components of an axial vector (angular velocity, moment), shape [3]."""
+        return self.along_y * self.along_z * self.polar
+
+    def image(self, y: Array, z: Array, cell: tuple[float, float]) -> tuple[Array, Array]:
+        """Images of points of a unit cell centred on the origin, in the same cell [m].
+
+        Args:
+            y, z: the points [m].
+            cell: extent of the cell along y and z [m].
+        """
+        y, z = self.along_y * y, self.along_z * z
+        return (y - np.copysign(0.5 * cell[0], y), z - np.copysign(0.5 * cell[1], z)) if self.centred else (y, z)
+
+
+SYMMETRIES = tuple(Symmetry(y, z, centred) for y, z, centred in product((1, -1), (1, -1), (False, True)))
+"""All that a scene may have; the first leaves everything where it is. Those that a scene has form a group."""
+IDENTITY = SYMMETRIES[0]
+
+
+def symmetries(plate: Plate, impact: "Impact") -> tuple[Symmetry, ...]:
+    """Those of SYMMETRIES, in their order, that plate and shot both have."""
+    return tuple(s for s in SYMMETRIES if s == IDENTITY or (_of_shot(s, impact) and _of_plate(s, plate)))
+
+
+def _of_shot(symmetry: Symmetry, impact: "Impact") -> bool:
+    """Whether the image of the shot, but for where it hits, is the shot itself."""
+    across = math.sin(impact.obliquity)
+    of_y = across * math.cos(impact.azimuth), impact.yaw
+    of_z = across * math.sin(impact.azimuth), impact.pitch
+    turned = [*(of_y if symmetry.along_y < 0 else ()), *(of_z if symmetry.along_z < 0 else ())]
+    keeps_spin = symmetry.along_y * symmetry.along_z > 0  # spin is an axial vector along the core
+    return all(abs(value) < _ROUNDING for value in turned) and (keeps_spin or impact.spin == 0.0)
+
+
+def _of_plate(symmetry: Symmetry, plate: Plate) -> bool:
+    """Whether the image of the plate is the plate itself."""
+    if plate.size is not None and symmetry.centred:
+        return False  # a plate with a rim has no translation
+    y, z = plate.pattern.probes
+    there = symmetry.image(y[:, None], z, plate.pattern.period)
+    return np.array_equal(plate.pattern.is_hole(*there), plate.pattern.is_hole(y[:, None], z))
+
+
+def irreducible_part(group: Sequence[Symmetry]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """A part of the unit cell of which the images under a group cover the cell once: ((low, high) along y, along z).
+
+    Both are shares of the extent of the cell, from its middle. Along y what the group does to y counts; what leaves
+    y alone, the identity and perhaps the mirror image in z, divides the cell along z.
+    """
+    actions_y = {(s.along_y, s.centred) for s in group}
+    mirrored_z = any((s.along_y, s.along_z, s.centred) == (1, -1, False) for s in group)
+    share = 1.0 / len(actions_y)
+    about_a_quarter = actions_y == {(1, False), (-1, True)}  # y → ½ − y leaves ±¼ where they are
+    low = -0.5 if share == 1.0 else -0.25 if about_a_quarter else 0.0
+    return (low, low + share), (0.0, 0.5) if mirrored_z else (-0.5, 0.5)

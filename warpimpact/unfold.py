@@ -1,0 +1,74 @@
+"""From the hits of the irreducible part of a unit cell to those of all of it (scene/symmetry.py)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields, replace
+from typing import TypeVar
+
+import numpy as np
+
+from warpimpact.refine import Estimates
+from warpimpact.scene import Symmetry
+from warpimpact.simulate import Outcomes, Replay
+
+
+def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
+    """Outcomes of every shot's images under a group, one shot's images after the other's: shape [shots · group].
+
+    A projected angle changes its sign with its axis; the angular velocity is an axial vector; all else stays.
+    """
+    every = _repeated(outcomes, len(group))
+    signs = np.tile([s.polar for s in group], (len(outcomes.status), 1))
+    axial = np.tile([s.axial for s in group], (len(outcomes.status), 1))
+    return replace(
+        every,
+        angular_velocity=every.angular_velocity * axial,
+        yaw=every.yaw * signs[:, 1:2],
+        pitch=every.pitch * signs[:, 2:3],
+    )
+
+
+def unfolded_estimates(estimates: Estimates, group: Sequence[Symmetry]) -> Estimates:
+    """Estimates of every shot's images, in the order of `unfolded`: those of the shot."""
+    return _repeated(estimates, len(group))
+
+
+def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], image: tuple[float, float]) -> Replay:
+    """A replayed shot as it goes at an image of its hit.
+
+    Args:
+        home: hit point (y, z) of the replayed shot [m].
+        image: that of its image [m].
+    """
+    history, polar, axial = replay.history, symmetry.polar, symmetry.axial
+    signs = symmetry.along_y, symmetry.along_z
+    cells = [
+        (sign * cells + (to - sign * at))[::sign]  # increasing again
+        for cells, sign, at, to in zip((replay.cell_y, replay.cell_z), signs, home, image, strict=True)
+    ]
+    return replace(
+        replay,
+        outcomes=unfolded(replay.outcomes, [symmetry]),
+        history=replace(
+            history,
+            position=history.position * polar,
+            attitude=history.attitude * [*axial, 1.0],  # the axis of a turn is an axial vector
+            core_axis=history.core_axis * polar,
+            velocity=history.velocity * polar,
+            angular_velocity=history.angular_velocity * axial,
+            force=history.force * polar,
+            moment=history.moment * axial,
+        ),
+        resistance_share=replay.resistance_share[:, :: signs[0], :: signs[1]],
+        cell_y=cells[0],
+        cell_z=cells[1],
+    )
+
+
+Columns = TypeVar("Columns", Outcomes, Estimates)
+
+
+def _repeated(columns: Columns, times: int) -> Columns:
+    """Every row several times in turn."""
+    return replace(columns, **{f.name: np.repeat(getattr(columns, f.name), times, axis=0) for f in fields(columns)})
