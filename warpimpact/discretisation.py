@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 FINER = 4
 """Cells of the tile per cell of the exposure's grid, in each direction: the tile is read without interpolation."""
-BLOCKS = 256
+BLOCKS = 96
 """Most blocks, in each direction, in which a period is searched for room that no core fills."""
 SUBSAMPLES = 4
 """Points per cell of the tile and direction behind a material fraction."""
