@@ -114,10 +114,12 @@ def build(variant: Variant) -> SimpleNamespace:
             found.box.z_low = home_z + wp.int32(wp.floor(low_z * window.per_cell)) - 1
             found.box.y_high = home_y + wp.int32(wp.floor(high_y * window.per_cell)) + 2
             found.box.z_high = home_z + wp.int32(wp.floor(high_z * window.per_cell)) + 2
+            # The filter's second pass looks at rows twice its reach away, and at the next in any case.
+            rows = wp.max(2 * plate.reach, 1)
             found.inside = (
-                found.box.y_low >= plate.reach
+                found.box.y_low >= rows
                 and found.box.z_low >= plate.reach
-                and found.box.y_high < fields.cells_y - plate.reach
+                and found.box.y_high < fields.cells_y - rows
                 and found.box.z_high < fields.cells_z - plate.reach
             )
         return found

@@ -412,7 +412,7 @@ class _Task:
             + plate.thickness * math.tan(steepest)
             + self.core.bounding_radius * turned
         )
-        cells_y = cells_z = 2 * (math.ceil(half / self.spacing) + self.device_plate.reach + 3)
+        cells_y = cells_z = 2 * (math.ceil(half / self.spacing) + 2 * self.device_plate.reach + 3)
         while not self._fits(cells_y, cells_z):  # what leaves a smaller window gets its named status
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
