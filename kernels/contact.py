@@ -347,5 +347,11 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     return SimpleNamespace(
-        Footprint=Footprint, Touches=Touches, open_window=open_window, footprint_of=footprint_of, load_on=load_on
+        Footprint=Footprint,
+        Touches=Touches,
+        Grip=Grip,
+        open_window=open_window,
+        footprint_of=footprint_of,
+        grip_of=grip_of,
+        load_on=load_on,
     )
