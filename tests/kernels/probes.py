@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.discretisation import rings_of, tent_taps
+from warpimpact.discretisation import azimuths_of, rings_of, tent_taps
 from warpimpact.scene import Core
 
 
@@ -43,15 +43,15 @@ def attitudes(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
 
 def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
     """The Surface of a core in `axial` × `around` patches and its discs."""
-    rings = rings_of(core, axial, around)
-    azimuth = 2 * np.pi * (np.arange(around) + 0.5) / around
+    rings, azimuths = rings_of(core, axial, around), azimuths_of(around)
+    names = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
     area = np.hypot(rings.area_axial, rings.area_radial)
-    arrays = {name: getattr(rings, name) for name in ("station", "radius", "half_axial", "half_radial")} | {
+    arrays = {name: getattr(rings, name) for name in names} | {
         "area": area,
         "normal_axial": rings.area_axial / area,
         "normal_radial": rings.area_radial / area,
-        "cosine": np.cos(azimuth),
-        "sine": np.sin(azimuth),
+        "cosine": np.cos(azimuths),
+        "sine": np.sin(azimuths),
     }
     surface = struct()
     for name, array in arrays.items():
@@ -64,24 +64,25 @@ def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) ->
 def plate_of(
     struct: Any,
     tile: NDArray[np.float64],
-    dy: float,
-    dz: float,
+    period: Any,
+    spacing: float,
     device: str,
     *,
     thickness: float = 4.0e-3,
     length: float = 0.5e-3,
     size: Any = (np.inf, np.inf),
+    real: Any = wp.float64,
 ) -> Any:
-    """The Plate of a tile of material fractions, with the filter of a degradation length."""
+    """The Plate of a tile of material fractions, with the filter of a degradation length on a grid of some spacing."""
     plate = struct()
-    plate.tile = wp.array(tile.reshape(-1), dtype=wp.float64, device=device)
+    plate.tile = wp.array(tile.reshape(-1), dtype=real, device=device)
     plate.tile_y, plate.tile_z = tile.shape
-    plate.dy, plate.dz = dy, dz
+    plate.period_y, plate.period_z = period
     plate.half_y, plate.half_z = size[0] / 2, size[1] / 2
-    plate.thickness = thickness
-    taps_y, taps_z = tent_taps(length, dy), tent_taps(length, dz)
-    plate.taps_y, plate.taps_z = (wp.array(taps, dtype=wp.float64, device=device) for taps in (taps_y, taps_z))
-    plate.reach_y, plate.reach_z = len(taps_y) // 2, len(taps_z) // 2
+    plate.thickness, plate.spacing = thickness, spacing
+    taps = tent_taps(length, spacing)
+    plate.reach = len(taps) // 2
+    plate.taps = wp.array(np.append(taps[plate.reach :], 0.0), dtype=real, device=device)
     return plate
 
 
@@ -89,6 +90,15 @@ def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device:
     """The Fields of some windows, as the memory comes."""
     fields = struct()
     fields.cells_y, fields.cells_z = cells_y, cells_z
-    for name in ("material", "exposure", "gain", "filtered"):
+    for name in ("exposure", "gain", "filtered"):
         setattr(fields, name, poisoned(slots * cells_y * cells_z, wp.float64, device))
     return fields
+
+
+def poisoned_touches(struct: Any, slots: int, surface: Any, device: str) -> Any:
+    """The Touches of some slots, as the memory comes."""
+    touches = struct()
+    for name, variable in struct.vars.items():
+        patches = 1 if name == "ring_area" else surface.around
+        setattr(touches, name, poisoned(slots * surface.rings * patches, variable.type.dtype, device))
+    return touches

@@ -1,4 +1,5 @@
-"""The grid of the plate: windows onto the periodic tile, interpolation, and the tent filter (MODEL.md §4)."""
+"""The plate: where a shot finds the periodic tile and the rim, its own grid of exposure, and the tent filter
+(MODEL.md §4)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +8,9 @@ import numpy as np
 import pytest
 import warp as wp
 from numpy.typing import NDArray
+from scipy import ndimage
 
+from warpimpact.discretisation import tent_taps
 from warpimpact.kernels import plate_grid
 from warpimpact.kernels.variant import Variant
 
@@ -15,15 +18,17 @@ from .probes import plate_of, poisoned, poisoned_fields
 
 Array = NDArray[np.float64]
 
-VARIANT = Variant(double=True)
+VARIANT, SINGLE = Variant(double=True), Variant()
 real = VARIANT.real
 grid = plate_grid.build(VARIANT)
-Plate, Fields, Window, Box = grid.Plate, grid.Fields, grid.Window, grid.Box
+Plate, Fields, Window, Cell, Box = grid.Plate, grid.Fields, grid.Window, grid.Cell, grid.Box
 
-DY, DZ = 0.25e-3, 0.2e-3
+CELL = 0.25e-3
 CELLS_Y, CELLS_Z = 24, 30
 SLOTS = 3
-TILE = np.random.default_rng(1).random((7, 11))
+TILE = np.random.default_rng(1).random((29, 44))
+PERIOD = np.array([1.7e-3, 2.3e-3])
+HITS = np.array([[1.1e-4, 3.9e-4], [-2.3e-3, -7.7e-4], [5.05e-3, -1.03e-3]])
 
 
 def lay(
@@ -34,7 +39,8 @@ def lay(
     windows: wp.array(dtype=Window),
 ) -> None:
     slot = wp.tid()
-    windows[slot] = grid.open_window(plate, fields, slot, hit_y[slot], hit_z[slot])
+    windows[slot] = grid.window_at(plate, fields, slot, hit_y[slot], hit_z[slot])
+    grid.blank(fields, windows[slot])
 
 
 def look_up(
@@ -47,11 +53,18 @@ def look_up(
     values: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
-    values[i] = grid.gather(field, fields.cells_z, grid.cell_at(fields, windows[slot], y[i], z[i]))
+    cell = grid.cell_at(fields, windows[slot], y[i], z[i])
+    values[i] = grid.gather(field, fields.cells_z, cell.index, cell.y, cell.z)
+
+
+def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, found: wp.array(dtype=Cell)) -> None:
+    slot = wp.tid()
+    found[slot] = grid.cell_at(fields, windows[slot], y, z)
 
 
 def gain(fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, y: real, z: real, amount: real) -> None:
-    grid.scatter(fields.gain, fields.cells_z, grid.cell_at(fields, windows[slot], y, z), amount)
+    cell = grid.cell_at(fields, windows[slot], y, z)
+    grid.scatter(fields.gain, fields.cells_z, cell.index, cell.y, cell.z, amount)
 
 
 def spread(plate: Plate, fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, box: Box) -> None:
@@ -62,7 +75,35 @@ def settle(plate: Plate, fields: Fields, windows: wp.array(dtype=Window), slot: 
     grid.settle(plate, fields, windows[slot], box)
 
 
-LAY, LOOK_UP, GAIN, SPREAD, SETTLE = (VARIANT.kernel(function) for function in (lay, look_up, gain, spread, settle))
+LAY, LOOK_UP, CELLS, GAIN, SPREAD, SETTLE = (
+    VARIANT.kernel(function) for function in (lay, look_up, cells, gain, spread, settle)
+)
+
+
+def beneath_kernel(variant: Variant) -> Any:
+    """Kernel of the tile's cells under points, and of the share of a grid cell about them that lies on the plate."""
+    part, real = plate_grid.build(variant), variant.real
+    Plate, Fields = part.Plate, part.Fields
+
+    def beneath(
+        plate: Plate,
+        fields: Fields,
+        hit_y: wp.float64,
+        hit_z: wp.float64,
+        y: wp.array(dtype=real),
+        z: wp.array(dtype=real),
+        cells: wp.array(dtype=wp.int32),
+        shares: wp.array(dtype=real),
+    ) -> None:
+        i = wp.tid()
+        window = part.window_at(plate, fields, 0, hit_y, hit_z)
+        cells[i] = part.tile_under(plate, window, y[i], z[i])
+        shares[i] = part.on_plate(plate, window, y[i], z[i])
+
+    return variant.kernel(beneath)
+
+
+BENEATH = {variant: beneath_kernel(variant) for variant in (VARIANT, SINGLE)}
 
 
 @dataclass
@@ -81,77 +122,112 @@ class Laid:
     def write(self, name: str, values: Array) -> None:
         getattr(self.fields, name).assign(values.reshape(-1))
 
-    def centres(self, slot: int) -> tuple[Array, Array]:
-        """Centres of a window's cells relative to its hit [m], along y and along z."""
-        window = self.windows.numpy()[slot]
-        y = window["y0"] + (np.arange(CELLS_Y) - CELLS_Y // 2) * DY
-        z = window["z0"] + (np.arange(CELLS_Z) - CELLS_Z // 2) * DZ
-        return y, z
-
     def launch(self, kernel: Any, *inputs: Any) -> None:
         wp.launch(kernel, 1, inputs=inputs, device=self.device)
 
 
-def lay_windows(hits: Any, device: str, *, size: Any = (np.inf, np.inf), length: float = 0.5e-3) -> Laid:
-    plate = plate_of(Plate, TILE, DY, DZ, device, size=size, length=length)
+# Nodes of any window relative to its hit [m], along y and along z.
+NODES = tuple((np.arange(count) - count // 2) * CELL for count in (CELLS_Y, CELLS_Z))
+
+
+def lay_windows(device: str, *, length: float = 0.5e-3) -> Laid:
+    plate = plate_of(Plate, TILE, PERIOD, CELL, device, length=length)
     fields = poisoned_fields(Fields, SLOTS, CELLS_Y, CELLS_Z, device)
-    hits = np.broadcast_to(np.asarray(hits, dtype=float), (SLOTS, 2))
     windows = poisoned(SLOTS, Window, device)
-    hit_y, hit_z = (wp.array(np.ascontiguousarray(h), dtype=wp.float64, device=device) for h in hits.T)
+    hit_y, hit_z = (wp.array(np.ascontiguousarray(h), dtype=wp.float64, device=device) for h in HITS.T)
     wp.launch(LAY, SLOTS, inputs=[plate, fields, hit_y, hit_z], outputs=[windows], device=device)
     return Laid(plate, fields, windows, device)
 
 
+def beneath(variant: Variant, hit: Array, y: Array, z: Array, device: str, **plate: Any) -> tuple[Array, Array]:
+    """Tile's cells under points relative to a hit [m], and shares of the grid cells about them on the plate."""
+    part = plate_grid.build(variant)
+    outputs = [poisoned(len(y), wp.int32, device), poisoned(len(y), variant.real, device)]
+    inputs = [
+        plate_of(part.Plate, TILE, PERIOD, CELL, device, real=variant.real, **plate),
+        part.Fields(),
+        *hit,
+        *(wp.array(a, dtype=variant.real, device=device) for a in (y, z)),
+    ]
+    wp.launch(BENEATH[variant], len(y), inputs=inputs, outputs=outputs, device=device)
+    cells, shares = (array.numpy() for array in outputs)
+    return cells, shares
+
+
 def box_about(y: int, z: int) -> Any:
-    """The box of the four cells from (y, z) on."""
+    """The box of the four nodes from (y, z) on."""
     box = Box()
     box.y_low, box.y_high, box.z_low, box.z_high = y, y + 1, z, z + 1
     return box
 
 
-PERIOD = np.array([TILE.shape[0] * DY, TILE.shape[1] * DZ])
-HITS = np.array([[1.1e-4, 3.9e-4], [-2.3e-3, -7.7e-4], [5.05e-3, -1.03e-3]])
+# --- Tile and rim ---
 
 
+@pytest.mark.parametrize(("variant", "rounding"), [(VARIANT, 1e-6), (SINGLE, 1e-3)], ids=["double", "single"])
 @pytest.mark.parametrize("shift", [0, 1, -1, 40_000, -40_000])
-def test_window_shows_the_periodic_tile(shift: int, device: str) -> None:
-    hits = HITS + shift * PERIOD  # up to 70 m away, where float32 coordinates would be cells off
-    laid = lay_windows(hits, device)
-    for slot, hit in enumerate(hits):
-        y, z = laid.centres(slot)
-        row = np.floor((hit[0] + y) / DY).astype(int) % TILE.shape[0]
-        column = np.floor((hit[1] + z) / DZ).astype(int) % TILE.shape[1]
-        np.testing.assert_array_equal(laid.read("material")[slot], TILE[np.ix_(row, column)])
-        # The hit lies in the middle cell, and cells are where the tile has them.
-        assert abs(y[CELLS_Y // 2]) <= DY / 2
-        assert abs(z[CELLS_Z // 2]) <= DZ / 2
-        np.testing.assert_allclose((HITS[slot][0] + y) / DY % 1, 0.5, atol=1e-6)
-        np.testing.assert_allclose((HITS[slot][1] + z) / DZ % 1, 0.5, atol=1e-6)
+def test_point_finds_its_cell_of_the_periodic_tile(shift: int, variant: Variant, rounding: float, device: str) -> None:
+    # Up to 90 m away, where float32 coordinates would be cells off. Points that rounding may move are left out.
+    y, z = np.random.default_rng(3).uniform(-8e-3, 8e-3, (2, 5000))
+    for hit in HITS:
+        found, _ = beneath(variant, hit + shift * PERIOD, y, z, device)
+        places = [(at + a) / p * n for at, a, p, n in zip(hit, (y, z), PERIOD, TILE.shape, strict=True)]
+        row, column = (np.floor(place).astype(int) % n for place, n in zip(places, TILE.shape, strict=True))
+        clear = np.logical_and(*(np.abs(place - np.round(place)) > rounding for place in places))
+        assert clear.mean() > 0.99
+        np.testing.assert_array_equal(found[clear], (row * TILE.shape[1] + column)[clear])
+
+
+def test_point_on_the_edge_of_the_period_finds_a_cell_of_the_tile(device: str) -> None:
+    # Rounding must not lead beyond the last cell: multiples of the period, and one unit of float32 to either side.
+    edges = np.float32(PERIOD[0]) * np.arange(-20, 21, dtype=np.float32)
+    y = np.concatenate([edges, np.nextafter(edges, np.float32(1)), np.nextafter(edges, np.float32(-1))])
+    found, _ = beneath(SINGLE, np.zeros(2), y, np.zeros(len(y)), device)
+    row, column = np.divmod(found, TILE.shape[1])
+    assert set(row) <= {0, TILE.shape[0] - 1}
+    assert (column == 0).all()
+
+
+@pytest.mark.parametrize("far", [0.0, 70.0])
+@pytest.mark.parametrize(("variant", "rounding"), [(VARIANT, 1e-9), (SINGLE, 1e-5)], ids=["double", "single"])
+def test_finite_plate_ends_at_its_rim(far: float, variant: Variant, rounding: float, device: str) -> None:
+    # The share of a cell of the grid about a point that lies within the rim, here 70 m away too.
+    size, y, z = np.array([3.3e-3, 2.5e-3]) + 2 * far, *np.random.default_rng(4).uniform(-4e-3, 4e-3, (2, 5000))
+    for hit in HITS / 10 + far:
+        _, found = beneath(variant, hit, y, z, device, size=size)
+        shares = []
+        for points, at, extent in zip((y, z), hit, size, strict=True):
+            edges = np.clip(at + points[:, None] + [-CELL / 2, CELL / 2], -extent / 2, extent / 2)
+            shares.append(np.diff(edges, axis=1)[:, 0] / CELL)
+        np.testing.assert_allclose(found, np.prod(shares, axis=0), atol=rounding)
+        assert {0.0, 1.0} < set(found)
+
+
+# --- Grid ---
+
+
+def test_hit_is_a_node_of_its_window(device: str) -> None:
+    laid = lay_windows(device)
+    for k, (y, z) in enumerate([(0.0, 0.0), (0.25 * CELL, -0.25 * CELL)]):
+        found = poisoned(SLOTS, Cell, device)
+        wp.launch(CELLS, SLOTS, inputs=[laid.fields, laid.windows, y, z], outputs=[found], device=device)
+        slot, row, column = np.unravel_index(found.numpy()["index"], (SLOTS, CELLS_Y, CELLS_Z))
+        np.testing.assert_array_equal(slot, np.arange(SLOTS))
+        np.testing.assert_array_equal(row, CELLS_Y // 2)
+        np.testing.assert_array_equal(column, CELLS_Z // 2 - k)
+        np.testing.assert_allclose(found.numpy()["y"], 0.25 * k, atol=1e-15)
+        np.testing.assert_allclose(found.numpy()["z"], 0.75 * k, atol=1e-15)
 
 
 def test_fresh_window_has_no_exposure(device: str) -> None:
-    laid = lay_windows(HITS, device)
-    for name in ("exposure", "gain"):
+    laid = lay_windows(device)
+    for name in ("exposure", "gain", "filtered"):
         np.testing.assert_array_equal(laid.read(name), 0.0)
 
 
-def test_window_ends_at_the_rim_of_a_finite_plate(device: str) -> None:
-    size = np.array([3.3e-3, 2.5e-3])  # no multiples of the cells
-    laid = lay_windows(HITS / 10, device, size=size)
-    for slot, hit in enumerate(HITS / 10):
-        shares = []
-        for centres, at, width, extent in zip(laid.centres(slot), hit, (DY, DZ), size, strict=True):
-            edges = np.clip(at + centres[:, None] + [-width / 2, width / 2], -extent / 2, extent / 2)
-            shares.append(np.diff(edges, axis=1)[:, 0] / width)
-        pristine = lay_windows(HITS / 10, device).read("material")[slot]
-        expected = pristine * np.outer(*shares)
-        np.testing.assert_allclose(laid.read("material")[slot], expected, atol=1e-12)
-        assert np.outer(*shares).sum() * DY * DZ == pytest.approx(size.prod())  # the test sees all of it
-
-
 def test_interpolation_reproduces_a_linear_field(device: str) -> None:
-    laid, slot = lay_windows(HITS, device), 1
-    y, z = laid.centres(slot)
+    laid, slot = lay_windows(device), 1
+    y, z = NODES
     values = np.full((SLOTS, CELLS_Y, CELLS_Z), np.nan)  # a look into another window shows
     values[slot] = 3.0 + 2e3 * y[:, None] - 5e3 * z[None, :]
     laid.write("exposure", values)
@@ -165,12 +241,12 @@ def test_interpolation_reproduces_a_linear_field(device: str) -> None:
 
 
 def test_scatter_conserves_amount_and_place(device: str) -> None:
-    laid, slot, amount = lay_windows(HITS, device), 2, 0.7
+    laid, slot, amount = lay_windows(device), 2, 0.7
     y, z = 1.234e-3, -0.815e-3
     for _ in range(2):  # adds to what is there
         laid.launch(GAIN, laid.fields, laid.windows, slot, y, z, amount)
     gained = laid.read("gain")
-    at_y, at_z = laid.centres(slot)
+    at_y, at_z = NODES
     assert np.count_nonzero(gained) == np.count_nonzero(gained[slot]) == 4
     assert gained.min() >= 0.0
     assert gained.sum() == pytest.approx(2 * amount, rel=1e-14)
@@ -178,9 +254,12 @@ def test_scatter_conserves_amount_and_place(device: str) -> None:
     assert (gained[slot].sum(axis=0) @ at_z) / (2 * amount) == pytest.approx(z, rel=1e-12)
 
 
+# --- Filter ---
+
+
 def exposed_at_a_point(laid: Laid, slot: int, y: float, z: float) -> tuple[Array, Array]:
     """Exposure [cells_y, cells_z] at mid-step and at the end of a step, of a point that gains 1."""
-    at_y, at_z = laid.centres(slot)
+    at_y, at_z = NODES
     box = box_about(int(np.searchsorted(at_y, y)) - 1, int(np.searchsorted(at_z, z)) - 1)
     laid.launch(GAIN, laid.fields, laid.windows, slot, y, z, 1.0)
     laid.launch(SPREAD, laid.plate, laid.fields, laid.windows, slot, box)
@@ -197,38 +276,85 @@ POINTS = [(0.0, 0.0), (1.234e-3, -0.815e-3), (-1.41e-3, 1.27e-3)]
 
 @pytest.mark.parametrize("point", POINTS)
 def test_exposure_of_a_point_is_the_tent_at_the_nodes(point: tuple[float, float], device: str) -> None:
-    # ℓ = 4 cells along y and 5 along z: gain 1 over a cell is K times the cell's area at every node.
-    length, slot = 1.0e-3, 1
-    laid = lay_windows(HITS, device, length=length)
+    # Half-width m = 4 cells, ℓ² = m² + 1 cells² (a sixth each for scattering and reading): gain 1 over a cell is,
+    # for a whole m, the tent of that half-width times the cell's area at every node.
+    half_width, slot = 4 * CELL, 1
+    laid = lay_windows(device, length=np.sqrt(17.0) * CELL)
     _, exposure = exposed_at_a_point(laid, slot, *point)
     tents = [
-        np.maximum(0.0, 1.0 - np.abs(centres - at) / length) * width / length
-        for centres, at, width in zip(laid.centres(slot), point, (DY, DZ), strict=True)
+        np.maximum(0.0, 1.0 - np.abs(nodes - at) / half_width) * CELL / half_width
+        for nodes, at in zip(NODES, point, strict=True)
     ]
-    np.testing.assert_allclose(exposure, np.outer(*tents), atol=1e-15)
+    np.testing.assert_allclose(exposure, np.outer(*tents), atol=1e-12)
 
 
 @pytest.mark.parametrize("length", [0.26e-3, 0.37e-3, 0.5e-3, 0.61e-3, 1.13e-3])
 @pytest.mark.parametrize("point", POINTS)
 def test_exposure_keeps_mass_place_and_second_moment(point: tuple[float, float], length: float, device: str) -> None:
-    # The taps' own second moment is ℓ²/6 − g²/6; interpolation at fraction f of a cell adds g² f(1 − f),
-    # g²/6 on average.
+    # The taps' own second moment is ℓ²/6 − g²/3 or, where they are one, 0; scattering at fraction f of a cell adds
+    # g² f(1 − f).
     slot = 1
-    laid = lay_windows(HITS, device, length=length)
+    laid = lay_windows(device, length=length)
     _, exposure = exposed_at_a_point(laid, slot, *point)
     assert exposure.min() >= 0.0
     assert exposure.sum() == pytest.approx(1.0, rel=1e-12)
-    for axis, width in enumerate((DY, DZ)):
-        distance = laid.centres(slot)[axis] - point[axis]
+    for axis in range(2):
+        distance = NODES[axis] - point[axis]
         along = exposure.sum(axis=1 - axis)
-        fraction = (-distance[0] / width) % 1.0
-        expected = length**2 / 6 + width**2 * (fraction * (1 - fraction) - 1 / 6)
-        assert along @ distance == pytest.approx(0.0, abs=1e-12 * width)
-        assert along @ distance**2 == pytest.approx(expected, rel=1e-9)
+        fraction = (-distance[0] / CELL) % 1.0
+        expected = max(length**2 / 6 - CELL**2 / 3, 0.0) + CELL**2 * fraction * (1 - fraction)
+        assert along @ distance == pytest.approx(0.0, abs=1e-12 * CELL)
+        assert along @ distance**2 == pytest.approx(expected, rel=1e-9, abs=1e-12 * CELL**2)
+
+
+def test_reading_what_was_scattered_keeps_the_second_moment_of_the_tent(device: str) -> None:
+    # Exposure scattered by a point and read at another, averaged over where the cells lie: K's ℓ²/6 in each
+    # direction, in all. Both ways are polynomials of third order in the place within the cell: Gauss' rule is exact.
+    length, slot, count = 0.5e-3, 0, 6
+    laid = lay_windows(device, length=length)
+    fractions, weights = np.polynomial.legendre.leggauss(3)
+    fractions, weights = (1 + fractions) / 2, weights / 2
+    moment = mass = 0.0
+    for at, weight in zip(fractions * CELL, weights, strict=True):
+        laid.write("exposure", np.zeros((SLOTS, CELLS_Y, CELLS_Z)))
+        exposed_at_a_point(laid, slot, at, 0.0)
+        read = ((np.arange(-count, count)[:, None] + fractions) * CELL).reshape(-1)
+        found = poisoned(len(read), real, device)
+        inputs = [laid.fields, laid.windows, slot, laid.fields.exposure]
+        inputs += [wp.array(a, dtype=real, device=device) for a in (read, np.zeros(len(read)))]
+        wp.launch(LOOK_UP, len(read), inputs=inputs, outputs=[found], device=device)
+        density = weight * np.tile(weights, 2 * count) * found.numpy()
+        mass += density.sum()
+        moment += density @ (read - at) ** 2
+    assert moment / mass == pytest.approx(length**2 / 6, rel=1e-9)
+
+
+@pytest.mark.parametrize("length", [0.3e-3, 0.5e-3, 0.8e-3, 1.13e-3])
+def test_step_s_gain_is_convolved_with_the_taps(length: float, device: str) -> None:
+    # Random gain in a box as near the window's edge as the filter's reach allows, over exposure that was there.
+    laid, slot, rng = lay_windows(device, length=length), 1, np.random.default_rng(7)
+    taps, reach = tent_taps(length, CELL), laid.plate.reach
+    box = Box()
+    rows = max(2 * reach, 1)
+    box.y_low, box.y_high = rows, CELLS_Y - 1 - rows
+    box.z_low, box.z_high = reach, CELLS_Z - 1 - reach
+    before, gain = np.full((SLOTS, CELLS_Y, CELLS_Z), np.nan), np.full((SLOTS, CELLS_Y, CELLS_Z), np.nan)
+    before[slot], gain[slot] = rng.random((CELLS_Y, CELLS_Z)), 0.0
+    inner = (slot, slice(box.y_low, box.y_high + 1), slice(box.z_low, box.z_high + 1))
+    gain[inner] = rng.random(gain[inner].shape)
+    filtered = np.where(np.isnan(gain), np.nan, 0.0)  # a look into another slot shows
+    for name, values in (("exposure", before), ("gain", gain), ("filtered", filtered)):
+        laid.write(name, values)
+    expected = ndimage.convolve(gain[slot], np.outer(taps, taps), mode="constant")
+    for kernel, share in ((SPREAD, 0.5), (SETTLE, 1.0)):
+        laid.launch(kernel, laid.plate, laid.fields, laid.windows, slot, box)
+        np.testing.assert_allclose(laid.read("exposure")[slot], before[slot] + share * expected, rtol=1e-13)
+    for name in ("gain", "filtered"):
+        np.testing.assert_array_equal(laid.read(name)[slot], 0.0)
 
 
 def test_mid_step_has_half_of_the_exposure_and_the_step_clears_its_gain(device: str) -> None:
-    laid = lay_windows(HITS, device)
+    laid = lay_windows(device)
     middle, end = exposed_at_a_point(laid, 0, *POINTS[1])
     assert end.any()
     np.testing.assert_allclose(middle, end / 2, rtol=1e-14)
@@ -238,8 +364,8 @@ def test_mid_step_has_half_of_the_exposure_and_the_step_clears_its_gain(device: 
 
 
 def test_length_below_the_cells_leaves_the_interpolation_alone(device: str) -> None:
-    laid = lay_windows(HITS, device, length=0.1e-3)
+    laid = lay_windows(device, length=0.1e-3)
     laid.launch(GAIN, laid.fields, laid.windows, 1, *POINTS[1], 1.0)
     gained = laid.read("gain")[1]
-    _, exposure = exposed_at_a_point(lay_windows(HITS, device, length=0.1e-3), 1, *POINTS[1])
+    _, exposure = exposed_at_a_point(lay_windows(device, length=0.1e-3), 1, *POINTS[1])
     np.testing.assert_allclose(exposure, gained, atol=1e-15)

@@ -67,12 +67,15 @@ def kick(
     loads: wp.array(dtype=Load),
     dt: real,
     kicked: wp.array(dtype=State),
-    means: wp.array(dtype=Load),
+    forces: wp.array(dtype=vec3),
+    moments: wp.array(dtype=vec3),
 ) -> None:
-    """The kicked states, and the mean load of each kick."""
+    """The kicked states, and the mean force and moment of each kick."""
     i = wp.tid()
     kicked[i] = motion.kick(body, states[i], loads[i], dt)
-    means[i] = motion.mean_load(body, states[i], loads[i], dt)
+    force, moment = motion.mean_load(body, states[i], loads[i], dt)
+    forces[i] = force
+    moments[i] = moment
 
 
 CONVERT, DRIFT, TURN, KICK = (VARIANT.kernel(function) for function in (convert, drift, turn, kick))
@@ -116,11 +119,25 @@ def drifted(start: SimpleNamespace, dt: float, device: str, repeats: int = 1) ->
     return after.numpy()
 
 
-def kicked(start: SimpleNamespace, dt: float, device: str, **load: Any) -> tuple[Any, Any]:
-    after, means = poisoned(COUNT, State, device), poisoned(COUNT, Load, device)
-    inputs = [paper_body(), states_of(start, device), records(Load, device, **load), dt]
-    wp.launch(KICK, COUNT, inputs=inputs, outputs=[after, means], device=device)
-    return after.numpy(), means.numpy()
+def along_body(start: SimpleNamespace, load: dict[str, Array]) -> dict[str, Array]:
+    """Members of a Load, given in the plate frame, along the body axes."""
+    turn = start.rotation.as_matrix().transpose(0, 2, 1)
+    axes = {1: "nij,nj->ni", 2: "nij,njk,nlk->nil"}
+    turned = {
+        name: np.einsum(axes[value.ndim - 1], *[turn, value, turn][: value.ndim])
+        for name, value in load.items()
+        if value.ndim > 1
+    }
+    return load | turned
+
+
+def kicked(start: SimpleNamespace, dt: float, device: str, **load: Any) -> tuple[Any, dict[str, Array]]:
+    """States after a kick by loads in the plate frame, and the mean force and moment there."""
+    after = poisoned(COUNT, State, device)
+    means = {name: poisoned(COUNT, vec3, device) for name in ("force", "moment")}
+    inputs = [paper_body(), states_of(start, device), records(Load, device, **along_body(start, load)), dt]
+    wp.launch(KICK, COUNT, inputs=inputs, outputs=[after, *means.values()], device=device)
+    return after.numpy(), {name: array.numpy() for name, array in means.items()}
 
 
 def energy(start: SimpleNamespace, velocity: Array, momentum: Array) -> Array:

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from warpimpact import discretisation
-from warpimpact.discretisation import FIDELITIES, NODAL, onset_jump, resolve, rings_of, tent_taps, tile_of
+from warpimpact.discretisation import (
+    FIDELITIES,
+    NODAL,
+    azimuths_of,
+    onset_jump,
+    resolve,
+    rings_of,
+    tent_taps,
+    tile_of,
+)
 from warpimpact.scene import (
     CirclePattern,
     ConeCore,
@@ -160,17 +169,49 @@ def test_discs_are_rings_from_the_axis_to_the_rim() -> None:
     assert len(rings_of(TABLE, 20, 16, discs=False).station) == 20
 
 
+@pytest.mark.parametrize("around", [4, 5, 16])
+def test_azimuths_are_their_own_mirror_images_half_a_patch_on_from_ring_to_ring(around: int) -> None:
+    even, odd = azimuths_of(around).reshape(2, around)
+    np.testing.assert_allclose(np.diff(even), 2 * np.pi / around)
+    np.testing.assert_allclose(even - odd, np.pi / around)
+    for azimuths in (even, odd):
+        directions = np.exp(1j * azimuths)
+        mirrored = directions.conj()
+        apart = np.abs(directions[:, None] - mirrored)
+        np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-12)
+
+
+@CORES
+def test_turns_are_half_the_change_of_the_normal_over_a_ring(core: Core) -> None:
+    # From the middles of neighbouring rings: exact to second order within a smooth stretch of the profile.
+    rings = rings_of(core, 400, 16)
+    lateral = rings.half_axial != 0
+    station = core.mass_properties.centre_of_mass - rings.station[lateral]
+    half = np.abs(rings.half_axial[lateral])
+    inside = 1e-4 * half
+
+    def normals(at: Any) -> Any:
+        slope = (core.radius(at + inside) - core.radius(at - inside)) / (2 * inside)
+        return np.stack([slope, np.ones_like(slope)]) / np.hypot(slope, 1.0)
+
+    low, high = normals(station - 0.99 * half), normals(station + 0.99 * half)
+    turns = np.stack([rings.turn_axial, rings.turn_radial])[:, lateral]
+    np.testing.assert_allclose(turns, (high - low) / 2, rtol=0.02, atol=1e-6)
+    np.testing.assert_array_equal(np.stack([rings.turn_axial, rings.turn_radial])[:, ~lateral], 0.0)
+
+
 # --- Tile ---
 
 
 @pytest.mark.parametrize("pattern", PATTERNS, ids=lambda pattern: pattern.shape)
 def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
     plate = PLATE.model_copy(update={"pattern": pattern})
-    tile = tile_of(plate, 0.25e-3)
+    spacing = 0.25e-3 / discretisation.FINER  # the tile's, where the grid's is 0.25 mm
+    tile = tile_of(plate, spacing)
     assert tile.material.mean() == pytest.approx(1 - pattern.open_area, abs=5e-4)
     assert tile.material.min() == 0.0
     assert tile.material.max() == 1.0
-    assert max(tile.dy, tile.dz) <= 0.25e-3
+    assert max(tile.dy, tile.dz) <= spacing
     extent = np.array(tile.material.shape) * (tile.dy, tile.dz)
     np.testing.assert_allclose(extent, pattern.period, rtol=1e-12)
 
@@ -205,12 +246,14 @@ def test_spacing_that_fits_the_period_is_kept() -> None:
 
 
 @pytest.mark.parametrize("ratio", [2, 3, 8])
-def test_taps_are_the_tent_where_the_length_is_a_multiple_of_the_cell(ratio: int) -> None:
+def test_taps_are_a_tent_of_the_half_width_that_scattering_and_reading_leave(ratio: int) -> None:
+    # A tent of half-width m cells has (m² − 1)/6 at the nodes and, scattered into and read bilinearly, (m² + 1)/6.
+    length = np.sqrt(ratio**2 + 1.0)
     offsets = np.arange(-ratio + 1, ratio)
-    np.testing.assert_allclose(tent_taps(ratio * 0.1, 0.1), (1 - np.abs(offsets) / ratio) / ratio, rtol=1e-12)
+    np.testing.assert_allclose(tent_taps(length * 0.1, 0.1), (1 - np.abs(offsets) / ratio) / ratio, rtol=1e-9)
 
 
-@pytest.mark.parametrize("ratio", [1.00001, 1.001, 1.3, 1.9, 2.5, 3.7, 7.99])
+@pytest.mark.parametrize("ratio", [1.415, 1.5, 1.9, 2.5, 3.7, 7.99])
 def test_taps_keep_mass_and_second_moment(ratio: float) -> None:
     taps = tent_taps(ratio, 1.0)
     offsets = np.arange(len(taps)) - len(taps) // 2
@@ -218,10 +261,10 @@ def test_taps_keep_mass_and_second_moment(ratio: float) -> None:
     assert (taps > 0).all()
     np.testing.assert_allclose(taps, taps[::-1], rtol=1e-12)
     assert taps.sum() == pytest.approx(1.0)
-    # Interpolation adds a sixth of the cell's square on average.
-    assert taps @ offsets**2 + 1 / 6 == pytest.approx(ratio**2 / 6, rel=1e-9)
+    # Bilinear scattering and bilinear reading add a sixth of the cell's square each, on average.
+    assert taps @ offsets**2 + 1 / 3 == pytest.approx(ratio**2 / 6, rel=1e-9)
 
 
-@pytest.mark.parametrize("ratio", [0.2, 1.0])
-def test_length_within_a_cell_is_not_filtered(ratio: float) -> None:
+@pytest.mark.parametrize("ratio", [0.2, 1.0, 1.414])
+def test_length_within_scattering_and_reading_is_not_filtered(ratio: float) -> None:
     np.testing.assert_array_equal(tent_taps(ratio, 1.0), [1.0])
