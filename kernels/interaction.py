@@ -90,12 +90,12 @@ def build(variant: Variant) -> SimpleNamespace:
         """e^x between 2^-126 and 2^126, NaN for NaN."""
         ...
 
+    exponential = wp.exp if variant.double else exp_single
+
     @wp.func
     def remaining(law: Law, exposure: real):
         """Share of the resistance left after an exposure T [s]: β^(T/Δt_β)."""
-        if wp.static(variant.double):
-            return wp.exp(law.decay_rate * exposure)
-        return exp_single(law.decay_rate * exposure)
+        return exponential(law.decay_rate * exposure)
 
     return SimpleNamespace(
         Law=Law,
