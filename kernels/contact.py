@@ -43,12 +43,14 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Touches:
         """What the first pass finds, for every patch of every slot: area [m²] of material that it immerses, exposure
-        per node [s] that it is about to give, cell of the tile, and cell of the grid with the place in it; and the
+        per node [s] that it is about to give, cells of the tile and of the grid with the place in them; and the
         area of every ring's patches together."""
 
         area: wp.array(dtype=real)
         gain: wp.array(dtype=real)
         tile: wp.array(dtype=wp.int32)
+        tile_y: wp.array(dtype=real)
+        tile_z: wp.array(dtype=real)
         cell: wp.array(dtype=wp.int32)
         y: wp.array(dtype=real)
         z: wp.array(dtype=real)
@@ -183,7 +185,10 @@ def build(variant: Variant) -> SimpleNamespace:
             cell = grid.cell_at(fields, window, patch.y, patch.z)
             write(touches.area, first + j, area)
             write(touches.gain, first + j, per_node * grip.share * area * wp.abs(normal_along_x(pose, patch, grip)))
-            write_index(touches.tile, first + j, grid.tile_under(plate, window, patch.y, patch.z))
+            tile = grid.tile_at(plate, window, patch.y, patch.z)
+            write_index(touches.tile, first + j, tile.index)
+            write(touches.tile_y, first + j, tile.y)
+            write(touches.tile_z, first + j, tile.z)
             write_index(touches.cell, first + j, cell.index)
             write(touches.y, first + j, cell.y)
             write(touches.z, first + j, cell.z)
@@ -197,7 +202,8 @@ def build(variant: Variant) -> SimpleNamespace:
         while j < first + surface.around:
             area = read(touches.area, j)
             if area > zero:
-                material = read(plate.tile, read_index(touches.tile, j))
+                tile, tile_y, tile_z = read_index(touches.tile, j), read(touches.tile_y, j), read(touches.tile_z, j)
+                material = grid.gather(plate.tile, plate.tile_z + 1, tile, tile_y, tile_z)
                 write(touches.area, j, material * area)
                 total += material * area
                 if wp.static(variant.degrades):

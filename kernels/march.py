@@ -64,7 +64,8 @@ def build(variant: Variant) -> SimpleNamespace:
     class Pace:
         """The time step [s], or if that is 0 the way per step [m] at impact velocity, of which `way_along` at most may
         lie in the plane of the plate; the most that any step may take; and the way [m], at impact velocity, after
-        which a shot that has not ended is given up. `rows` of the trace belong to each shot."""
+        which a shot that has not ended is given up. `rows` of the trace belong to each shot; none if it is 0: not a
+        build of its own, so that a shot computes the same bits with a trace and without."""
 
         time_step: wp.float64
         way: wp.float64
@@ -236,12 +237,12 @@ def build(variant: Variant) -> SimpleNamespace:
                         touched = True
                         contact_steps += 1
                         state = motion.kick(body, state, load, dt)
-                if wp.static(variant.traced):
+                if pace.rows > 0:
                     force, moment = motion.mean_load(body, before, load, dt)
                     record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, force, moment)
                 state = motion.drift(body, state, dt)
                 step += 1
-        if wp.static(variant.traced):
+        if pace.rows > 0:
             record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, vec3(), vec3())
         if status == RUNNING:
             status = UNFINISHED
@@ -249,9 +250,10 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes.status[shot] = status
         outcomes.steps[shot] = step
         outcomes.contact_duration[shot] = real(contact_steps) * dt
-        outcomes.energy_loss[shot] = initial_energy - motion.kinetic_energy(
-            body, axis, state.velocity, state.angular_momentum
-        )
+        energy_loss = zero
+        if touched:
+            energy_loss = initial_energy - motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+        outcomes.energy_loss[shot] = energy_loss
         outcomes.position[shot] = state.position
         outcomes.axis[shot] = axis
         outcomes.velocity[shot] = state.velocity

@@ -3,7 +3,6 @@
 Kept because the published rows came from it. It has no limit in the time step or the grid (MODEL.md §4),
 has no condition on the direction of motion. Its forces may feed energy into the core: what a step would add beyond
 the kinetic energy that was there, the kick withholds (rigid_body.restraint), as in every scheme here.
-Nodes lie about the hit, 10 µm apart, each with the resistance of the plate under it.
 """
 
 from functools import cache
@@ -31,27 +30,44 @@ def build(variant: Variant) -> SimpleNamespace:
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func
+    def within(index: wp.int32, period: wp.int32):
+        """The index brought into 0 … period − 1."""
+        rest = index % period
+        if rest < 0:
+            rest += period
+        return rest
+
+    @wp.func
     def open_window(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
-        """A slot's window about a hit: each node's share of the resistance, from the tile; nothing touched."""
+        """A slot's window about a hit: nodes at the centres of the tile's cells, each with its share of the resistance;
+        nothing touched."""
         window = grid.window_at(plate, fields, slot, hit_y, hit_z)
+        dy, dz = plate.period_y / wp.float64(plate.tile_y), plate.period_z / wp.float64(plate.tile_z)
+        home_y, home_z = wp.int32(wp.floor(hit_y / dy)), wp.int32(wp.floor(hit_z / dz))
+        window.y0 = real((wp.float64(home_y) + wp.float64(0.5)) * dy - hit_y)
+        window.z0 = real((wp.float64(home_z) + wp.float64(0.5)) * dz - hit_z)
+        index = window.first
         for i in range(fields.cells_y):
-            y = real(i - fields.cells_y // 2) * plate.spacing
-            row = grid.tile_row(plate, window, y) * plate.tile_z
+            row = within(home_y + i - fields.cells_y // 2, plate.tile_y) * (plate.tile_z + 1)
+            column = within(home_z - fields.cells_z // 2, plate.tile_z)
+            y = window.y0 + real(i - fields.cells_y // 2) * real(dy)
             for j in range(fields.cells_z):
-                z = real(j - fields.cells_z // 2) * plate.spacing
-                index = window.first + i * fields.cells_z + j
-                share = plate.tile[row + grid.tile_column(plate, window, z)]
+                share = plate.tile[row + column]
                 if wp.static(variant.rimmed):
-                    share *= grid.on_plate(plate, window, y, z)
+                    share *= grid.on_plate(plate, window, y, window.z0 + real(j - fields.cells_z // 2) * real(dz))
                 fields.exposure[index] = share
                 fields.gain[index] = zero
+                index += 1
+                column += 1
+                if column == plate.tile_z:
+                    column = 0
         return window
 
     @wp.func
     def node_under(fields: Fields, window: Window, point: vec3):
         """Index of the nearest node."""
-        row = wp.int32(wp.floor(point[1] * window.per_cell + half))
-        column = wp.int32(wp.floor(point[2] * window.per_cell + half))
+        row = wp.int32(wp.floor((point[1] - window.y0) * window.per_cell + half))
+        column = wp.int32(wp.floor((point[2] - window.z0) * window.per_cell + half))
         return window.home + row * fields.cells_z + column
 
     @wp.func

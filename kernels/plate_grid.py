@@ -22,9 +22,10 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Plate:
-        """Pristine plate: one period [m] as a tile [tile_y × tile_z] of material fractions, corner at the origin, and
-        how far at least each of its cells is from any material [m]; the half extents [m] of a finite plate (infinite
-        if there is no rim); the spacing [m] of the exposure's grid and half of the tent filter on it."""
+        """Pristine plate: one period [m] as a tile [tile_y + 1 × tile_z + 1] of material fractions, corner at the
+        origin, the last row and column repeating the first; how far at least each of the tile_y × tile_z cells is from
+        any material [m]; the half extents [m] of a finite plate (infinite if there is no rim); the spacing [m] of the
+        exposure's grid and half of the tent filter on it."""
 
         tile: wp.array(dtype=real)
         clear: wp.array(dtype=real)
@@ -54,7 +55,8 @@ def build(variant: Variant) -> SimpleNamespace:
     class Window:
         """One slot's part of the fields, and how to find the tile. The hit is the node of index `home`: a shot
         computes the same bits in a window of any size. The hit's place in the tile and what brings a way there,
-        in periods; the rims of a finite plate [m], seen from the hit."""
+        in periods; the rims of a finite plate [m], seen from the hit. (y0, z0): where the literal scheme has
+        its node `home` [m]."""
 
         first: wp.int32
         home: wp.int32
@@ -67,6 +69,8 @@ def build(variant: Variant) -> SimpleNamespace:
         high_y: real
         low_z: real
         high_z: real
+        y0: real
+        z0: real
 
     @wp.struct
     class Cell:
@@ -104,24 +108,26 @@ def build(variant: Variant) -> SimpleNamespace:
         return window
 
     @wp.func
-    def tile_row(plate: Plate, window: Window, y: real):
-        across = window.tile_y + y * window.per_period_y
-        return wp.min(wp.int32((across - wp.floor(across)) * real(plate.tile_y)), plate.tile_y - 1)
-
-    @wp.func
-    def tile_column(plate: Plate, window: Window, z: real):
-        along = window.tile_z + z * window.per_period_z
-        return wp.min(wp.int32((along - wp.floor(along)) * real(plate.tile_z)), plate.tile_z - 1)
-
-    @wp.func
-    def tile_under(plate: Plate, window: Window, y: real, z: real):
-        """Index of the tile's cell under a point."""
-        return tile_row(plate, window, y) * plate.tile_z + tile_column(plate, window, z)
+    def tile_at(plate: Plate, window: Window, y: real, z: real):
+        """The cells of the tile whose centres enclose a point: index of the first, and the point's place."""
+        across = window.tile_y + y * window.per_period_y - half / real(plate.tile_y)
+        along = window.tile_z + z * window.per_period_z - half / real(plate.tile_z)
+        across = (across - wp.floor(across)) * real(plate.tile_y)
+        along = (along - wp.floor(along)) * real(plate.tile_z)
+        row = wp.min(wp.int32(across), plate.tile_y - 1)
+        column = wp.min(wp.int32(along), plate.tile_z - 1)
+        cell = Cell()
+        cell.index = row * (plate.tile_z + 1) + column
+        cell.y = across - real(row)
+        cell.z = along - real(column)
+        return cell
 
     @wp.func
     def clearance(plate: Plate, window: Window):
         """How far at least the hit is from any material [m]."""
-        return plate.clear[tile_under(plate, window, zero, zero)]
+        row = wp.min(wp.int32(window.tile_y * real(plate.tile_y)), plate.tile_y - 1)
+        column = wp.min(wp.int32(window.tile_z * real(plate.tile_z)), plate.tile_z - 1)
+        return plate.clear[row * plate.tile_z + column]
 
     @wp.func
     def on_plate(plate: Plate, window: Window, y: real, z: real):
@@ -276,9 +282,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Cell=Cell,
         Box=Box,
         window_at=window_at,
-        tile_row=tile_row,
-        tile_column=tile_column,
-        tile_under=tile_under,
+        tile_at=tile_at,
         clearance=clearance,
         on_plate=on_plate,
         cell_at=cell_at,

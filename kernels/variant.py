@@ -24,7 +24,6 @@ class Variant:
         rubs: there is friction (η > 0).
         rate_dependent: the normal stress depends on the normal velocity (a1 or a2 > 0).
         rimmed: the plate is finite.
-        traced: the state after every step is recorded.
     """
 
     double: bool = False
@@ -33,7 +32,6 @@ class Variant:
     rubs: bool = True
     rate_dependent: bool = False
     rimmed: bool = False
-    traced: bool = False
 
     @property
     def real(self) -> Any:

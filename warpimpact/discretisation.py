@@ -16,11 +16,11 @@ from warpimpact.scene import Core, Impact, Numerics, Plate
 
 Array = NDArray[np.float64]
 
-FINER = 4
-"""Cells of the tile per cell of the exposure's grid, in each direction: the tile is read without interpolation."""
+FINER = 2
+"""Cells of the tile per cell of the exposure's grid, in each direction: edges of holes are sharp, exposure is not."""
 BLOCKS = 96
 """Most blocks, in each direction, in which a period is searched for room that no core fills."""
-SUBSAMPLES = 4
+SUBSAMPLES = 8
 """Points per cell of the tile and direction behind a material fraction."""
 
 

@@ -235,8 +235,8 @@ class _Task:
             rubs=plate.shear_coefficient > 0.0,
             rate_dependent=a1 > 0.0 or a2 > 0.0,
             rimmed=plate.size is not None,
-            traced=traced,
         )
+        self.traced = traced
         self.stage = march.build(self.variant)
         self.real = np.float64 if self.resolution.double else np.float32
         self.spacing = self.resolution.grid_spacing
@@ -282,7 +282,7 @@ class _Task:
         finer = 1 if nodal else discretisation.FINER
         tile = discretisation.tile_of(self.plate, self.spacing / finer, sharp=nodal)
         plate = self.stage.Plate()
-        plate.tile = self._array(tile.material.reshape(-1))
+        plate.tile = self._array(np.pad(tile.material, (0, 1), mode="wrap").reshape(-1))
         plate.clear = self._array(tile.clearance.reshape(-1))
         plate.tile_y, plate.tile_z = tile.material.shape
         plate.period_y, plate.period_z = self.plate.pattern.period
@@ -322,11 +322,10 @@ class _Task:
         pace.way, pace.way_along = self.resolution.way, self.resolution.way_along
         pace.longest_step = self.resolution.longest_step
         pace.longest_way = STEP_ALLOWANCE * passage
-        steps = [
-            self.resolution.step_at(v, o) * v for v, o in zip(self.shots.velocity, self.shots.obliquity, strict=True)
-        ]
-        shortest = min(steps) if self.variant.traced else math.inf
-        pace.rows = math.ceil(pace.longest_way / shortest) + 2  # the end, and a step that rounding may add
+        if self.traced:
+            pairs = zip(self.shots.velocity, self.shots.obliquity, strict=True)
+            shortest = min(self.resolution.step_at(v, obliquity) * v for v, obliquity in pairs)
+            pace.rows = math.ceil(pace.longest_way / shortest) + 2  # the end, and a step that rounding may add
         return pace
 
     def march(self, progress: Progress) -> Any:
@@ -370,10 +369,11 @@ class _Task:
 
     def _material(self) -> Array:
         """Share of material about every node of the first shot's window."""
-        fine = (np.arange(discretisation.FINER) + 0.5) / discretisation.FINER - 0.5
+        samples = 16
+        fine = (np.arange(samples) + 0.5) / samples - 0.5
         y, z = ((nodes[:, None] + self.spacing * fine).reshape(-1) for nodes in self.nodes())
         solid = self.plate.is_solid(y[:, None], z[None, :])
-        shape = (self.cells[0], discretisation.FINER, self.cells[1], discretisation.FINER)
+        shape = (self.cells[0], samples, self.cells[1], samples)
         return np.asarray(solid.reshape(shape).mean(axis=(1, 3)))
 
     def report(self, contact: Any, standoffs: Array, standoff_point: str) -> Outcomes:
@@ -419,7 +419,7 @@ class _Task:
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = np.dtype(self.real).itemsize
-        return self._field_count() * cells_y * cells_z * size + self._patches() * (4 * size + 2 * 4)
+        return self._field_count() * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4)
 
     def _field_count(self) -> int:
         return 2 if self.resolution.nodal else 3 if self.variant.degrades else 0
@@ -446,7 +446,7 @@ class _Task:
         for name in ("exposure", "gain", "filtered")[: self._field_count()]:
             setattr(scratch, name, empty(slots * cells_y * cells_z))
         patches = slots * self._patches()
-        for name in ("area", "gain", "y", "z"):
+        for name in ("area", "gain", "tile_y", "tile_z", "y", "z"):
             setattr(touches, name, empty(patches))
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
