@@ -75,7 +75,7 @@ def plate_of(
 ) -> Any:
     """The Plate of a tile of material fractions, with the filter of a degradation length on a grid of some spacing."""
     plate = struct()
-    plate.tile = wp.array(tile.reshape(-1), dtype=real, device=device)
+    plate.tile = wp.array(np.pad(tile, (0, 1), mode="wrap").reshape(-1), dtype=real, device=device)
     plate.tile_y, plate.tile_z = tile.shape
     plate.period_y, plate.period_z = period
     plate.half_y, plate.half_z = size[0] / 2, size[1] / 2
