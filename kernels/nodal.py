@@ -30,14 +30,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func
-    def within(index: wp.int32, period: wp.int32):
-        """The index brought into 0 … period − 1."""
-        rest = index % period
-        if rest < 0:
-            rest += period
-        return rest
-
-    @wp.func
     def open_window(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
         """A slot's window about a hit: nodes at the centres of the tile's cells, each with its share of the resistance;
         nothing touched."""
@@ -48,8 +40,8 @@ def build(variant: Variant) -> SimpleNamespace:
         window.z0 = real((wp.float64(home_z) + wp.float64(0.5)) * dz - hit_z)
         index = window.first
         for i in range(fields.cells_y):
-            row = within(home_y + i - fields.cells_y // 2, plate.tile_y) * (plate.tile_z + 1)
-            column = within(home_z - fields.cells_z // 2, plate.tile_z)
+            row = grid.within(home_y % plate.tile_y + i - fields.cells_y // 2, plate.tile_y) * (plate.tile_z + 1)
+            column = grid.within(home_z % plate.tile_z - fields.cells_z // 2, plate.tile_z)
             y = window.y0 + real(i - fields.cells_y // 2) * real(dy)
             for j in range(fields.cells_z):
                 share = plate.tile[row + column]

@@ -54,17 +54,19 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Window:
         """One slot's part of the fields, and how to find the tile. The hit is the node of index `home`: a shot
-        computes the same bits in a window of any size. The hit's place in the tile and what brings a way there,
-        in periods; the rims of a finite plate [m], seen from the hit. (y0, z0): where the literal scheme has
-        its node `home` [m]."""
+        computes the same bits in a window of any size. The cell of the tile whose centre precedes the hit, the hit's
+        place from there, and cells per metre; the rims of a finite plate [m], seen from the hit. (y0, z0): where the
+        literal scheme has its node `home` [m]."""
 
         first: wp.int32
         home: wp.int32
         per_cell: real
+        row: wp.int32
+        column: wp.int32
         tile_y: real
         tile_z: real
-        per_period_y: real
-        per_period_z: real
+        per_row: real
+        per_column: real
         low_y: real
         high_y: real
         low_z: real
@@ -96,11 +98,16 @@ def build(variant: Variant) -> SimpleNamespace:
         window.first = slot * fields.cells_y * fields.cells_z
         window.home = window.first + (fields.cells_y // 2) * fields.cells_z + fields.cells_z // 2
         window.per_cell = one / plate.spacing
-        across, along = hit_y / plate.period_y, hit_z / plate.period_z
+        # In cells of the tile, between whose centres a point lies; whole cells and the rest apart, so that hits a
+        # lattice vector of whole cells apart compute the same bits.
+        across = hit_y * wp.float64(plate.tile_y) / plate.period_y - wp.float64(0.5)
+        along = hit_z * wp.float64(plate.tile_z) / plate.period_z - wp.float64(0.5)
+        window.row = wp.int32(wp.floor(across)) % plate.tile_y
+        window.column = wp.int32(wp.floor(along)) % plate.tile_z
         window.tile_y = real(across - wp.floor(across))
         window.tile_z = real(along - wp.floor(along))
-        window.per_period_y = real(wp.float64(1.0) / plate.period_y)
-        window.per_period_z = real(wp.float64(1.0) / plate.period_z)
+        window.per_row = real(wp.float64(plate.tile_y) / plate.period_y)
+        window.per_column = real(wp.float64(plate.tile_z) / plate.period_z)
         window.low_y = real(-plate.half_y - hit_y)
         window.high_y = real(plate.half_y - hit_y)
         window.low_z = real(-plate.half_z - hit_z)
@@ -108,31 +115,35 @@ def build(variant: Variant) -> SimpleNamespace:
         return window
 
     @wp.func
+    def within(index: wp.int32, period: wp.int32):
+        """The index, of a few periods, brought into 0 … period − 1; a CPU vectorises floor, but no remainder."""
+        return index - period * wp.int32(wp.floor((real(index) + half) / real(period)))
+
+    @wp.func
     def tile_at(plate: Plate, window: Window, y: real, z: real):
         """The cells of the tile whose centres enclose a point: index of the first, and the point's place."""
-        across = window.tile_y + y * window.per_period_y - half / real(plate.tile_y)
-        along = window.tile_z + z * window.per_period_z - half / real(plate.tile_z)
-        across = (across - wp.floor(across)) * real(plate.tile_y)
-        along = (along - wp.floor(along)) * real(plate.tile_z)
-        row = wp.min(wp.int32(across), plate.tile_y - 1)
-        column = wp.min(wp.int32(along), plate.tile_z - 1)
+        across = window.tile_y + y * window.per_row
+        along = window.tile_z + z * window.per_column
+        row, column = wp.floor(across), wp.floor(along)
         cell = Cell()
-        cell.index = row * (plate.tile_z + 1) + column
-        cell.y = across - real(row)
-        cell.z = along - real(column)
+        cell.index = within(window.row + wp.int32(row), plate.tile_y) * (plate.tile_z + 1) + within(
+            window.column + wp.int32(column), plate.tile_z
+        )
+        cell.y = across - row
+        cell.z = along - column
         return cell
 
     @wp.func
     def clearance(plate: Plate, window: Window):
         """How far at least the hit is from any material [m]."""
-        row = wp.min(wp.int32(window.tile_y * real(plate.tile_y)), plate.tile_y - 1)
-        column = wp.min(wp.int32(window.tile_z * real(plate.tile_z)), plate.tile_z - 1)
+        row = within(window.row + wp.int32(window.tile_y + half), plate.tile_y)
+        column = within(window.column + wp.int32(window.tile_z + half), plate.tile_z)
         return plate.clear[row * plate.tile_z + column]
 
     @wp.func
     def on_plate(plate: Plate, window: Window, y: real, z: real):
-        """Share of a grid cell's width about a point that lies on a finite plate."""
-        width = plate.spacing
+        """Share of half a grid cell, as wide as a cell of the tile, about a point that lies on a finite plate."""
+        width = half * plate.spacing
         inside_y = wp.min(y - window.low_y, window.high_y - y) / width + half
         inside_z = wp.min(z - window.low_z, window.high_z - z) / width + half
         return wp.clamp(inside_y, zero, one) * wp.clamp(inside_z, zero, one)
@@ -282,6 +293,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Cell=Cell,
         Box=Box,
         window_at=window_at,
+        within=within,
         tile_at=tile_at,
         clearance=clearance,
         on_plate=on_plate,

@@ -190,14 +190,14 @@ def test_material_on_the_edge_of_the_period_is_that_of_both_sides(device: str) -
 @pytest.mark.parametrize("far", [0.0, 70.0])
 @pytest.mark.parametrize(("variant", "rounding"), [(VARIANT, 1e-9), (SINGLE, 1e-5)], ids=["double", "single"])
 def test_finite_plate_ends_at_its_rim(far: float, variant: Variant, rounding: float, device: str) -> None:
-    # The share of a cell of the grid about a point that lies within the rim, here 70 m away too.
+    # The share of half a cell of the grid about a point that lies within the rim, here 70 m away too.
     size, y, z = np.array([3.3e-3, 2.5e-3]) + 2 * far, *np.random.default_rng(4).uniform(-4e-3, 4e-3, (2, 5000))
     for hit in HITS / 10 + far:
         _, found = beneath(variant, hit, y, z, device, size=size)
         shares = []
         for points, at, extent in zip((y, z), hit, size, strict=True):
-            edges = np.clip(at + points[:, None] + [-CELL / 2, CELL / 2], -extent / 2, extent / 2)
-            shares.append(np.diff(edges, axis=1)[:, 0] / CELL)
+            edges = np.clip(at + points[:, None] + [-CELL / 4, CELL / 4], -extent / 2, extent / 2)
+            shares.append(np.diff(edges, axis=1)[:, 0] / (CELL / 2))
         np.testing.assert_allclose(found, np.prod(shares, axis=0), atol=rounding)
         assert {0.0, 1.0} < set(found)
 

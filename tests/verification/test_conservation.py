@@ -81,6 +81,6 @@ def test_change_of_momentum_is_the_impulse_of_the_load(name: str) -> None:
         momentum = mass * shots.velocity[k]
         rounding = 2 * EPSILON["double"] * momentum
         change = mass * np.diff(history.velocity, axis=0)
-        assert change == pytest.approx(step * history.force[1:], abs=rounding, rel=1e-9)
+        assert change == pytest.approx(step * history.force[1:], abs=rounding, rel=1e-7)
         turning = np.diff(history.angular_momentum, axis=0)
-        assert turning == pytest.approx(step * history.moment[1:], abs=rounding * reach, rel=1e-9)
+        assert turning == pytest.approx(step * history.moment[1:], abs=rounding * reach, rel=1e-7)

@@ -21,11 +21,11 @@ def shots(y: np.ndarray = Y, z: np.ndarray = Z, **changes: float) -> Shots:
     return shots_at(y, z, **ATTITUDE | changes)
 
 
-# Only rounding tells the scenes apart. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 2e-6 rad,
+# Only rounding tells the scenes apart. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 3e-6 rad,
 # but 4e-5 rad where a core points across the view (pitch near 90°); double precision: 5e8 times less.
 SINGLE_TOLERANCE = {
     "residual_velocity": 1e-3,
-    "deflection": 2e-6,
+    "deflection": 4e-6,
     "energy_loss": 4e-3,
     "angular_velocity": 0.3,
     "tilt": 2e-5,

@@ -42,8 +42,8 @@ def campaign() -> Campaign:
 @pytest.fixture(scope="module")
 def small(campaign: Campaign) -> xarray.Dataset:
     """A study of three settings and the literal scheme on a coarse grid, 16 hits."""
-    core, plate, velocity = campaign.core, campaign.plate, campaign.impact.velocity
-    settings = {name: spelt_out(setting, core, plate, velocity) for name, setting in LADDER.items()}
+    core, plate, impact = campaign.core, campaign.plate, campaign.impact
+    settings = {name: spelt_out(setting, core, plate, impact) for name, setting in LADDER.items()}
     settings["nodal"] = Numerics(scheme="nodal", grid_spacing=5e-5)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(studies, "MEASURED_TIME", 0.0)
@@ -144,12 +144,13 @@ def test_runs_for_the_extrapolation_differ_in_the_time_step_alone(campaign: Camp
 
 
 def test_spelt_out_fidelities_resolve_as_their_names_do(campaign: Campaign) -> None:
-    velocity = campaign.impact.velocity
+    impact = campaign.impact
     for name, fidelity in FIDELITIES.items():
         named = resolve(Numerics(fidelity=name), campaign.core, campaign.plate)
-        spelt = resolve(spelt_out(fidelity, campaign.core, campaign.plate, velocity), campaign.core, campaign.plate)
-        assert spelt.step_at(velocity) == pytest.approx(named.step_at(velocity), rel=1e-12)
-        assert spelt.time_step == pytest.approx(named.way / velocity, rel=1e-12)
+        spelt = resolve(spelt_out(fidelity, campaign.core, campaign.plate, impact), campaign.core, campaign.plate)
+        step = named.step_at(impact.velocity, impact.obliquity)
+        assert spelt.step_at(impact.velocity, impact.obliquity) == pytest.approx(step, rel=1e-12)
+        assert spelt.time_step == pytest.approx(step, rel=1e-12)
         for field in ("nodal", "double", "patches_axial", "patches_around", "grid_spacing"):
             assert getattr(spelt, field) == getattr(named, field)
 
@@ -159,7 +160,7 @@ def test_default_settings_hold_fidelities_sweep_and_literal_scheme(campaign: Cam
     assert len(settings) == len(FIDELITIES) + len(studies.SWEEP) + 2
     assert settings["draft"].fidelity == "draft"
     assert settings["nodal, 0.5 µs"] == Numerics(scheme="nodal", time_step=0.5e-6)
-    assert label(campaign, settings["8×16, ℓ/0.5, 3.86 µs"]) == "8×16, ℓ/0.5, 3.86 µs"
+    assert label(campaign, settings["8×12, ℓ/0.7, 3.86 µs"]) == "8×12, ℓ/0.7, 3.86 µs"
 
 
 def test_errors_fall_from_coarse_to_fine(small: xarray.Dataset) -> None:
@@ -216,7 +217,7 @@ def test_file_gives_back_what_was_measured(small: xarray.Dataset, tmp_path: Path
 
 def test_progress_ends_with_all_hits_and_never_goes_back(campaign: Campaign) -> None:
     seen: list[tuple[int, int]] = []
-    settings = {"only": spelt_out(LADDER["coarse"], campaign.core, campaign.plate, campaign.impact.velocity)}
+    settings = {"only": spelt_out(LADDER["coarse"], campaign.core, campaign.plate, campaign.impact)}
     levels = (LADDER["coarse"], LADDER["middle"])
     study(campaign, hits=8, device="cpu", settings=settings, levels=levels, progress=lambda *now: seen.append(now))
     assert seen == sorted(seen)
