@@ -58,8 +58,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def node_under(fields: Fields, window: Window, point: vec3):
         """Index of the nearest node."""
-        row = wp.int32(wp.floor((point[1] - window.y0) * window.per_cell + half))
-        column = wp.int32(wp.floor((point[2] - window.z0) * window.per_cell + half))
+        row = wp.int32(wp.floor((point[1] - window.y0) * window.per_row + half))
+        column = wp.int32(wp.floor((point[2] - window.z0) * window.per_column + half))
         return window.home + row * fields.cells_z + column
 
     @wp.func

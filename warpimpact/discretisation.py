@@ -306,7 +306,9 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
         MemoryError: the tile does not fit; the message is for a person.
     """
     period_y, period_z = plate.pattern.period
-    count_y, count_z = (max(1, int(np.ceil(p / spacing - 1e-9))) for p in (period_y, period_z))
+    # An even number, so that a row staggered by half a period sees the same cells.
+    step = 1 if sharp else 2
+    count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
     dy, dz = period_y / count_y, period_z / count_z
     needed, free = 2 * 8 * count_y * count_z, psutil.virtual_memory().available
     if needed > free:

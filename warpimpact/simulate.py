@@ -286,6 +286,8 @@ class _Task:
         plate.clear = self._array(tile.clearance.reshape(-1))
         plate.tile_y, plate.tile_z = tile.material.shape
         plate.period_y, plate.period_z = self.plate.pattern.period
+        if nodal:  # nodes are the tile's cells, which fit the period
+            self.spacing = min(tile.dy, tile.dz)
         plate.spacing = self.spacing
         size = self.plate.size or (math.inf, math.inf)
         plate.half_y, plate.half_z = 0.5 * size[0], 0.5 * size[1]

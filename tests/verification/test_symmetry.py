@@ -21,15 +21,15 @@ def shots(y: np.ndarray = Y, z: np.ndarray = Z, **changes: float) -> Shots:
     return shots_at(y, z, **ATTITUDE | changes)
 
 
-# Only rounding tells the scenes apart. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 3e-6 rad,
+# Only rounding tells the scenes apart. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 3e-6 rad (angles after 130 mm 4e-5),
 # but 4e-5 rad where a core points across the view (pitch near 90°); double precision: 5e8 times less.
 SINGLE_TOLERANCE = {
     "residual_velocity": 1e-3,
     "deflection": 4e-6,
     "energy_loss": 4e-3,
     "angular_velocity": 0.3,
-    "tilt": 2e-5,
-    "total_yaw": 2e-5,
+    "tilt": 6e-5,
+    "total_yaw": 6e-5,
     "pitch": 4e-4,
     "yaw": 4e-4,
 }
