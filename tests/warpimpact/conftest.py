@@ -10,6 +10,7 @@ import xarray
 
 from warpimpact import results
 from warpimpact.kernels.status import Status
+from warpimpact.scene import Shots
 
 STANDOFFS = np.array([0.05, 0.13])
 PERIOD = (16e-3, 8e-3)
@@ -23,9 +24,9 @@ def scattered_hits(count: int) -> np.ndarray:
     return (np.random.default_rng(5).random((count, 2)) - 0.5) * PERIOD
 
 
-def shots_at(hits: np.ndarray) -> SimpleNamespace:
+def shots_at(hits: np.ndarray) -> Shots:
     n = len(hits)
-    return SimpleNamespace(
+    return Shots(
         hit_y=hits[:, 0],
         hit_z=hits[:, 1],
         velocity=np.full(n, 825.0),

@@ -15,7 +15,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.discretisation import Fidelity
 from warpimpact.refine import level
 from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, ResultError, history_dataset, to_dataset
-from warpimpact.scene import Numerics, make_shots
+from warpimpact.scene import Numerics
 
 ROUNDING = {"residual_velocity": 0.1, "deflection": 0.5, "tilt": 0.5}
 """How far another device's rounding may move an outcome [m/s, degree]. Between single and double precision, 6144
@@ -44,10 +44,10 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     if not 0 <= hit < hits:
         raise ResultError(f"hit: got {hit}, but the result has hits 0 to {hits - 1}")
     campaign = _campaign(result, folder)
-    shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
-    if len(shots) != hits:
-        raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(shots)}")
-    shot = shots[hit : hit + 1]
+    sampler = campaign.sampler()
+    if len(sampler) != hits and (campaign.stop is None or len(sampler) < hits):
+        raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(sampler)}")
+    shot = sampler.shots(hit, 1)
     again = simulate.replay(
         campaign.core,
         campaign.plate,

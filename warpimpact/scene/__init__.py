@@ -14,7 +14,9 @@ from .patterns import (
     TrianglePattern,
 )
 from .plate import Plate
-from .shots import Hits, Impact, Shots, make_shots
+from .sampling import Sampler, make_shots
+from .scatter import Scatter
+from .shots import Hits, Impact, Shots
 
 __all__ = [
     "AnyCore",
@@ -35,6 +37,8 @@ __all__ = [
     "Plate",
     "PolynomialCore",
     "ProfileCore",
+    "Sampler",
+    "Scatter",
     "Shots",
     "SlotPattern",
     "Tolerance",
