@@ -51,6 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"warpimpact {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_run(commands)
+    _add_inspect(commands)
     _add_plot(commands)
     _add_replay(commands)
     _add_study(commands)
@@ -78,6 +79,19 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         "--overwrite", action="store_true", help="replace an existing result, and a run that was broken off"
     )
     parser.set_defaults(command=_run)
+
+
+def _add_inspect(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "inspect",
+        help="tell what is in a result",
+        description="Tell who made a result, from what campaign, its numbers with their intervals, and which shots "
+        "failed.",
+        epilog="example: warpimpact inspect slotted.nc",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument("--campaign", action="store_true", help="print the campaign that it carries, and no more")
+    parser.set_defaults(command=_inspect)
 
 
 def _add_plot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -271,6 +285,14 @@ def _running(standing: "Standing") -> str:
         if estimate.count > 1
     ]
     return ", ".join([*parts, f"{standing.failed} failed"])
+
+
+def _inspect(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .analysis.inspect import inspect_text
+
+    with results.opened(arguments.result) as dataset:
+        print(dataset.attrs["campaign"] if arguments.campaign else inspect_text(dataset))
 
 
 def _plot(arguments: argparse.Namespace) -> None:

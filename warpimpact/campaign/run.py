@@ -285,7 +285,8 @@ class _Watch:
         """How far the run is, with shots of unfinished shards."""
         tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
         estimates = {tally.measure: tally.estimate() for tally in tallies if tally.measure.kind != "quantile"}
-        return Standing(min(self.done + underway, self._total), self._total, self.resumed, self.failed, estimates)
+        done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
+        return Standing(done, self._total, self.resumed, self.failed, estimates)
 
 
 def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:
