@@ -264,7 +264,7 @@ def _log_standing() -> "Callable[[Standing], None]":
             return
         shown, last = tenths, elapsed
         line = f"{standing.done} of {standing.total} hits"
-        if (fresh := standing.done - standing.resumed) > 0:
+        if (fresh := standing.done - standing.resumed) > 0 and elapsed > 0.0:
             left = (standing.total - standing.done) * elapsed / fresh
             line += f", {fresh / elapsed:.4g} hits/s, {left:.0f} s left; {_running(standing)}"
         print(line, file=sys.stderr, flush=True)

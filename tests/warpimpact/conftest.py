@@ -1,9 +1,11 @@
 """Results made by hand: shots and outcomes whose values a test knows."""
 
 from collections.abc import Callable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray
@@ -81,3 +83,21 @@ def make_result() -> ResultMaker:
         )
 
     return make
+
+
+def _assert_same_bits(one: Path, other: Path) -> None:
+    """Variable by variable, as it lies in the files."""
+    with netCDF4.Dataset(one) as a, netCDF4.Dataset(other) as b:
+        assert a.variables.keys() == b.variables.keys()
+        for name, variable in a.variables.items():
+            variable.set_auto_maskandscale(False)
+            b[name].set_auto_maskandscale(False)
+            assert variable[...].tobytes() == b[name][...].tobytes(), name
+            assert variable.dimensions == b[name].dimensions
+            assert str(variable.__dict__) == str(b[name].__dict__)
+
+
+@pytest.fixture(scope="session")
+def assert_same_bits() -> Callable[[Path, Path], None]:
+    """A function of two result files."""
+    return _assert_same_bits

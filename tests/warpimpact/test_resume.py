@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import netCDF4
@@ -23,6 +24,7 @@ from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
 from warpimpact.results import OutputError
 
+SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
 COUNT = 4000  # sixteen shards, the last one short
@@ -49,20 +51,8 @@ def undisturbed(campaign: Campaign, tmp_path_factory: pytest.TempPathFactory) ->
     return path
 
 
-def assert_same_bits(one: Path, other: Path) -> None:
-    """Variable by variable, as it lies in the files."""
-    with netCDF4.Dataset(one) as a, netCDF4.Dataset(other) as b:
-        assert a.variables.keys() == b.variables.keys()
-        for name, variable in a.variables.items():
-            variable.set_auto_maskandscale(False)
-            b[name].set_auto_maskandscale(False)
-            assert variable[...].tobytes() == b[name][...].tobytes(), name
-            assert variable.dimensions == b[name].dimensions
-            assert str(variable.__dict__) == str(b[name].__dict__)
-
-
 def test_runs_killed_at_any_moment_end_with_the_same_bits(
-    campaign_file: Path, undisturbed: Path, tmp_path: Path
+    campaign_file: Path, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
 ) -> None:
     # A server that has imported everything forks real processes without the second that imports take.
     def command(path: Path) -> list[str]:
@@ -100,7 +90,7 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
 
 
 def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
-    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: SameBits
 ) -> None:
     """Every call that changes a name on the disk is the last one in its turn."""
     output, steps = tmp_path / "a.nc", 0
@@ -170,7 +160,7 @@ def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
 
 
 def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
-    broken_off: Path, campaign: Campaign, undisturbed: Path
+    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
 ) -> None:
     with pytest.raises(OutputError, match=r"holds a run that has not ended .* --resume or begin anew with --overwrite"):
         run_to_file(campaign, broken_off, device="cpu")
@@ -184,14 +174,18 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
     assert broken_off.stat() == before
 
 
-def test_overwriting_begins_anew(broken_off: Path, campaign: Campaign, undisturbed: Path) -> None:
+def test_overwriting_begins_anew(
+    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
+) -> None:
     standings: list[Standing] = []
     run_to_file(campaign, broken_off, device="cpu", overwrite=True, progress=standings.append)
     assert standings[0].resumed == 0
     assert_same_bits(broken_off, undisturbed)
 
 
-def test_an_old_result_stays_until_the_new_one_is_complete(campaign: Campaign, undisturbed: Path, tmp_path: Path):
+def test_an_old_result_stays_until_the_new_one_is_complete(
+    campaign: Campaign, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+):
     output = tmp_path / "a.nc"
     output.write_text("old")
     with pytest.raises(Interrupted):
@@ -235,7 +229,9 @@ def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -
     assert parts.difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
 
 
-def test_a_damaged_shard_is_computed_again(broken_off: Path, campaign: Campaign, undisturbed: Path) -> None:
+def test_a_damaged_shard_is_computed_again(
+    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
+) -> None:
     shard = min(broken_off.with_name("a.nc.parts").glob("hits_*.nc"))
     shard.write_bytes(shard.read_bytes()[:1000])
     run_to_file(campaign, broken_off, device="cpu", resume=True)
@@ -264,7 +260,9 @@ def _with_files_up_to(size: int, *command: str) -> subprocess.CompletedProcess[s
     return subprocess.run([*WARPIMPACT, *command], preexec_fn=limit, capture_output=True, text=True, check=False)
 
 
-def test_a_disk_that_is_full_at_the_end_loses_nothing(campaign_file: Path, undisturbed: Path, tmp_path: Path) -> None:
+def test_a_disk_that_is_full_at_the_end_loses_nothing(
+    campaign_file: Path, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+) -> None:
     output = tmp_path / "a.nc"
     command = ("run", str(campaign_file), "-o", str(output), "--device", "cpu")
     # The kernels of this campaign are in Warp's cache: shards fit, the whole file does not.

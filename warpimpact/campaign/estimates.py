@@ -227,18 +227,30 @@ class Tally:
         pooled = _Sample.pooled(self._replicates)
         if pooled.count == 0:
             return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
-        value, interval = self._center(pooled), self._independent
-        if len(self._replicates) > 1 and all(sample.count for sample in self._replicates):
-            answers = np.array([self._center(sample) for sample in self._replicates])
-            value = float(answers.mean())
-            # Replicates that all say the same of something that happens or not (never, mostly) tell nothing.
-            if not (self.measure.is_binary and np.ptp(answers) == 0.0):
-                half = _student(self.confidence, len(answers)) * float(answers.std(ddof=1))
-                return Estimate(value, value - half, value + half, pooled.count, pooled.deviation)
-        return Estimate(value, *interval(pooled), pooled.count, pooled.deviation)
+        value = pooled.quantile(self.measure.share) if self.measure.kind == "quantile" else pooled.mean
+        interval = self._of_replicates(pooled, value) or self._independent(pooled)
+        return Estimate(value, *interval, pooled.count, pooled.deviation)
 
-    def _center(self, sample: _Sample) -> float:
-        return sample.quantile(self.measure.share) if self.measure.kind == "quantile" else sample.mean
+    def _of_replicates(self, pooled: _Sample, value: float) -> tuple[float, float] | None:
+        """Interval from the spread of the replicates, None where there is none to tell from.
+
+        That of a quantile is Woodruff's: the replicates say how certain the share below it is (R. S. Woodruff, Journal
+        of the American Statistical Association 47 (1952) 635). Their own quantiles would be biased.
+        """
+        replicates = [sample for sample in self._replicates if sample.count]
+        if len(replicates) < 2:
+            return None
+        quantile = self.measure.kind == "quantile"
+        answers = [float((one.values <= value).mean()) if quantile else one.mean for one in replicates]
+        half = _student(self.confidence, len(answers)) * float(np.std(answers, ddof=1))
+        # Replicates that all say the same of something that happens or not (never, mostly) tell nothing.
+        if half == 0.0 and (quantile or self.measure.is_binary):
+            return None
+        if not quantile:
+            return value - half, value + half
+        ends = (self.measure.share - half, self.measure.share + half)
+        low, high = (pooled.quantile(end) if 0.0 < end < 1.0 else math.nan for end in ends)
+        return low, high
 
     def _independent(self, sample: _Sample) -> tuple[float, float]:
         """Interval as of independent shots."""
@@ -318,7 +330,7 @@ class _Sample:
 
     def quantile(self, share: float) -> float:
         """Value below which this share of the numbers lies."""
-        return float(np.quantile(self.values, share))
+        return float(np.quantile(self.values, share, method="hazen"))
 
 
 def looks(sampling: str, shards: int) -> Iterator[int]:

@@ -228,7 +228,7 @@ class _Watch:
         self._total, self._shards = total, -(-total // size)
         self._rule = campaign.stop
         last = campaign.output.standoffs[-1]
-        measures = [Measure.parse("mean(residual_velocity)"), Measure.parse(f"mean(tilt@{last * 1e3!r}mm)")]
+        measures = [Measure.parse("mean(residual_velocity)"), Measure.parse(f"mean(tilt@{last * 1e3:.10g}mm)")]
         self._tallies = [Tally(measure, replicates=campaign.replicates) for measure in measures]
         if self._rule is not None:
             rule = self._rule
