@@ -36,10 +36,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _mistakes() -> tuple[type[Exception], ...]:
     """Errors whose message is for the user; imported once there is an error, to keep `--help` quick."""
     from .campaign.campaign import CampaignError
+    from .campaign.team import ClusterError
     from .results import OutputError, ResultError
     from .simulate import DeviceError, UnsupportedError
 
-    return CampaignError, OutputError, ResultError, DeviceError, UnsupportedError
+    return CampaignError, ClusterError, OutputError, ResultError, DeviceError, UnsupportedError
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -71,6 +72,9 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         "-o", "--output", type=Path, metavar="RESULT.nc", help="result (default: the campaign's name, here)"
     )
     _add_device(parser)
+    cluster = parser.add_mutually_exclusive_group()
+    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
+    cluster.add_argument("--workers", type=_positive, metavar="N", help="compute in N processes of this machine")
     parser.add_argument("--count", type=int, metavar="N", help="number of hits, in place of the campaign's")
     parser.add_argument(
         "--resume", action="store_true", help="continue a run that was broken off; begin where there is none"
@@ -172,7 +176,10 @@ def _add_validate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--device", default="auto", metavar="auto|cpu|cuda:0", help="auto takes CUDA where there is one"
+        "--device",
+        default="auto",
+        metavar="auto|cpu|cuda:0",
+        help="auto takes CUDA where there is any; several for a run: cuda:0,cuda:1",
     )
 
 
@@ -181,16 +188,21 @@ def _run(arguments: argparse.Namespace) -> int:
     from .analysis.summary import summary_text
     from .campaign.campaign import Campaign, CampaignError
     from .campaign.run import run_to_file
+    from .campaign.team import cluster_team
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     _check_place(output)
+    team = None
+    if arguments.scheduler or arguments.workers:
+        team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
     try:
         with _terminated_as_interrupted(), _standing() as progress:
             run_to_file(
                 campaign,
                 output,
                 device=arguments.device,
+                team=team,
                 resume=arguments.resume,
                 overwrite=arguments.overwrite,
                 progress=progress,

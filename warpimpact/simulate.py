@@ -125,7 +125,7 @@ def simulate(
         UnsupportedError: a quantity differs from shot to shot that the kernels take as one number.
     """
     task = _Task(core, plate, interaction or Interaction(), numerics or Numerics(), shots, find_device(device))
-    task.threads = threads or _cores()
+    task.threads = threads or cores()
     contact = task.march(progress or _unseen)
     return task.report(contact, np.asarray(standoffs, dtype=float), standoff_point)
 
@@ -233,7 +233,7 @@ class _Task:
         traced: bool = False,
     ) -> None:
         _refuse_unsupported(shots)
-        self.core, self.plate, self.shots, self.device, self.threads = core, plate, shots, device, _cores()
+        self.core, self.plate, self.shots, self.device, self.threads = core, plate, shots, device, cores()
         self.resolution = discretisation.resolve(numerics, core, plate)
         a0, a1, a2 = interaction.coefficients(plate)
         self.variant = Variant(
@@ -537,7 +537,7 @@ def _refuse_unsupported(shots: Shots) -> None:
         )
 
 
-def _cores() -> int:
+def cores() -> int:
     """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

@@ -1,6 +1,6 @@
 """Results made by hand: shots and outcomes whose values a test knows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +11,7 @@ import pytest
 import xarray
 
 from warpimpact import results
+from warpimpact.campaign import parts
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Shots
 
@@ -95,6 +96,14 @@ def _assert_same_bits(one: Path, other: Path) -> None:
             assert variable[...].tobytes() == b[name][...].tobytes(), name
             assert variable.dimensions == b[name].dimensions
             assert str(variable.__dict__) == str(b[name].__dict__)
+
+
+@pytest.fixture(scope="module")
+def small_shards() -> Iterator[None]:
+    """Shards as in small_shards.py."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(parts, "FEWEST", 256)
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -29,11 +29,17 @@ SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
 COUNT = 4000  # sixteen shards, the last one short
 KILLS = 20
-WARPIMPACT = (sys.executable, "-c", "from warpimpact.cli import main; raise SystemExit(main())")
+HERE = Path(__file__).parent
+pytestmark = pytest.mark.usefixtures("small_shards")
+WARPIMPACT = (
+    sys.executable,
+    "-c",
+    "import small_shards; from warpimpact.cli import main; raise SystemExit(main())",
+)
 
 
 @pytest.fixture(scope="module")
-def campaign_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def campaign_file(tmp_path_factory: pytest.TempPathFactory, small_shards: None) -> Path:
     path = tmp_path_factory.mktemp("campaign") / "campaign.toml"
     path.write_text(DRAFT.replace("count = 4096", f"count = {COUNT}"), encoding="utf-8")
     return path
@@ -52,14 +58,19 @@ def undisturbed(campaign: Campaign, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def test_runs_killed_at_any_moment_end_with_the_same_bits(
-    campaign_file: Path, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+    campaign_file: Path,
+    undisturbed: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    assert_same_bits: SameBits,
 ) -> None:
     # A server that has imported everything forks real processes without the second that imports take.
     def command(path: Path) -> list[str]:
         return ["run", str(campaign_file), "-o", str(path), "--device", "cpu", "--resume"]
 
+    monkeypatch.syspath_prepend(HERE)
     processes = multiprocessing.get_context("forkserver")
-    processes.set_forkserver_preload(["warpimpact.cli", "warpimpact.campaign.run", "scipy.stats"])
+    processes.set_forkserver_preload(["small_shards", "warpimpact.campaign.run", "scipy.stats"])
     moments, output = random.Random(1), tmp_path / "a.nc"
     for _ in range(2):  # the first one waits for the imports
         begin = time.monotonic()
@@ -257,7 +268,14 @@ def _with_files_up_to(size: int, *command: str) -> subprocess.CompletedProcess[s
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
-    return subprocess.run([*WARPIMPACT, *command], preexec_fn=limit, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [*WARPIMPACT, *command],
+        preexec_fn=limit,
+        env=os.environ | {"PYTHONPATH": str(HERE)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def test_a_disk_that_is_full_at_the_end_loses_nothing(
@@ -291,7 +309,9 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, tmp_pat
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
     path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 100000"), encoding="utf-8")
     command = [*WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.PIPE, text=True
+    ) as process:
         limit = time.monotonic() + 60.0
         while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
             assert process.poll() is None

@@ -23,8 +23,8 @@ from warpimpact.results import OutputError
 
 _MANIFEST = "manifest.json"
 _SHARDS = "hits_*.nc"
-FEWEST, MOST, SHARDS = 256, 2**16, 256
-"""Shots per shard, and how many shards are aimed at between these."""
+FEWEST, MOST, SHARDS = 2**10, 2**16, 256
+"""Shots per shard, and how many shards are aimed at between these. A shard costs some 40 ms beside its computing."""
 
 
 def extent(count: int) -> int:

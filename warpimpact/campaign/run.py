@@ -177,7 +177,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     waiting: dict[Future[xarray.Dataset], range] = {}
     try:
         while watch.end is None:
-            while len(waiting) < team.width and (task := next(tasks, None)) is not None:
+            while len(waiting) < team.width() and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
                 waiting[team.submit(shots)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)

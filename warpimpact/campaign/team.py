@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any
@@ -15,10 +16,14 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import compute, made_by
 from warpimpact.scene import Shots
-from warpimpact.simulate import DeviceError, find_device
+from warpimpact.simulate import DeviceError, cores, find_device
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
+
+
+class ClusterError(RuntimeError):
+    """A cluster that cannot be used; the message is for a person."""
 
 
 @dataclass(frozen=True)
@@ -27,14 +32,14 @@ class Team:
 
     Attributes:
         submit: hands over shots; their Dataset comes in the future.
-        width: tasks to keep under way: as many as compute, and as many that wait.
+        width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
         made_by: versions and kind of device, which decide the bits.
         underway: how many shots of unfinished tasks are done.
     """
 
     submit: Callable[[Shots], Future[xarray.Dataset]]
-    width: int
+    width: Callable[[], int]
     task: int
     made_by: dict[str, str]
     underway: Callable[[], int]
@@ -69,18 +74,81 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
             done[thread] = 0
             idle.put(name)
 
-    pool = ThreadPoolExecutor(len(devices))
+    pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
     try:
         yield Team(
             submit=lambda shots: pool.submit(work, shots),
-            width=2 * len(devices),
-            task=1 if devices[0].is_cpu else CUDA_SHOTS,
-            made_by=made_by(str(devices[0])),
+            width=lambda: 2 * len(devices),
+            task=_task_size(kind),
+            made_by=kind,
             underway=lambda: sum(done.copy().values()),
         )
     finally:
         stopping.set()
         pool.shutdown(cancel_futures=True)
+
+
+def _task_size(kind: dict[str, str]) -> int:
+    return 1 if kind["device"] == "cpu" else CUDA_SHOTS
+
+
+@contextmanager
+def cluster_team(
+    campaign: Campaign, *, address: str | None = None, workers: int | None = None, device: str = "auto"
+) -> Iterator[Team]:
+    """The workers of a Dask cluster; what one that dies was computing goes to another.
+
+    Args:
+        address: of a scheduler.
+        workers: processes to start on this machine, where there is no address.
+        device: that every worker computes on.
+
+    Raises:
+        ClusterError: dask is not installed, the scheduler cannot be reached, or shots kill one worker after another.
+        DeviceError: the workers lack the device, or compute other bits than the first one asked.
+    """
+    try:
+        from distributed import Client, KilledWorker, LocalCluster
+    except ImportError:
+        raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
+    with ExitStack() as stack:
+        threads = None
+        if address is None:
+            assert workers is not None
+            threads = max(1, cores() // workers)
+            cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL
+            )
+            address = stack.enter_context(cluster).scheduler_address
+        try:
+            client = stack.enter_context(Client(address, timeout="20s"))
+        except (OSError, ValueError) as error:
+            raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
+        kind = client.submit(made_by, device, pure=False).result()
+        executor = client.get_executor(pure=False)
+        try:
+            yield Team(
+                submit=lambda shots: executor.submit(_compute_alike, campaign, shots, device, threads, kind),
+                width=lambda: 2 * max(1, sum(client.nthreads().values())),
+                task=_task_size(kind),
+                made_by=kind,
+                underway=lambda: 0,
+            )
+        except KilledWorker as error:
+            raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+def _compute_alike(
+    campaign: Campaign, shots: Shots, device: str, threads: int | None, kind: dict[str, str]
+) -> xarray.Dataset:
+    """Compute shots on a worker that gives the same bits as the others."""
+    own = made_by(device)
+    if own != kind:
+        name = next(name for name in kind if own[name] != kind[name])
+        raise DeviceError(
+            f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
+        )
+    return compute(campaign, shots, device=device, threads=threads)
 
 
 def _devices(names: str) -> list[Any]:
