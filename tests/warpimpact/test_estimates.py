@@ -13,7 +13,7 @@ from warpimpact.analysis.summary import summary_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.estimates import Measure, Tally, looks
 from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import Interrupted, Standing, _Watch, run, run_to_file
+from warpimpact.campaign.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
 from warpimpact.kernels.status import Status
 
 SameBits = Callable[[Path, Path], None]
@@ -97,7 +97,7 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
     held, ends = 0, []
     for seed in range(TRIALS):
         reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
-        watch = _Watch(reseeded, 2**16, 256)
+        watch = _Watch(reseeded, 2**16, _Held(256))
         values = surface(reseeded, 0, 2**14)
         while watch.end is None:
             watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))

@@ -10,8 +10,10 @@ from scipy import stats
 
 from warpimpact import Campaign, Impact, Plate
 from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.compute import compute
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
+from warpimpact.results import OUTCOME_VARIABLES
 from warpimpact.scene import Hits, NoPattern, Sampler, Scatter, Shots
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.simulate import UnsupportedError
@@ -150,6 +152,17 @@ def test_a_campaign_in_python_comes_back_from_its_text_and_from_another_process(
     by_hand = Campaign(**{name: getattr(campaign, name) for name in Campaign.model_fields})
     assert Campaign.from_text(by_hand.text, name="text", folder=tmp_path).model_dump() == by_hand.model_dump()
     assert pickle.loads(pickle.dumps(campaign)).model_dump() == campaign.model_dump()
+
+
+def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
+    """The window on the plate is as large as the steepest shot of a batch needs."""
+    changes = 'obliquity = { distribution = "uniform", low = 0, high = "50 deg" }\nspin = 1e4'
+    campaign = campaign_with(tmp_path, (VELOCITY, f"{NORMAL}\n{changes}"))
+    whole = run(campaign, device="cpu")
+    for hit in range(0, 64, 9):
+        alone = compute(campaign, campaign.sampler().shots(hit, 1), device="cpu")
+        for name in OUTCOME_VARIABLES:
+            assert np.array_equal(alone[name][0], whole[name][hit], equal_nan=True), name
 
 
 @pytest.mark.parametrize("name", ["resistance", "shear_coefficient", "degradation", "thickness", "mass"])

@@ -158,8 +158,12 @@ class Parts:
             self.folder.mkdir()
         except OSError as error:
             raise OutputError(f"{self.folder}: cannot be written into ({error.strerror})") from None
-        with results.aside(self.folder / _MANIFEST) as file:
-            file.write_text(json.dumps({**self.content, "replaces": overwrite}, indent=1), encoding="utf-8")
+        try:
+            with results.aside(self.folder / _MANIFEST) as file:
+                file.write_text(json.dumps({**self.content, "replaces": overwrite}, indent=1), encoding="utf-8")
+        except OutputError:
+            self.discard()
+            raise
 
     def _shards(self) -> list[Path]:
         return sorted(self.folder.glob(_SHARDS))

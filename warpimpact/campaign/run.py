@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.estimates import MEASURED, Estimate, Measure, Tally, looks
+from warpimpact.campaign.estimates import Estimate, Measure, Tally, looks
 from warpimpact.campaign.parts import Parts, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import OutputError, failed
@@ -169,7 +169,7 @@ class _End:
 def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End:
     """Compute the shards that the store lacks, until all are there or the stop rule is met."""
     sampler = campaign.sampler()
-    watch = _Watch(campaign, len(sampler), store.extent)
+    watch = _Watch(campaign, len(sampler), store)
     for index in sorted(store.saved):
         watch.add(index, store.load(index))
     watch.resumed = watch.done
@@ -177,7 +177,8 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     waiting: dict[Future[xarray.Dataset], range] = {}
     try:
         while watch.end is None:
-            while len(waiting) < team.width() and (task := next(tasks, None)) is not None:
+            width = team.width()
+            while len(waiting) < width and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
                 waiting[team.submit(shots)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
@@ -224,8 +225,8 @@ class _Watch:
     same shots however it was computed.
     """
 
-    def __init__(self, campaign: Campaign, total: int, size: int) -> None:
-        self._total, self._shards = total, -(-total // size)
+    def __init__(self, campaign: Campaign, total: int, store: _Store) -> None:
+        self._total, self._shards, self._load = total, -(-total // store.extent), store.load
         self._rule = campaign.stop
         last = campaign.output.standoffs[-1]
         measures = [Measure.parse("mean(residual_velocity)"), Measure.parse(f"mean(tilt@{last * 1e3:.10g}mm)")]
@@ -235,18 +236,19 @@ class _Watch:
             self._stop = Tally(rule.measure, replicates=campaign.replicates, confidence=rule.confidence)
             self._looks = looks(campaign.hits.sampling, self._shards)
             self._look = next(self._looks)
-        self._early: dict[int, xarray.Dataset] = {}
+        self._early: set[int] = set()
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
         self.end: _End | None = None
 
     def add(self, index: int, shard: xarray.Dataset) -> None:
-        """Take in a shard."""
+        """Take in a shard that the store has; one that comes before its turn is loaded when that is."""
         self.done += shard.sizes["hit"]
         self.failed += int(failed(shard).sum())
-        self._early[index] = shard[["status", *MEASURED]]
+        self._early.add(index)
         while self.end is None and self._next in self._early:
-            self._advance(self._early.pop(self._next))
+            self._early.remove(self._next)
+            self._advance(shard if self._next == index else self._load(self._next))
 
     def _advance(self, shard: xarray.Dataset) -> None:
         self._next += 1
