@@ -305,24 +305,34 @@ def test_a_disk_that_is_full_at_once_leaves_nothing(size: int, saved: str, campa
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("by", "where"), [(signal.SIGINT, ["--workers", "1"]), (signal.SIGTERM, [])])
+def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: list[str], tmp_path: Path) -> None:
+    """A terminal sends Ctrl-C to all processes of the group; a batch system ends the first one."""
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
     path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 100000"), encoding="utf-8")
-    command = [*WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu"]
+    command = [*WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu", *where]
     with subprocess.Popen(
-        command, env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.PIPE, text=True
+        command,
+        env=os.environ | {"PYTHONPATH": str(HERE)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
     ) as process:
         limit = time.monotonic() + 60.0
         while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
             assert process.poll() is None
             assert time.monotonic() < limit
             time.sleep(0.05)
-        process.send_signal(by)
+        if by == signal.SIGINT:
+            os.killpg(process.pid, by)
+        else:
+            process.send_signal(by)
         begin = time.monotonic()
         _, shown = process.communicate(timeout=30)
     assert time.monotonic() - begin < 5.0  # it waits for no task
     assert process.returncode == 130
+    assert "Traceback" not in shown
     last = shown.splitlines()[-1]
     assert last.startswith("warpimpact: interrupted; ")
     assert last.endswith(f"shards are saved in {output}.parts; continue with --resume")

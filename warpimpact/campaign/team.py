@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import signal
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -108,7 +109,7 @@ def cluster_team(
         DeviceError: the workers lack the device, or compute other bits than the first one asked.
     """
     try:
-        from distributed import Client, KilledWorker, LocalCluster
+        from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
     with ExitStack() as stack:
@@ -124,6 +125,8 @@ def cluster_team(
             client = stack.enter_context(Client(address, timeout="20s"))
         except (OSError, ValueError) as error:
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
+        if threads is not None:
+            client.register_plugin(_ignoring_interrupts(WorkerPlugin))
         kind = client.submit(made_by, device, pure=False).result()
         executor = client.get_executor(pure=False)
         try:
@@ -136,6 +139,16 @@ def cluster_team(
             )
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+def _ignoring_interrupts(plugin: Any) -> Any:
+    """Plugin of workers on this machine, which Ctrl-C reaches, too: this process is the one that ends them."""
+
+    class Ignoring(plugin):
+        def setup(self, worker: Any) -> None:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return Ignoring()
 
 
 def _compute_alike(
