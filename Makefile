@@ -17,7 +17,7 @@ test: $(INSTALLED)
 	$(VENV)/bin/pytest tests/kernels tests/verification/test_determinism.py::test_any_chunk --warp-mode debug
 
 clean:
-	rm -rf $(VENV) build slotted.nc slotted_*.png
+	rm -rf $(VENV) build slotted.nc slotted.nc.parts slotted_*.png
 
 # Editable, so that the modules of kernels/ and campaigns/ are found inside the package from the checkout, too.
 $(INSTALLED): pyproject.toml Makefile

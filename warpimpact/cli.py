@@ -1,36 +1,46 @@
 """The warpimpact command."""
 
 import argparse
+import signal
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from . import __version__
 
+if TYPE_CHECKING:
+    import xarray
+
+    from .campaign.run import Standing
+
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code, 2 after a mistake that the user can put right."""
+    """Run one command; returns the exit code: 2 after a mistake that the user can put right, 3 when more shots failed
+    than the campaign allows, 130 when interrupted."""
     arguments = _parser().parse_args(argv)
     try:
-        arguments.command(arguments)
-    except KeyboardInterrupt:
-        print("warpimpact: interrupted", file=sys.stderr)
+        code: int | None = arguments.command(arguments)
+    except KeyboardInterrupt as interrupt:
+        print(f"warpimpact: {str(interrupt) or 'interrupted'}", file=sys.stderr)
         return 130
     except _mistakes() as error:
         print(f"warpimpact: error: {error}", file=sys.stderr)
         return 2
-    return 0
+    return code or 0
 
 
 def _mistakes() -> tuple[type[Exception], ...]:
     """Errors whose message is for the user; imported once there is an error, to keep `--help` quick."""
     from .campaign.campaign import CampaignError
+    from .campaign.team import ClusterError
     from .results import OutputError, ResultError
-    from .simulate import DeviceError
+    from .simulate import DeviceError, UnsupportedError
 
-    return CampaignError, OutputError, ResultError, DeviceError
+    return CampaignError, ClusterError, OutputError, ResultError, DeviceError, UnsupportedError
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -42,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"warpimpact {__version__}")
     commands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_run(commands)
+    _add_inspect(commands)
     _add_plot(commands)
     _add_replay(commands)
     _add_study(commands)
@@ -61,9 +72,30 @@ def _add_run(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         "-o", "--output", type=Path, metavar="RESULT.nc", help="result (default: the campaign's name, here)"
     )
     _add_device(parser)
+    cluster = parser.add_mutually_exclusive_group()
+    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
+    cluster.add_argument("--workers", type=_positive, metavar="N", help="compute in N processes of this machine")
     parser.add_argument("--count", type=int, metavar="N", help="number of hits, in place of the campaign's")
-    parser.add_argument("--overwrite", action="store_true", help="replace an existing result")
+    parser.add_argument(
+        "--resume", action="store_true", help="continue a run that was broken off; begin where there is none"
+    )
+    parser.add_argument(
+        "--overwrite", action="store_true", help="replace an existing result, and a run that was broken off"
+    )
     parser.set_defaults(command=_run)
+
+
+def _add_inspect(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "inspect",
+        help="tell what is in a result",
+        description="Tell who made a result, from what campaign, its numbers with their intervals, and which shots "
+        "failed.",
+        epilog="example: warpimpact inspect slotted.nc",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument("--campaign", action="store_true", help="print the campaign that it carries, and no more")
+    parser.set_defaults(command=_inspect)
 
 
 def _add_plot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -144,30 +176,137 @@ def _add_validate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]
 
 def _add_device(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--device", default="auto", metavar="auto|cpu|cuda:0", help="auto takes CUDA where there is one"
+        "--device",
+        default="auto",
+        metavar="auto|cpu|cuda:0",
+        help="auto takes CUDA where there is any; several for a run: cuda:0,cuda:1",
     )
 
 
-def _run(arguments: argparse.Namespace) -> None:
+def _run(arguments: argparse.Namespace) -> int:
     from . import results
     from .analysis.summary import summary_text, symmetry_text
     from .campaign.campaign import Campaign, CampaignError
-    from .campaign.run import run
+    from .campaign.run import run_to_file
+    from .campaign.team import cluster_team
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
-    _check_output(output, overwrite=arguments.overwrite)
+    _check_place(output)
+    team = None
+    if arguments.scheduler or arguments.workers:
+        team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
     try:
-        with _progress() as progress:
-            dataset = run(campaign, device=arguments.device, progress=progress)
+        with _terminated_as_interrupted(), _standing() as progress:
+            run_to_file(
+                campaign,
+                output,
+                device=arguments.device,
+                team=team,
+                resume=arguments.resume,
+                overwrite=arguments.overwrite,
+                progress=progress,
+            )
     except MemoryError as error:
         raise CampaignError(f"{arguments.campaign}: {error}") from None
-    results.write(dataset, output)
-    print(summary_text(dataset))
-    if "symmetries" in dataset.attrs:
-        print(symmetry_text(dataset))
-    print(f"{dataset.attrs['hits_per_second']:.4g} hits per second on {dataset.attrs['device']}")
-    print(f"written to {output}")
+    with results.opened(output) as dataset:
+        print(summary_text(dataset))
+        if "symmetries" in dataset.attrs:
+            print(symmetry_text(dataset))
+        print(f"{dataset.attrs['hits_per_second']:.4g} hits per second on {dataset.attrs['device']}")
+        print(f"written to {output}")
+        return _failure_code(dataset, output)
+
+
+def _failure_code(dataset: "xarray.Dataset", path: Path) -> int:
+    """3, and a line, when more shots failed than the campaign allows."""
+    from . import results
+
+    share = float(results.failed(dataset).mean())
+    allowed = dataset.attrs["failed_share"]
+    if share <= allowed:
+        return 0
+    print(
+        f"warpimpact: {share:.3g} of the shots failed, more than output.failed_share = {allowed:g}; "
+        f"warpimpact inspect {path} lists them",
+        file=sys.stderr,
+    )
+    return 3
+
+
+@contextmanager
+def _terminated_as_interrupted() -> Iterator[None]:
+    """A batch system ends what has used up its time by SIGTERM: that stops as cleanly as Ctrl-C."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def _standing() -> "Iterator[Callable[[Standing], None]]":
+    """Shows how far a run is: a bar on a terminal, plain lines in a log."""
+    if not sys.stderr.isatty():
+        yield _log_standing()
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="hit", dynamic_ncols=True) as bar:
+
+        def show(standing: "Standing") -> None:
+            if bar.total is None:
+                bar.total, bar.initial, bar.n = standing.total, standing.resumed, standing.resumed
+            bar.set_postfix_str(_running(standing), refresh=False)
+            bar.update(max(0, standing.done - bar.n))
+
+        yield show
+
+
+def _log_standing() -> "Callable[[Standing], None]":
+    """A line at the start, at every tenth, and at least every ten minutes."""
+    shown, last, begin = -1, 0.0, time.monotonic()
+
+    def show(standing: "Standing") -> None:
+        nonlocal shown, last
+        tenths, elapsed = 10 * standing.done // standing.total, time.monotonic() - begin
+        if tenths == shown and elapsed - last < _LONGEST_SILENCE:
+            return
+        shown, last = tenths, elapsed
+        line = f"{standing.done} of {standing.total} hits"
+        if (fresh := standing.done - standing.resumed) > 0 and elapsed > 0.0:
+            left = (standing.total - standing.done) * elapsed / fresh
+            line += f", {fresh / elapsed:.4g} hits/s, {left:.0f} s left; {_running(standing)}"
+        print(line, file=sys.stderr, flush=True)
+
+    return show
+
+
+_LONGEST_SILENCE = 600.0
+
+
+def _running(standing: "Standing") -> str:
+    """Running estimates and failed shots as one short line."""
+    from .analysis.summary import UNITS
+
+    parts = [
+        f"{measure.text} {estimate.value:.5g} ± {estimate.half_width:.2g}{UNITS[measure.units]}"
+        for measure, estimate in standing.estimates.items()
+        if estimate.count > 1
+    ]
+    return ", ".join([*parts, f"{standing.failed} failed"])
+
+
+def _inspect(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .analysis.inspect import inspect_text
+
+    with results.opened(arguments.result) as dataset:
+        print(dataset.attrs["campaign"] if arguments.campaign else inspect_text(dataset))
 
 
 def _plot(arguments: argparse.Namespace) -> None:
@@ -239,10 +378,16 @@ def _check_output(path: Path, *, overwrite: bool) -> None:
     """Refuse before hours of computing what could not be written after them."""
     from .results import OutputError
 
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder, but the result is one file")
+    _check_place(path)
     if path.exists() and not overwrite:
         raise OutputError(f"{path}: exists already; name another file or give --overwrite")
+
+
+def _check_place(path: Path) -> None:
+    from .results import OutputError
+
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder, but the result is one file")
     _check_folder(path.parent)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +57,7 @@ def simulate_to_tolerance(
     standoffs: Sequence[float] = (),
     standoff_point: str = "centre_of_mass",
     device: str = "auto",
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[Outcomes, Estimates]:
     """Compute every shot on the first two levels, and on finer ones while two levels differ by too much.
@@ -80,13 +80,19 @@ def simulate_to_tolerance(
         return simulate(
             core,
             plate,
-            _picked(shots, which),
+            shots[which],
             interaction=interaction,
             numerics=level(index, numerics),
             standoffs=standoffs,
             standoff_point=standoff_point,
             device=device,
+            threads=threads,
+            progress=lambda *_: show(len(shots) - len(pending)),  # nothing new, but a chance to end the computation
         )
+
+    def show(done: int) -> None:
+        if progress is not None:
+            progress(done, len(shots))
 
     pending = np.arange(len(shots))
     outcomes = on(0, pending)
@@ -102,12 +108,10 @@ def simulate_to_tolerance(
         _put(outcomes, pending, finer)
         estimates.level[pending] = index
         pending = np.flatnonzero(~estimates.converged)
-        if progress is not None:
-            progress(len(shots) - len(pending), len(shots))
+        show(len(shots) - len(pending))
         if not len(pending):
             break
-    if progress is not None:
-        progress(len(shots), len(shots))
+    show(len(shots))
     return outcomes, estimates
 
 
@@ -130,12 +134,9 @@ def _change(coarse: Array, fine: Array) -> Array:
     return np.where(np.isnan(change), np.inf, change)
 
 
-Columns = TypeVar("Columns", Shots, Outcomes)
-
-
-def _picked(columns: Columns, which: NDArray[np.int64]) -> Columns:
+def _picked(outcomes: Outcomes, which: NDArray[np.int64]) -> Outcomes:
     """The rows of some shots."""
-    return replace(columns, **{field.name: getattr(columns, field.name)[which] for field in fields(columns)})
+    return replace(outcomes, **{field.name: getattr(outcomes, field.name)[which] for field in fields(outcomes)})
 
 
 def _put(outcomes: Outcomes, which: NDArray[np.int64], finer: Outcomes) -> None:

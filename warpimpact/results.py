@@ -7,11 +7,13 @@ follows the CF conventions and opens with plain ``xarray.open_dataset``.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import netCDF4
 import numpy as np
 import xarray
 
@@ -56,6 +58,15 @@ SHOT_VARIABLES = {
     "impact_yaw": Variable(("hit",), "degree", "yaw of the core on impact, relative to the line of fire"),
     "spin": Variable(("hit",), "rad s-1", "spin of the core about its axis on impact"),
 }
+
+SCATTER_VARIABLES = {
+    "resistance": Variable(("hit",), "Pa", "resistance of the plate"),
+    "shear_coefficient": Variable(("hit",), "1", "friction per normal stress"),
+    "degradation": Variable(("hit",), "1", "share of the resistance left after an interval of contact"),
+    "thickness": Variable(("hit",), "m", "thickness of the plate"),
+    "mass": Variable(("hit",), "kg", "mass of the core"),
+}
+"""Only of a campaign in which they differ from shot to shot."""
 
 OUTCOME_VARIABLES = {
     "status": Variable(("hit",), "1", "how the shot ended"),
@@ -180,9 +191,10 @@ def to_dataset(
     vertices = _joined(outlines)
     coordinates = {"hit_y": shots.hit_y, "hit_z": shots.hit_z, "standoff": standoffs, "axis": ["x", "y", "z"]}
     values = {name: getattr(shots, name.removeprefix("impact_")) for name in SHOT_VARIABLES}
+    values |= {name: shots.columns[name] for name in SCATTER_VARIABLES if name in shots.columns}
     values |= {name: getattr(outcomes, name) for name in OUTCOME_VARIABLES}
     values |= {"outline_y": vertices[:, 0], "outline_z": vertices[:, 1]}
-    variables = VARIABLES
+    variables = VARIABLES | {name: variable for name, variable in SCATTER_VARIABLES.items() if name in values}
     if estimates is not None:
         variables = variables | ESTIMATE_VARIABLES
         values |= {name: getattr(estimates, name) for name in ESTIMATE_VARIABLES}
@@ -283,13 +295,75 @@ def status_codes(dataset: xarray.Dataset) -> dict[str, int]:
     return dict(zip(attributes["flag_meanings"].split(), attributes["flag_values"].tolist(), strict=True))
 
 
+def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+    """Whether each core passed the plate, shape (hit,): it perforated the plate or missed its material."""
+    return np.isin(dataset["status"].values, [Status.PERFORATED, Status.MISSED])
+
+
+def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+    """Whether the computation of each shot failed, shape (hit,)."""
+    return np.isin(dataset["status"].values, [status for status in Status if status.failed])
+
+
+def images(dataset: xarray.Dataset) -> int:
+    """How many hits in a row are images of each other; 1 but for a map with `hits.irreducible`."""
+    return str(dataset.attrs.get("symmetries", "()")).count("(")
+
+
 def write(dataset: xarray.Dataset, path: Path) -> None:
     """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    aside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with aside(path) as file:
+        dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=_encoding(dataset))
+
+
+CHUNK = 2**15
+"""Hits per chunk of a joined file: 256 KiB of one variable."""
+
+
+def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> None:
+    """Write results one after the other into one file, whole or not at all, with one of them in memory at a time.
+
+    Args:
+        parts: results of the same campaign, in the order of their hits, on the disk of `path`.
+        path: the file; an existing one is replaced.
+        attributes: global attributes over those of the first part.
+
+    Raises:
+        OutputError: The file cannot be written; what was there before is untouched.
+    """
+    hits = 0
+    for part in parts:
+        with netCDF4.Dataset(part) as source:
+            hits += len(source.dimensions["hit"])
+    with aside(path, parts[0].parent) as file:
+        with xarray.open_dataset(parts[0], engine="netcdf4") as first:
+            dataset = first.load().assign_attrs(attributes).drop_encoding()
+        encoding = _encoding(dataset, chunk=min(hits, CHUNK))
+        dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=encoding, unlimited_dims=["hit"])
+        at = dataset.sizes["hit"]
+        with netCDF4.Dataset(file, "a") as joined:
+            joined.set_auto_maskandscale(False)
+            for part in parts[1:]:
+                at = _append(joined, part, at)
+
+
+def _append(joined: Any, part: Path, at: int) -> int:
+    """Copy the hits of a part behind those that are there; returns how many there are then."""
+    with netCDF4.Dataset(part) as source:
+        source.set_auto_maskandscale(False)
+        end = at + len(source.dimensions["hit"])
+        for name, variable in joined.variables.items():
+            if "hit" in variable.dimensions:
+                variable[at:end] = source[name][:]
+    return end
+
+
+def _encoding(dataset: xarray.Dataset, *, chunk: int | None = None) -> dict[str, dict[str, Any]]:
+    """How variables are stored: compressed, and with `chunk` hits per chunk if that is given."""
     encoding: dict[str, dict[str, Any]] = {
         str(name): {"zlib": True, "complevel": 1}
         for name, array in dataset.variables.items()
@@ -297,14 +371,48 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
     }
     for name in dataset.coords:
         encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
+    for name, array in dataset.variables.items():
+        if chunk and "hit" in array.dims:
+            encoding[str(name)]["chunksizes"] = (chunk, *array.shape[1:])
+    return encoding
+
+
+@contextmanager
+def aside(path: Path, folder: Path | None = None) -> Iterator[Path]:
+    """A name in a folder of the same disk, if not given that of `path`, to write to; what was written there is on the
+    disk before it gets its own name.
+
+    Raises:
+        OutputError: The file cannot be written; what was there before is untouched.
+    """
+    written = (folder or path.parent) / f".{path.name}.{os.getpid()}.part"
     try:
-        dataset.to_netcdf(aside, format="NETCDF4", engine="netcdf4", encoding=encoding)
-        os.replace(aside, path)
+        yield written
+        _flush(written, os.O_RDWR)
+        os.replace(written, path)
+        if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
+            _flush(path.parent, os.O_RDONLY)
     except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
-        raise OutputError(f"{path}: cannot be written ({error})") from error
+        raise OutputError(f"{path}: cannot be written ({_cause(error, path)})") from error
     finally:
         with suppress(OSError):
-            aside.unlink()
+            written.unlink()
+
+
+def _flush(path: Path, mode: int) -> None:
+    descriptor = os.open(path, mode)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _cause(error: Exception, path: Path) -> str:
+    """What an error of the disk means: netCDF does not say that the disk is full."""
+    with suppress(OSError):
+        if isinstance(error, RuntimeError) and shutil.disk_usage(path.parent).free < 2**20:
+            return "the disk is full"
+    return str(error)
 
 
 def read(path: Path) -> xarray.Dataset:
@@ -313,14 +421,29 @@ def read(path: Path) -> xarray.Dataset:
     Raises:
         ResultError: The file is missing, is not netCDF, or is not a warpimpact result.
     """
+    with opened(path) as file:
+        return file.load()
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[xarray.Dataset]:
+    """A result file of which only what is used is read.
+
+    Raises:
+        ResultError: as in `read`.
+    """
     try:
-        with xarray.open_dataset(path, engine="netcdf4") as file:
-            dataset = file.load()
+        dataset = xarray.open_dataset(path, engine="netcdf4")
     except (OSError, RuntimeError) as error:
         raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error
+    with dataset:
+        _check_is_result(dataset, path)
+        yield dataset
+
+
+def _check_is_result(dataset: xarray.Dataset, path: Path) -> None:
     missing = (COORDINATES.keys() | VARIABLES.keys()) - dataset.variables.keys()
     if missing:
         raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
     if "hit" not in dataset.sizes:
         raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
-    return dataset

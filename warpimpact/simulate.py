@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from functools import partial
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import psutil
@@ -28,6 +28,7 @@ from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 Progress1 = Callable[[int], None]
+Scratch = TypeVar("Scratch")
 
 CPU_CHUNK = 32
 """Shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
@@ -44,6 +45,10 @@ MEMORY_SHARE = 0.5
 
 class DeviceError(RuntimeError):
     """The device asked for is not there; the message is for a person."""
+
+
+class UnsupportedError(ValueError):
+    """What the kernels cannot compute yet; the message is for a person."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,7 @@ def simulate(
     standoffs: Sequence[float] = (),
     standoff_point: str = "centre_of_mass",
     device: str = "auto",
+    threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
     """Compute every shot on its own copy of the plate (MODEL.md §§1–5).
@@ -113,12 +119,15 @@ def simulate(
         standoffs: distances behind the rear face [m], shape [stand-offs]; at least the core's bounding radius.
         standoff_point: which point has to pass them: "centre_of_mass" or "nose".
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
-        progress: called with (shots done, shots) as they come.
+        threads: of a CPU; None is one for every core that this process may use.
+        progress: called with (shots done, shots) as they come; what it raises ends the computation.
 
     Raises:
         DeviceError: the device is absent.
+        UnsupportedError: a quantity differs from shot to shot that the kernels take as one number.
     """
     task = _Task(core, plate, interaction or Interaction(), numerics or Numerics(), shots, find_device(device))
+    task.threads = threads or cores()
     contact = task.march(progress or _unseen)
     return task.report(contact, np.asarray(standoffs, dtype=float), standoff_point)
 
@@ -225,7 +234,8 @@ class _Task:
         *,
         traced: bool = False,
     ) -> None:
-        self.core, self.plate, self.shots, self.device = core, plate, shots, device
+        _refuse_unsupported(shots)
+        self.core, self.plate, self.shots, self.device, self.threads = core, plate, shots, device, cores()
         self.resolution = discretisation.resolve(numerics, core, plate)
         a0, a1, a2 = interaction.coefficients(plate)
         self.variant = Variant(
@@ -314,8 +324,8 @@ class _Task:
 
     def _shots(self) -> Any:
         shots = self.stage.Shots()
-        for field in fields(self.shots):
-            setattr(shots, field.name, self._array(getattr(self.shots, field.name), dtype=wp.float64))
+        for name, values in self.shots.columns.items():
+            setattr(shots, name, self._array(values, dtype=wp.float64))
         return shots
 
     def _pace(self) -> Any:
@@ -433,7 +443,7 @@ class _Task:
     def _slots(self, cells_y: int, cells_z: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow."""
         free = psutil.virtual_memory().available if self.device.is_cpu else self.device.free_memory
-        wanted = _threads() if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
+        wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
         return min(wanted, affordable, (2**31 - 1) // (cells_y * cells_z))
 
@@ -479,24 +489,28 @@ class _Task:
 
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
-        slots = self._slots(*self.cells)
         self.stage.kernel.module.load(self.device)
         launch = partial(self._launch, self._array(which, dtype=wp.int32), outcomes, self.pace)
         if self.device.is_cpu:
-            self._on_threads(launch, slots, len(which), progress)
+            self._on_threads(launch, self._cpu_scratch(), len(which), progress)
         else:
-            scratch = self._scratch(slots, *self.cells)
+            slots, scratch = _halving(self._slots(*self.cells), lambda slots: self._scratch(slots, *self.cells))
             for first, count in _chunks(len(which), slots):
                 launch(scratch, slots, first, count)
                 wp.synchronize_device(self.device)
                 progress(first + count)
 
-    def _on_threads(self, launch: Callable[..., int], slots: int, total: int, progress: Progress1) -> None:
+    def _cpu_scratch(self) -> list[Any]:
+        """Scratch of one slot for every thread."""
+        slots = self._slots(*self.cells)
+        return _halving(slots, lambda slots: [self._scratch(1, *self.cells) for _ in range(slots)])[1]
+
+    def _on_threads(self, launch: Callable[..., int], slots: list[Any], total: int, progress: Progress1) -> None:
         """Share chunks out over threads, each with one slot: a CPU launch runs its shots one after another on
         the calling thread, without the interpreter lock."""
         idle = SimpleQueue[Any]()
-        for _ in range(slots):
-            idle.put(self._scratch(1, *self.cells))
+        for scratch in slots:
+            idle.put(scratch)
 
         def work(chunk: tuple[int, int]) -> int:
             scratch = idle.get()
@@ -506,7 +520,7 @@ class _Task:
                 idle.put(scratch)
 
         done = 0
-        with ThreadPoolExecutor(slots) as pool:
+        with ThreadPoolExecutor(len(slots)) as pool:
             for count in pool.map(work, _chunks(total, CPU_CHUNK)):
                 done += count
                 progress(done)
@@ -526,7 +540,31 @@ def _chunks(total: int, size: int) -> Iterator[tuple[int, int]]:
     return ((first, min(size, total - first)) for first in range(0, total, size))
 
 
-def _threads() -> int:
+def _halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
+    """Slots and their scratch: half as many while there is no memory for more, which free memory only estimates."""
+    while True:
+        try:
+            return slots, allocate(slots)
+        except (RuntimeError, MemoryError) as error:
+            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
+                raise
+        slots //= 2
+
+
+def _refuse_unsupported(shots: Shots) -> None:
+    """The one place that knows which columns of the shots the kernels take as one number of the scene."""
+    per_shot = [
+        name
+        for name in ("resistance", "shear_coefficient", "degradation", "thickness", "mass")
+        if name in shots.columns
+    ]
+    if per_shot:
+        raise UnsupportedError(
+            f"{per_shot[0]}: got values that differ from shot to shot, which is not supported yet; give one number"
+        )
+
+
+def cores() -> int:
     """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 

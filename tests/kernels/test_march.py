@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact import simulate
 from warpimpact.kernels.status import Status
-from warpimpact.scene import CirclePattern, ConeCore, Core, Numerics, OgiveCore, Plate, PolynomialCore, Shots
+from warpimpact.scene import CirclePattern, ConeCore, Core, Impact, Numerics, OgiveCore, Plate, PolynomialCore, Shots
 
 Array = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ DRAFT = Numerics(fidelity="draft")
 
 def shots_of(**columns: Any) -> Shots:
     """Shots of 825 m/s at the origin, but for the given columns."""
-    values = {field.name: 0.0 for field in fields(Shots)} | {"velocity": 825.0} | columns
+    values = dict.fromkeys(("hit_y", "hit_z", *Impact.model_fields), 0.0) | {"velocity": 825.0} | columns
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, dtype=float)) for value in values.values()))
     return Shots(**dict(zip(values, (array.copy() for array in arrays), strict=True)))
 

@@ -1,15 +1,19 @@
 """Results made by hand: shots and outcomes whose values a test knows."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray
 
 from warpimpact import results
+from warpimpact.campaign import parts
 from warpimpact.kernels.status import Status
+from warpimpact.scene import Shots
 
 STANDOFFS = np.array([0.05, 0.13])
 PERIOD = (16e-3, 8e-3)
@@ -23,9 +27,9 @@ def scattered_hits(count: int) -> np.ndarray:
     return (np.random.default_rng(5).random((count, 2)) - 0.5) * PERIOD
 
 
-def shots_at(hits: np.ndarray) -> SimpleNamespace:
+def shots_at(hits: np.ndarray) -> Shots:
     n = len(hits)
-    return SimpleNamespace(
+    return Shots(
         hit_y=hits[:, 0],
         hit_z=hits[:, 1],
         velocity=np.full(n, 825.0),
@@ -80,3 +84,29 @@ def make_result() -> ResultMaker:
         )
 
     return make
+
+
+def _assert_same_bits(one: Path, other: Path) -> None:
+    """Variable by variable, as it lies in the files."""
+    with netCDF4.Dataset(one) as a, netCDF4.Dataset(other) as b:
+        assert a.variables.keys() == b.variables.keys()
+        for name, variable in a.variables.items():
+            variable.set_auto_maskandscale(False)
+            b[name].set_auto_maskandscale(False)
+            assert variable[...].tobytes() == b[name][...].tobytes(), name
+            assert variable.dimensions == b[name].dimensions
+            assert str(variable.__dict__) == str(b[name].__dict__)
+
+
+@pytest.fixture(scope="module")
+def small_shards() -> Iterator[None]:
+    """Shards as in small_shards.py."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(parts, "FEWEST", 256)
+        yield
+
+
+@pytest.fixture(scope="session")
+def assert_same_bits() -> Callable[[Path, Path], None]:
+    """A function of two result files."""
+    return _assert_same_bits

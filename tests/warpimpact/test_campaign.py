@@ -281,7 +281,7 @@ def test_file_names_count_from_the_campaign_file(tmp_path: Path) -> None:
     (tmp_path / "campaign.toml").write_text(text)
     campaign = Campaign.from_toml(tmp_path / "campaign.toml")
     assert campaign.core.length == 0.02
-    assert campaign.hits.points((1.0, 1.0))[1].tolist() == [0.002]
+    assert campaign.hits.listed["hit_z"].tolist() == [0.002]
 
 
 def test_the_count_can_be_given_instead(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["plot"], ["validate"], ["study"]])
+@pytest.mark.parametrize("command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"]])
 def test_help_shows_how(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main([*command, "--help"])
@@ -113,7 +113,7 @@ def test_memory_that_cannot_be_had_is_told(
     def no_memory(*_: object, **__: object) -> None:
         raise MemoryError("Unable to allocate 8 TiB")
 
-    monkeypatch.setattr("warpimpact.campaign.run.run", no_memory)
+    monkeypatch.setattr("warpimpact.campaign.run.run_to_file", no_memory)
     assert _refusal(["run", str(SLOTTED_PLATE)], capsys) == f"{SLOTTED_PLATE}: Unable to allocate 8 TiB"
     assert not list(folder.iterdir())
 

@@ -206,5 +206,5 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
 
 def test_every_field_of_shots_and_outcomes_has_a_variable():
     shot_names = {name.removeprefix("impact_") for name in results.SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | results.SCATTER_VARIABLES.keys()
     assert {field.name for field in dataclasses.fields(Outcomes)} == set(results.OUTCOME_VARIABLES)

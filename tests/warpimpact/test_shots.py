@@ -10,11 +10,13 @@ from pydantic import ValidationError
 from warpimpact.scene import CirclePattern, Hits, Impact, Plate, make_shots
 
 PERIOD = (16e-3, 8e-3)
+CELL = Plate(thickness="4 mm", resistance=1e9, pattern=CirclePattern(diameter="5 mm", spacing=PERIOD))
 SOLID = Plate(thickness="4 mm", resistance=1e9)
 
 
 def _points(**hits: object) -> np.ndarray:
-    return np.column_stack(Hits(**hits).points(PERIOD))
+    shots = make_shots(Impact(velocity=825), Hits(**hits), CELL)
+    return np.column_stack([shots.hit_y, shots.hit_z])
 
 
 @pytest.mark.parametrize("sampling", ["sobol", "random"])
@@ -76,7 +78,8 @@ def test_a_bad_row_is_named(tmp_path: Path, row: str, complaint: str) -> None:
         ({}, 'got sampling = "sobol" without count'),
         ({"sampling": "list"}, 'got sampling = "list" without file'),
         ({"sampling": "list", "file": __file__, "count": 3}, "got count beside"),
-        ({"sampling": "list", "file": __file__, "seed": 3}, "got seed beside"),
+        ({"sampling": "grid", "count": 3, "replicates": 8}, "got replicates beside"),
+        ({"sampling": "random", "count": 3, "repeats": 2}, "got repeats beside"),
         ({"count": 3, "file": __file__}, "got file beside"),
         ({"count": 0}, "greater than or equal to 1"),
         ({"count": 1.5}, "valid integer"),

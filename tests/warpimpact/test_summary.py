@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from warpimpact.analysis.summary import passed, summary, summary_text
+from warpimpact.analysis.summary import summary, summary_text
 from warpimpact.kernels.status import Status
+from warpimpact.results import passed
 
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED, Status.UNFINISHED]
 

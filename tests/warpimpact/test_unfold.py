@@ -1,5 +1,6 @@
 """Hits of the irreducible part unfolded over the cell are those that a run of every hit gives."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,17 @@ import xarray
 
 from warpimpact import Campaign, Hits, Impact, MaskPattern, Numerics, Plate, PolynomialCore, SlotPattern, results, run
 from warpimpact import simulate as simulation
-from warpimpact.campaign import run as running
+from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.summary import estimated
+from warpimpact.campaign import compute as computing
+from warpimpact.campaign import parts
+from warpimpact.campaign.estimates import Measure, Stop, Tally
 from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import Interrupted, Standing, run_to_file
 from warpimpact.cli import main
 from warpimpact.history import History
 from warpimpact.refine import LADDER
-from warpimpact.scene import TrianglePattern, make_shots, symmetries_used
+from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
@@ -53,7 +59,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         counts.append(len(shots))
         return simulation.simulate(core, plate, shots, **how)
 
-    monkeypatch.setattr(running, "simulate", counting)
+    monkeypatch.setattr(computing, "simulate", counting)
     return counts
 
 
@@ -195,3 +201,75 @@ def test_the_command_tells_what_was_computed(
     Path("a.toml").write_text(text.replace('"825 m/s"', '"825 m/s"\npitch = 0.1\nyaw = 0.1').replace("[plate]", rim))
     assert main(["run", "a.toml", "--count", "4", "--device", "cpu", "--overwrite"]) == 0
     assert "all 4 hits computed: plate and shot have no symmetry in common" in capsys.readouterr().out
+
+
+def test_an_unfolded_run_is_streamed_resumed_and_replayed(
+    tmp_path: Path, small_shards: None, assert_same_bits: Callable[[Path, Path], None]
+) -> None:
+    scatter = Scatter(velocity={"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"})
+    scene = campaign(count=1100, numerics=Numerics(fidelity="draft"), scatter=scatter)  # 137 orbits
+
+    def interrupt(standing: Standing) -> None:
+        assert standing.total == 1096
+        if standing.done >= parts.FEWEST:
+            raise KeyboardInterrupt
+
+    straight, resumed = tmp_path / "straight.nc", tmp_path / "resumed.nc"
+    run_to_file(scene, straight, device="cpu,cpu")
+    with pytest.raises(Interrupted):
+        run_to_file(scene, resumed, device="cpu", progress=interrupt)
+    for path in resumed.with_name("resumed.nc.parts").glob("*.nc"):
+        shard = results.read(path)
+        assert shard.attrs["computed_hits"] == shard.sizes["hit"] // 8
+    run_to_file(scene, resumed, device="cpu", resume=True)
+    assert_same_bits(straight, resumed)
+    stored = results.read(resumed)
+    assert stored.sizes["hit"] == 1096
+    assert stored.attrs["computed_hits"] == 137
+    assert stored.attrs["hits_per_second"] == pytest.approx(137 / stored.attrs["compute_time"])
+    assert "137 of 1096 hits computed" in inspect_text(stored)
+    velocity = stored["impact_velocity"].values.reshape(-1, 8)
+    assert (velocity == velocity[:, :1]).all()
+    assert len(np.unique(velocity)) == 137
+    assert replay(stored, 1095, folder=tmp_path).attrs["agreement"] == "bit-identical"
+
+
+@pytest.mark.parametrize("sampling", ["sobol", "random"])
+def test_a_stop_rule_counts_a_hit_and_its_images_once(sampling: str, small_shards: None) -> None:
+    rule = Stop(quantity="mean(residual_velocity)", half_width="3 m/s", max_count=8192)
+    hits = Hits(sampling=sampling, count=8192, seed=3, irreducible=True)
+    scene = campaign(hits=hits, numerics=Numerics(fidelity="draft"), stop=rule)
+    result = run(scene, device="cpu")
+    assert 256 < result.sizes["hit"] < 8192
+    computed = Tally(rule.measure, replicates=scene.replicates)
+    computed.add(result.isel(hit=slice(None, None, 8)))
+    expected = computed.estimate()
+    assert result.attrs["stop_reason"] == "half_width"
+    assert result.attrs["estimate"] == pytest.approx(expected.value, rel=1e-12)
+    assert result.attrs["estimate_interval"] == pytest.approx([expected.low, expected.high], rel=1e-9)
+    told = estimated(result, [rule.measure])[rule.measure]
+    assert [told.low, told.high] == pytest.approx([expected.low, expected.high], rel=1e-9)
+
+
+TALLIED = ["mean(energy_loss)", "quantile(residual_velocity, 0.3)", "P(residual_velocity > 780 m/s)", "P(perforated)"]
+
+
+@pytest.mark.parametrize("replicates", [1, 8])
+@pytest.mark.parametrize("text", TALLIED)
+def test_images_tell_no_more_than_one_of_them(text: str, replicates: int, make_result: Any) -> None:
+    single = make_result(np.random.default_rng(4).choice([0, 0, 0, 2, 3], 400))
+    images = single.isel(hit=np.repeat(np.arange(400), 4))
+    one = Tally(Measure.parse(text), replicates=replicates)
+    many = Tally(Measure.parse(text), replicates=replicates, images=4)
+    one.add(single)
+    many.add(images.isel(hit=slice(0, 600)))
+    many.add(images.isel(hit=slice(600, None)))
+    expected, told = one.estimate(), many.estimate()
+    assert told.count == 4 * expected.count
+    if not text.startswith("quantile"):  # an interpolation between neighbours, which images are
+        assert told.value == pytest.approx(expected.value, rel=1e-12)
+        assert [told.low, told.high] == pytest.approx([expected.low, expected.high], rel=1e-9)
+    else:
+        step = 100.0 * 0.9 / 399
+        assert told.value == pytest.approx(expected.value, abs=2.0 * step)
+        assert [told.low, told.high] == pytest.approx([expected.low, expected.high], abs=3.0 * step)

@@ -12,7 +12,7 @@ import math
 import time
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
@@ -267,7 +267,7 @@ class _Bench:
         self.campaign, self.device = campaign, find_device(device)
         self.progress, self.work, self.total = progress, 0.0, 0.0
         spread = Hits(count=hits, seed=campaign.hits.seed)
-        self.shots = make_shots(campaign.impact, spread, campaign.plate)
+        self.shots = make_shots(campaign.impact, spread, campaign.plate, campaign.scatter)
 
     def numerics(self, fidelity: Fidelity) -> Numerics:
         return spelt_out(fidelity, self.campaign.core, self.campaign.plate, self.campaign.impact)
@@ -328,7 +328,7 @@ class _Bench:
 
 
 def _repeated(shots: Shots, copies: int) -> Shots:
-    return Shots(*(np.tile(getattr(shots, field.name), copies) for field in fields(Shots)))
+    return Shots.joined([shots] * copies)
 
 
 def _doubled(level: Fidelity) -> Fidelity:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
-from warpimpact.results import status_codes
+from warpimpact.campaign.estimates import MEASURED, Estimate, Measure, Tally
+from warpimpact.results import images, status_codes
+
+SLICE = 2**18
+"""Hits in memory at a time."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +22,11 @@ class Spread:
     count: int
     mean: float
     standard_deviation: float
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Spread:
+        """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
+        return cls(estimate.count, estimate.value, estimate.spread)
 
 
 @dataclass(frozen=True)
@@ -33,30 +42,44 @@ class Summary:
     tilt: dict[float, Spread]
 
 
-def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
-    """Whether each core passed the plate, shape (hit,): it perforated the plate or missed its material."""
-    codes = status_codes(dataset)
-    return np.isin(dataset["status"].values, [codes["perforated"], codes["missed"]])
-
-
 def summary(dataset: xarray.Dataset) -> Summary:
     """Summarise a hit map; velocity, deflection and tilt count only the cores that passed the plate."""
-    status = dataset["status"].values
-    behind = dataset.isel(hit=passed(dataset))
+    codes, standoffs = status_codes(dataset), dataset["standoff"].values.tolist()
+    velocity, deflection, *tilt = main_measures(standoffs)
+    estimates = estimated(dataset, [velocity, deflection, *tilt])
+    counts = np.zeros(len(codes), dtype=int)
+    for part in slices(dataset[["status"]]):
+        counts += (part["status"].values[:, None] == list(codes.values())).sum(axis=0)
     return Summary(
-        counts={name: int(np.sum(status == code)) for name, code in status_codes(dataset).items()},
-        residual_velocity=_spread(behind["residual_velocity"].values),
-        deflection=_spread(behind["deflection"].values),
-        tilt={float(tilt["standoff"]): _spread(tilt.values) for tilt in behind["tilt"].T},
+        counts=dict(zip(codes, counts.tolist(), strict=True)),
+        residual_velocity=Spread.of(estimates[velocity]),
+        deflection=Spread.of(estimates[deflection]),
+        tilt={at: Spread.of(estimates[measure]) for at, measure in zip(standoffs, tilt, strict=True)},
     )
 
 
-def _spread(values: NDArray[np.float64]) -> Spread:
-    """Spread of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
-    existing = values[np.isfinite(values)]
-    if existing.size == 0:
-        return Spread(0, np.nan, np.nan)
-    return Spread(existing.size, float(existing.mean()), float(existing.std()))
+def main_measures(standoffs: Sequence[float]) -> list[Measure]:
+    """Means of residual velocity, deflection and the tilt at every stand-off [m]."""
+    names = ["residual_velocity", "deflection", *(f"tilt@{standoff!r}m" for standoff in standoffs)]
+    return [Measure.parse(f"mean({name})") for name in names]
+
+
+def estimated(
+    dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95
+) -> dict[Measure, Estimate]:
+    """Measures of a result with their intervals; of an open file only a slice is in memory at a time."""
+    dealt = {"replicates": int(dataset.attrs.get("replicates", 1)), "images": images(dataset)}
+    tallies = [Tally(measure, **dealt, confidence=confidence) for measure in measures]
+    for part in slices(dataset[["status", *MEASURED]]):
+        for tally in tallies:
+            tally.add(part)
+    return {tally.measure: tally.estimate() for tally in tallies}
+
+
+def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
+    """Its hits in slices that are loaded one at a time."""
+    for first in range(0, dataset.sizes["hit"], SLICE):
+        yield dataset.isel(hit=slice(first, first + SLICE)).load()
 
 
 def summary_text(dataset: xarray.Dataset) -> str:
@@ -69,7 +92,24 @@ def summary_text(dataset: xarray.Dataset) -> str:
         _spread_row("deflection", result.deflection, "°"),
     ]
     rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°") for standoff, tilt in result.tilt.items()]
-    return "\n".join(rows)
+    return "\n".join([*rows, *stop_lines(dataset)])
+
+
+UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "1": ""}
+"""Units as people write them."""
+
+
+def stop_lines(dataset: xarray.Dataset) -> list[str]:
+    """What the stop rule asked for, if there was one."""
+    told = dataset.attrs
+    if "stop_quantity" not in told:
+        return []
+    (low, high), unit = told["estimate_interval"], UNITS[told["estimate_units"]]
+    reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told["stop_reason"]]
+    return [
+        f"{told['stop_quantity']} = {told['estimate']:.6g}{unit}, {told['confidence']:.4g} interval "
+        f"{low:.6g} to {high:.6g}{unit}; {reason}"
+    ]
 
 
 def symmetry_text(dataset: xarray.Dataset) -> str:

@@ -1,17 +1,22 @@
 """Campaign: one TOML file, validated, as one immutable value."""
 
 import json
+import math
 import tomllib
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
 from pydantic_core import ErrorDetails
 
-from ..scene import AnyCore, Hits, Impact, Interaction, Numerics, Plate
+from ..scene import AnyCore, Hits, Impact, Interaction, Numerics, Plate, Sampler, Scatter, Symmetry, symmetries_used
 from ..scene.model import Model
-from ..scene.units import PositiveLength, quoted
+from ..scene.scatter import EDGE, QUANTITIES, check_range
+from ..scene.symmetry import check_scatter
+from ..scene.units import Number, PositiveLength, quoted
+from .estimates import Stop
 
 
 class CampaignError(ValueError):
@@ -24,10 +29,12 @@ class Output(Model):
     Attributes:
         standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
         standoff_point: the point of the core that passes them.
+        failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1)] = (0.05, 0.13)
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
+    failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
 
     @field_validator("standoffs")
     @classmethod
@@ -49,6 +56,8 @@ class Campaign(Model):
     interaction: Interaction = Interaction()
     numerics: Numerics = Numerics()
     output: Output = Output()
+    scatter: Scatter = Scatter()
+    stop: Stop | None = None
     _source: str = PrivateAttr("")
 
     @property
@@ -87,14 +96,80 @@ class Campaign(Model):
             data = json.loads(text) if text.startswith("{") else tomllib.loads(text)
         except ValueError as error:
             raise CampaignError(f"{name}: is not valid TOML: {error}") from None
-        if count is not None and isinstance(data.setdefault("hits", {}), dict):
-            data["hits"]["count"] = count
+        if count is not None:
+            _override_count(data, count)
+        data = _with_scatter_apart(data, name)
         try:
             campaign = cls.model_validate(data, context={"folder": folder})
         except ValidationError as error:
             raise CampaignError(f"{name}: {_sentence(error, data)}") from None
         campaign._source = text
         return campaign
+
+    @property
+    def replicates(self) -> int:
+        """Independent scramblings that its shots are dealt out to in turn."""
+        return self.hits.replicates or (16 if self.stop is not None and self.hits.sampling == "sobol" else 1)
+
+    @property
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Those by which its hits are images of each other; the identity alone where none is asked for or there."""
+        return symmetries_used(self.impact, self.hits, self.plate)
+
+    def sampler(self) -> Sampler:
+        """Its shots."""
+        return Sampler(self.impact, self.hits, self.plate, self.scatter, self.replicates)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _stop_bounds_the_count(cls, values: Any) -> Any:
+        stop, hits = values.get("stop"), values.get("hits")
+        if isinstance(stop, dict) and isinstance(hits, dict) and "max_count" in stop:
+            return values | {"hits": {"count": stop["max_count"]} | hits}
+        return values
+
+    @model_validator(mode="after")
+    def _stop_fits(self) -> Self:
+        if self.stop is None:
+            return self
+        if self.hits.sampling not in ("sobol", "random"):
+            raise ValueError(
+                f'got stop beside hits.sampling = "{self.hits.sampling}", but an interval needs "sobol" or "random"'
+            )
+        if self.hits.count != self.stop.max_count:
+            raise ValueError(
+                f"got hits.count = {self.hits.count} beside stop.max_count = {self.stop.max_count}, "
+                "which takes its place"
+            )
+        if self.replicates == 1 and self.hits.sampling == "sobol":
+            raise ValueError("got hits.replicates = 1 beside stop, but an interval of a sobol sampling needs some")
+        at = self.stop.measure.standoff
+        if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
+            standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)
+            raise ValueError(f"got stop.quantity at {at:g} m, but output.standoffs are {standoffs}")
+        return self
+
+    @model_validator(mode="after")
+    def _images_share_their_shot(self) -> Self:
+        check_scatter(self.hits, self.scatter)
+        return self
+
+    @model_validator(mode="after")
+    def _shots_are_possible(self) -> Self:
+        ranges = {name: (value, value) for name, value in self.impact}
+        for name, distribution in self.scatter.given.items():
+            low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
+            ranges[name] = (float(low), float(high))
+        for name, column in (self.hits.listed or {}).items():
+            if name in QUANTITIES:
+                ranges[name] = (float(column.min()), float(column.max()))
+                try:
+                    check_range(name, *ranges[name])
+                except ValueError as error:
+                    raise ValueError(f"got hits.file with a column {name} that {error}") from None
+        if ranges != {name: (value, value) for name, value in self.impact}:
+            _check_nose_first({name: max(map(abs, ends)) for name, ends in ranges.items()})
+        return self
 
     @model_validator(mode="after")
     def _standoffs_clear_of_plate(self) -> Self:
@@ -107,6 +182,40 @@ class Campaign(Model):
                 f"but a core of this size is sure to be out of the plate only from {needed:.4g} m"
             )
         return self
+
+
+def _check_nose_first(largest: dict[str, float]) -> None:
+    """The axis is built from its projected angles, which flip at 90 degrees; each is at most the obliquity plus its
+    own."""
+    for name in ("pitch", "yaw"):
+        if largest[name] + largest["obliquity"] >= math.pi / 2:
+            raise ValueError(
+                f"got shots with {name} up to {math.degrees(largest[name]):.4g} deg and obliquity up to "
+                f"{math.degrees(largest['obliquity']):.4g} deg, but their sum must stay below 90 deg"
+            )
+
+
+def _override_count(data: dict[str, Any], count: int) -> None:
+    """Put a count in the place of that of the file; a stop rule has it as its largest."""
+    stopped = isinstance(data.get("stop"), dict)
+    if stopped:
+        data["stop"]["max_count"] = count
+    if isinstance(data.setdefault("hits", {}), dict) and (not stopped or "count" in data["hits"]):
+        data["hits"]["count"] = count
+
+
+def _with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
+    """Distributions moved from the places of their values to `scatter`, their medians in the places."""
+    data, scatter = dict(data), {}
+    for field, (table, _) in QUANTITIES.items():
+        value = data[table].get(field) if isinstance(data.get(table), dict) else None
+        if isinstance(value, dict):
+            try:
+                scatter[field] = getattr(Scatter.model_validate({field: value}), field)
+            except ValidationError as error:
+                raise CampaignError(f"{name}: {table}.{_sentence(error, {field: value})}") from None
+            data[table] = data[table] | {field: float(scatter[field].quantile(np.array(0.5)))}
+    return data | {"scatter": scatter} if scatter else data
 
 
 def _read(path: Path) -> str:
@@ -130,15 +239,15 @@ def _sentence(error: ValidationError, data: dict[str, Any]) -> str:
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:
-    """Dotted TOML key of a problem, without the chosen `shape`, which pydantic counts as a key."""
+    """Dotted TOML key of a problem, without the chosen `shape` or `distribution`, which pydantic counts as a key."""
     place = ""
     for part in problem["loc"]:
-        if isinstance(data, dict) and part not in data and part == data.get("shape"):
+        if isinstance(data, dict) and part not in data and part in (data.get("shape"), data.get("distribution")):
             continue
         place += f"[{part}]" if isinstance(part, int) else f".{part}"
         data = data.get(part) if isinstance(data, dict) else None
     if problem["type"].startswith("union_tag"):
-        place += ".shape"
+        place += f".{problem['ctx']['discriminator'].strip(chr(39))}"
     return place.removeprefix(".")
 
 

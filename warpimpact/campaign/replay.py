@@ -15,7 +15,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.discretisation import Fidelity
 from warpimpact.refine import level
 from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, ResultError, history_dataset, to_dataset
-from warpimpact.scene import Numerics, make_shots, symmetries_used
+from warpimpact.scene import Numerics
 from warpimpact.unfold import image_of
 
 ROUNDING = {"residual_velocity": 0.1, "deflection": 0.5, "tilt": 0.5}
@@ -47,11 +47,13 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     if not 0 <= hit < hits:
         raise ResultError(f"hit: got {hit}, but the result has hits 0 to {hits - 1}")
     campaign = _campaign(result, folder)
-    shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
-    if len(shots) != hits:
-        raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(shots)}")
-    group = symmetries_used(campaign.impact, campaign.hits, campaign.plate)
-    shot, computed = shots[hit : hit + 1], shots[hit - hit % len(group) :][:1]
+    sampler = campaign.sampler()
+    if len(sampler) != hits and (campaign.stop is None or len(sampler) < hits):
+        raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(sampler)}")
+    group = campaign.symmetries
+    image = hit % len(group)
+    images = sampler.shots(hit - image, len(group))
+    computed, shot = images[:1], images[image:][:1]
     again = simulate.replay(
         campaign.core,
         campaign.plate,
@@ -61,8 +63,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         standoffs=list(campaign.output.standoffs),
         standoff_point=campaign.output.standoff_point,
     )
-    home, image = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
-    again = image_of(again, group[hit % len(group)], home=home, image=image)
+    home, away = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
+    again = image_of(again, group[image], home=home, image=away)
     reach = [(float(cells.min()), float(cells.max())) for cells in (again.cell_y, again.cell_z)]
     end = to_dataset(
         shot,

@@ -1,144 +1,309 @@
-"""From a campaign to its Dataset."""
+"""From a campaign to its Dataset, in memory or as a file that survives what may happen on the way."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
-from dataclasses import fields
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
-import numpy as np
-import psutil
-import warp
 import xarray
 
-import warpimpact
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.discretisation import resolve
-from warpimpact.refine import LADDER, Estimates, simulate_to_tolerance
-from warpimpact.results import to_dataset
-from warpimpact.scene import Shots, Symmetry, make_shots, symmetries_used
-from warpimpact.simulate import Outcomes, Progress, find_device, simulate
-from warpimpact.unfold import unfolded, unfolded_estimates
+from warpimpact.campaign.estimates import Estimate, Measure, Tally, looks
+from warpimpact.campaign.parts import Parts, extent, manifest
+from warpimpact.campaign.team import Team, local_team
+from warpimpact.results import OutputError, failed, images
 
-BATCH = 2**18
-"""Shots per call of `simulate`, so that what the device holds does not grow with the campaign."""
+_REPORT_EVERY = 0.2
+"""Seconds between two looks at what is under way."""
 
 
-def run(campaign: Campaign, *, device: str = "auto", progress: Progress | None = None) -> xarray.Dataset:
-    """Compute every hit of a campaign, or those of the irreducible part of its unit cell and from them the others.
+@dataclass(frozen=True)
+class Standing:
+    """How far a run is.
+
+    Attributes:
+        done, total: shots; `total` is the most that a stop rule allows.
+        resumed: shots that an earlier run had done.
+        failed: shots whose computation failed.
+        estimates: running estimates of the main quantities, over the shots from the first on without a gap.
+    """
+
+    done: int
+    total: int
+    resumed: int
+    failed: int
+    estimates: dict[Measure, Estimate]
+
+
+Follow = Callable[[Standing], None]
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run was broken off; the message tells what is saved."""
+
+
+def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = None) -> xarray.Dataset:
+    """Compute every hit of a campaign, in memory.
 
     Args:
-        device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
-        progress: called with (hits done, hits) as they come.
+        device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
+        progress: called with the standing several times a second.
 
     Returns:
         The Dataset of results.py, one entry per hit.
 
     Raises:
         DeviceError: the device is absent.
-        MemoryError: the results do not fit into memory; the message is for a person.
+        UnsupportedError: the kernels cannot compute these shots yet.
     """
-    chosen = find_device(device)
-    _check_memory(campaign)
-    shots = make_shots(campaign.impact, campaign.hits, campaign.plate)
-    group = symmetries_used(campaign.impact, campaign.hits, campaign.plate)
-    computed = shots[:: len(group)]
-    begin = time.perf_counter()
-    outcomes, estimates = _in_batches(campaign, computed, str(chosen), progress or (lambda done, total: None))
-    elapsed = time.perf_counter() - begin
-    period = campaign.plate.sampled_cell
-    return to_dataset(
-        shots,
-        unfolded(outcomes, group),
-        standoffs=np.array(campaign.output.standoffs),
-        outlines=campaign.plate.pattern.outlines(*((-0.5 * side, 0.5 * side) for side in period)),
-        period=period,
-        attributes={
-            "title": campaign.title,
-            "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
-            "campaign": campaign.text,
-            "warpimpact_version": warpimpact.__version__,
-            "warp_version": warp.__version__,
-            "device": f"{chosen.alias} ({chosen.name})",
-            "seed": campaign.hits.seed,
-            "standoff_point": campaign.output.standoff_point,
-            "open_area": campaign.plate.open_area,
-            "areal_density": campaign.plate.areal_density,
-            "numerics": _numerics(campaign),
-            "compute_time": elapsed,
-            "hits_per_second": len(computed) / elapsed,
+    total = len(campaign.sampler())
+    with local_team(campaign, device) as team:
+        held = _Held(extent(total))
+        end = _fill(campaign, held, team, progress or (lambda standing: None))
+    shards = [held.load(index) for index in range(end.shards)]
+    dataset = shards[0]
+    if len(shards) > 1:
+        dataset = xarray.concat(
+            shards,
+            dim="hit",
+            data_vars="minimal",
+            coords="minimal",
+            compat="override",
+            join="override",
+            combine_attrs="override",
+        )
+    return dataset.assign_attrs(_attributes(dataset, end))
+
+
+def run_to_file(
+    campaign: Campaign,
+    output: Path,
+    *,
+    device: str = "auto",
+    team: AbstractContextManager[Team] | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Follow | None = None,
+) -> None:
+    """Compute every hit of a campaign into a file; what is computed is on the disk at once, in `output`.parts.
+
+    Args:
+        output: the netCDF file, which appears when it is complete.
+        device, progress: as in `run`.
+        team: who computes, in place of `device`.
+        resume: continue what is in `output`.parts; begin where there is nothing.
+        overwrite: replace an existing file, and begin anew in place of a run that has not ended.
+
+    Raises:
+        OutputError: something cannot be written, must not be overwritten or is no part of this campaign.
+        DeviceError: the device is absent.
+        UnsupportedError: the kernels cannot compute these shots yet.
+        Interrupted: by the keyboard; what is saved can be resumed.
+    """
+    with team or local_team(campaign, device) as members:
+        parts = Parts(output, manifest(campaign, members.made_by), len(campaign.sampler()))
+        if not parts.begin(resume=resume, overwrite=overwrite):
+            return
+        try:
+            end = _fill(campaign, parts, members, progress or (lambda standing: None))
+            parts.finish(end.shards, lambda first: _attributes(first, end))
+        except KeyboardInterrupt:
+            raise Interrupted(f"interrupted; {_kept(parts)}") from None
+        except OutputError as error:
+            raise OutputError(f"{error}; {_kept(parts)}") from None
+        except BaseException:
+            _kept(parts)
+            raise
+
+
+def _kept(parts: Parts) -> str:
+    """What a run that breaks off leaves behind; the folder goes if that is nothing."""
+    if not parts.saved:
+        parts.discard()
+        return "nothing is saved"
+    return f"{len(parts.saved)} of {parts.count} shards are saved in {parts.folder}; continue with --resume"
+
+
+class _Store(Protocol):
+    """Where shards go: a folder, or memory."""
+
+    extent: int
+    saved: set[int]
+
+    def save(self, index: int, dataset: xarray.Dataset) -> None: ...
+
+    def load(self, index: int) -> xarray.Dataset: ...
+
+
+class _Held:
+    """Shards in memory."""
+
+    def __init__(self, size: int) -> None:
+        self.extent, self.saved = size, set[int]()
+        self._shards: dict[int, xarray.Dataset] = {}
+
+    def save(self, index: int, dataset: xarray.Dataset) -> None:
+        self._shards[index] = dataset
+        self.saved.add(index)
+
+    def load(self, index: int) -> xarray.Dataset:
+        return self._shards[index]
+
+
+@dataclass(frozen=True)
+class _End:
+    """How a run ended: its number of shards and of hits, the time that computing took [s], and the estimate that a stop
+    rule asked for."""
+
+    shards: int
+    hits: int
+    compute_time: float
+    stop: dict[str, Any]
+
+
+def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End:
+    """Compute the shards that the store lacks, until all are there or the stop rule is met."""
+    sampler = campaign.sampler()
+    watch = _Watch(campaign, len(sampler), store)
+    for index in sorted(store.saved):
+        watch.add(index, store.load(index))
+    watch.resumed = watch.done
+    tasks = _tasks(store, len(sampler), team.task)
+    waiting: dict[Future[xarray.Dataset], range] = {}
+    try:
+        while watch.end is None:
+            width = team.width()
+            while len(waiting) < width and (task := next(tasks, None)) is not None:
+                shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
+                waiting[team.submit(shots)] = task
+            finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
+            for future in finished:
+                task = waiting.pop(future)
+                for index, shard in _split(future.result(), task, store.extent):
+                    store.save(index, shard)
+                    watch.add(index, shard)
+            follow(watch.standing(team.underway()))
+    finally:
+        for future in waiting:
+            future.cancel()
+    follow(watch.standing(0))
+    return watch.end
+
+
+def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
+    """Ranges of shards that the store lacks, of about so many shots each."""
+    most, saved = max(1, shots // store.extent), frozenset(store.saved)
+    missing = (index for index in range(-(-total // store.extent)) if index not in saved)
+    task = range(0)
+    for index in missing:
+        if len(task) == most or index != task.stop:
+            if task:
+                yield task
+            task = range(index, index)
+        task = range(task.start, index + 1)
+    if task:
+        yield task
+
+
+def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[int, xarray.Dataset]]:
+    """The shards of a task, each with its share of the time and of what was computed."""
+    hits = dataset.sizes["hit"]
+    for place, index in enumerate(task):
+        shard = dataset.isel(hit=slice(place * size, (place + 1) * size))
+        time = dataset.attrs["compute_time"] * shard.sizes["hit"] / hits
+        yield index, shard.assign_attrs(compute_time=time, **_computed(dataset, shard.sizes["hit"]))
+
+
+class _Watch:
+    """Follows a run: what is done, what failed, what the estimates are, and when it is enough.
+
+    All but the counts is looked at in the order of the shots, whatever order they come in, so that a run ends with the
+    same shots however it was computed.
+    """
+
+    def __init__(self, campaign: Campaign, total: int, store: _Store) -> None:
+        self._total, self._shards, self._load = total, -(-total // store.extent), store.load
+        self._rule = campaign.stop
+        last = campaign.output.standoffs[-1]
+        measures = [Measure.parse("mean(residual_velocity)"), Measure.parse(f"mean(tilt@{last * 1e3:.10g}mm)")]
+        dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries)}
+        self._tallies = [Tally(measure, **dealt) for measure in measures]
+        if self._rule is not None:
+            rule = self._rule
+            self._stop = Tally(rule.measure, **dealt, confidence=rule.confidence)
+            self._looks = looks(campaign.hits.sampling, self._shards)
+            self._look = next(self._looks)
+        self._early: set[int] = set()
+        self._next, self._hits, self._time = 0, 0, 0.0
+        self.done, self.resumed, self.failed = 0, 0, 0
+        self.end: _End | None = None
+
+    def add(self, index: int, shard: xarray.Dataset) -> None:
+        """Take in a shard that the store has; one that comes before its turn is loaded when that is."""
+        self.done += shard.sizes["hit"]
+        self.failed += int(failed(shard).sum())
+        self._early.add(index)
+        while self.end is None and self._next in self._early:
+            self._early.remove(self._next)
+            self._advance(shard if self._next == index else self._load(self._next))
+
+    def _advance(self, shard: xarray.Dataset) -> None:
+        self._next += 1
+        self._hits += shard.sizes["hit"]
+        self._time += shard.attrs["compute_time"]
+        for tally in self._tallies:
+            tally.add(shard)
+        stop: dict[str, Any] = {}
+        if self._rule is not None:
+            self._stop.add(shard)
+            stop = self._looked_at()
+        if self._next == self._shards or stop:
+            self.end = _End(self._next, self._hits, self._time, stop)
+
+    def _looked_at(self) -> dict[str, Any]:
+        """What there is to say at the end, if this is one."""
+        rule = self._rule
+        assert rule is not None
+        if self._next != self._look:
+            return {}
+        self._look = next(self._looks, self._shards)
+        estimate = self._stop.estimate()
+        met = estimate.half_width <= rule.measure.shown(rule.half_width)
+        if not met and self._next != self._shards:
+            return {}
+        return {
+            "stop_quantity": rule.quantity,
+            "stop_reason": "half_width" if met else "max_count",
+            "estimate": estimate.value,
+            "estimate_interval": [estimate.low, estimate.high],
+            "estimate_units": rule.measure.units,
+            "confidence": rule.confidence,
         }
-        | ({} if campaign.hits.count is None else {"count": campaign.hits.count})
-        | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {}),
-        estimates=None if estimates is None else unfolded_estimates(estimates, group),
-    )
+
+    def standing(self, underway: int) -> Standing:
+        """How far the run is, with shots of unfinished shards."""
+        tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
+        estimates = {tally.measure: tally.estimate() for tally in tallies if tally.measure.kind != "quantile"}
+        done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
+        return Standing(done, self._total, self.resumed, self.failed, estimates)
 
 
-def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
-    """By which symmetries hits were unfolded, and how many were computed."""
-    return {"symmetries": ", ".join(map(str, group)), "computed_hits": computed}
-
-
-def _check_memory(campaign: Campaign) -> None:
-    """Refuse a campaign whose results cannot be held, before it starts."""
-    numbers = len(fields(Shots)) + 8 + 4 * len(campaign.output.standoffs)
-    copies = 3  # outcomes by batch, joined, and in the Dataset's units
-    needed = copies * numbers * 8 * (campaign.hits.count or 0)
-    free = psutil.virtual_memory().available
-    if needed > free:
-        raise MemoryError(
-            f"hits.count: got {campaign.hits.count}, whose results take {needed / 2**30:.3g} GiB, "
-            f"but {free / 2**30:.3g} GiB are free; at most {(campaign.hits.count or 0) * free // needed} hits fit"
-        )
-
-
-def _in_batches(campaign: Campaign, shots: Shots, device: str, progress: Progress) -> tuple[Outcomes, Estimates | None]:
-    parts = []
-    for first in range(0, len(shots), BATCH):
-        parts.append(_batch(campaign, shots[first : first + BATCH], device, _after(first, len(shots), progress)))
-    outcomes, estimates = zip(*parts, strict=True)
-    return _joined(outcomes), None if estimates[0] is None else _joined(estimates)
-
-
-def _batch(campaign: Campaign, shots: Shots, device: str, progress: Progress) -> tuple[Outcomes, Estimates | None]:
-    how: dict[str, Any] = {
-        "interaction": campaign.interaction,
-        "numerics": campaign.numerics,
-        "standoffs": campaign.output.standoffs,
-        "standoff_point": campaign.output.standoff_point,
-        "device": device,
-        "progress": progress,
+def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:
+    """Global attributes of a complete result over those of its first shard."""
+    return {
+        "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        "compute_time": end.compute_time,
+        "hits_per_second": end.hits / images(dataset) / end.compute_time,
+        **_computed(dataset, end.hits),
+        **end.stop,
     }
-    if campaign.numerics.tolerance is None:
-        return simulate(campaign.core, campaign.plate, shots, **how), None
-    return simulate_to_tolerance(campaign.core, campaign.plate, shots, **how)
 
 
-def _joined(parts: Sequence[Any]) -> Any:
-    """One dataclass of arrays from several of the same type."""
-    names = [field.name for field in fields(parts[0])]
-    return type(parts[0])(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in names})
-
-
-def _after(first: int, total: int, progress: Progress) -> Progress:
-    """Progress of a batch that comes after the first shots."""
-    return lambda done, _: progress(first + done, total)
-
-
-def _numerics(campaign: Campaign) -> str:
-    """The numerics in force, every choice made, as one line."""
-    tolerance = campaign.numerics.tolerance
-    if tolerance is not None:
-        return (
-            f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg, "
-            f"at most {LADDER[-1].patches_axial} by {LADDER[-1].patches_around} patches"
-        )
-    resolution = resolve(campaign.numerics, campaign.core, campaign.plate)
-    return (
-        f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
-        f"time_step {resolution.step_at(campaign.impact.velocity, campaign.impact.obliquity):.4g} s, "
-        f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
-        f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
-    )
+def _computed(dataset: xarray.Dataset, hits: int) -> dict[str, int]:
+    """How many of some hits of a Dataset were computed, if that is not all the same."""
+    return {"computed_hits": hits // images(dataset)} if "computed_hits" in dataset.attrs else {}

@@ -21,8 +21,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
-from warpimpact.analysis.summary import passed
-from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, status_codes
+from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, passed, status_codes
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -18,7 +18,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
 from scipy.spatial import ConvexHull
 
-from warpimpact.analysis.summary import passed
+from warpimpact.results import passed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

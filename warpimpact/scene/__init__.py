@@ -14,8 +14,10 @@ from .patterns import (
     TrianglePattern,
 )
 from .plate import Plate
-from .shots import Hits, Impact, Shots, make_shots, symmetries_used
-from .symmetry import IDENTITY, Symmetry
+from .sampling import Sampler, make_shots
+from .scatter import Scatter
+from .shots import Hits, Impact, Shots
+from .symmetry import IDENTITY, Symmetry, symmetries_used
 
 __all__ = [
     "IDENTITY",
@@ -37,6 +39,8 @@ __all__ = [
     "Plate",
     "PolynomialCore",
     "ProfileCore",
+    "Sampler",
+    "Scatter",
     "Shots",
     "SlotPattern",
     "Symmetry",

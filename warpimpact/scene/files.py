@@ -3,7 +3,7 @@
 import csv
 import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
@@ -31,14 +31,42 @@ def read_table(path: Path, columns: tuple[str, ...]) -> Array:
     Raises:
         ValueError: names the file, the line and what is wrong with it.
     """
+    header, reader = _open_table(path)
+    if header != columns:
+        raise ValueError(f'{path.name}, line 1: got "{",".join(header)}", but the header must be {",".join(columns)}')
+    return _rows(path, columns, reader)
+
+
+def read_columns(path: Path, required: tuple[str, ...], optional: tuple[str, ...]) -> dict[str, Array]:
+    """Columns of a CSV file by their names: the required ones first in its header, then any of the optional ones.
+
+    Returns:
+        Arrays of shape [rows], read-only.
+
+    Raises:
+        ValueError: names the file, the line and what is wrong with it.
+    """
+    header, reader = _open_table(path)
+    more = header[len(required) :]
+    if header[: len(required)] != required or not set(more) <= set(optional) or len(set(more)) < len(more):
+        raise ValueError(
+            f'{path.name}, line 1: got "{",".join(header)}", but the header must be {",".join(required)} '
+            f"and then any of {', '.join(optional)}"
+        )
+    return dict(zip(header, _rows(path, header, reader).T, strict=True))
+
+
+def _open_table(path: Path) -> tuple[tuple[str, ...], Any]:
+    """Header of a CSV file, and the reader of what follows."""
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{path.name} cannot be read as text: {error}") from None
     reader = csv.reader(lines, skipinitialspace=True)
-    header = next(reader, [])
-    if tuple(name.strip() for name in header) != columns:
-        raise ValueError(f'{path.name}, line 1: got "{",".join(header)}", but the header must be {",".join(columns)}')
+    return tuple(name.strip() for name in next(reader, [])), reader
+
+
+def _rows(path: Path, columns: tuple[str, ...], reader: Any) -> Array:
     rows = [_numbers(row, columns, f"{path.name}, line {reader.line_num}") for row in reader if row]
     if not rows:
         raise ValueError(f"{path.name} has no rows below its header")

@@ -1,5 +1,6 @@
 """Hole patterns: one hole shape on a periodic lattice, or any mask repeated periodically (MODEL §3)."""
 
+import math
 import struct
 from abc import ABC, abstractmethod
 from functools import cached_property
@@ -19,7 +20,7 @@ Range = tuple[float, float]
 
 _MASK_LIMIT = 4096  # cells along one side; 16 million in all
 _ARC = np.linspace(0.0, np.pi, 33)
-_WITHIN = (np.arange(64) + 1.0 / np.e) / 64  # irrational, so that no probe lies on the edge of a hole of round numbers
+_WITHIN = (np.arange(64) + 1.0 / math.e) / 64  # irrational: no probe lies on the edge of a hole of round numbers
 
 
 class Pattern(Model, ABC):

@@ -1,26 +1,27 @@
 """Shots: how the core arrives, and where (MODEL §1)."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Annotated, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from .files import InputFile, read_table
+from .files import InputFile, read_columns
 from .model import Array, Model
-from .plate import Plate
-from .symmetry import IDENTITY, Symmetry, irreducible_part, symmetries
 from .units import Angle, AngularVelocity, PositiveSpeed
 
 _RIGHT_ANGLE = np.pi / 2
 
-_Tilt = Annotated[Angle, Field(gt=-_RIGHT_ANGLE, lt=_RIGHT_ANGLE)]
+Obliquity = Annotated[Angle, Field(ge=0, lt=_RIGHT_ANGLE)]
+Tilt = Annotated[Angle, Field(gt=-_RIGHT_ANGLE, lt=_RIGHT_ANGLE)]
 
 
 class Impact(Model):
-    """Velocity and attitude at impact, the same for all shots of a campaign.
+    """Velocity and attitude at impact, of all shots or, where they scatter, at the median.
 
     Attributes:
         velocity: [m/s].
@@ -31,10 +32,10 @@ class Impact(Model):
     """
 
     velocity: PositiveSpeed
-    obliquity: Annotated[Angle, Field(ge=0, lt=_RIGHT_ANGLE)] = 0.0
+    obliquity: Obliquity = 0.0
     azimuth: Angle = 0.0
-    pitch: _Tilt = 0.0
-    yaw: _Tilt = 0.0
+    pitch: Tilt = 0.0
+    yaw: Tilt = 0.0
     spin: AngularVelocity = 0.0
 
     @model_validator(mode="after")
@@ -51,14 +52,18 @@ class Impact(Model):
 
 
 class Hits(Model):
-    """Where the cores hit.
+    """Where the cores hit, and how the numbers are drawn that hits and scatter are made of.
 
     Attributes:
         sampling: "sobol" (scrambled, even at any count), "random" (independent), "grid" (cell centres), or
             "list" (those of `file`).
         count: how many; a grid takes the most that a rectangle of nearly square cells gives.
-        seed: of a sobol or random sampling.
-        file: CSV file of a list, with the header hit_y,hit_z in metres.
+        seed: of all that is drawn.
+        file: CSV file of a list, with the header hit_y,hit_z in metres; more columns, named as in `Shots` and in SI,
+            override those quantities.
+        repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
+        replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
+            two. Their spread tells how certain a mean is; None is 16 for a campaign with a stop rule, else 1.
         irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
             each hit there with its images, as many in all as `count` holds, or one hit's.
     """
@@ -68,12 +73,18 @@ class Hits(Model):
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     file: InputFile | None = None
     irreducible: Annotated[bool, Field(strict=True)] = False
+    repeats: Annotated[int, Field(strict=True, ge=1, le=2**20)] = 1
+    replicates: Literal[1, 8, 16, 32, 64] | None = None
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
-        needed, foreign = ("file", {"count", "seed", "irreducible"}) if self.sampling == "list" else ("count", {"file"})
+        needed, foreign = ("file", {"count", "irreducible"}) if self.sampling == "list" else ("count", {"file"})
         if getattr(self, needed) is None:
             raise ValueError(f'got sampling = "{self.sampling}" without {needed}, which it needs')
+        if self.sampling in ("sobol", "random"):
+            foreign = foreign | {"repeats"}
+        if self.sampling != "sobol":
+            foreign = foreign | {"replicates"}
         for name in sorted(foreign):
             if getattr(self, name) != type(self).model_fields[name].default:
                 raise ValueError(f'got {name} beside sampling = "{self.sampling}", which takes none')
@@ -81,51 +92,30 @@ class Hits(Model):
         return self
 
     @cached_property
-    def listed(self) -> Array | None:
-        """Hit points of the file [m], shape [hits, 2]; None where there is no file."""
-        return None if self.file is None else read_table(self.file, ("hit_y", "hit_z"))
+    def listed(self) -> dict[str, Array] | None:
+        """Columns of the file by their names, SI, each of shape [hits]; None where there is no file."""
+        if self.file is None:
+            return None
+        required = ("hit_y", "hit_z")
+        return read_columns(self.file, required, tuple(f.name for f in fields(Shots) if f.name not in required))
 
-    def points(self, period: tuple[float, float]) -> tuple[Array, Array]:
-        """Hit points (y, z) [m], both of shape [hits], over a unit cell centred on the origin.
-
-        Hit k of a sobol or random sampling depends on the seed and k only, but for the scale.
-
-        Args:
-            period: extent of the unit cell along y and z [m].
-        """
+    def total(self, period: tuple[float, float]) -> int:
+        """How many shots there are over a unit cell of this extent along y and z [m]."""
         if self.listed is not None:
-            return self.listed[:, 0], self.listed[:, 1]
+            return len(self.listed["hit_y"]) * self.repeats
         assert self.count is not None  # validated
-        match self.sampling:
-            case "grid":
-                unit = _grid(self.count, period[0] / period[1])
-            case "random":
-                unit = np.random.Generator(np.random.Philox(self.seed)).random((self.count, 2))
-            case _:
-                unit = _sobol(self.count, self.seed)
-        return (unit[:, 0] - 0.5) * period[0], (unit[:, 1] - 0.5) * period[1]
+        return math.prod(self.grid(period)) * self.repeats if self.sampling == "grid" else self.count
 
-
-def _sobol(count: int, seed: int) -> Array:
-    """Points of the unit square, shape [count, 2]."""
-    from scipy.stats.qmc import Sobol  # a second to import
-
-    # The sequence is balanced at powers of two; any other count is the start of the next longer one.
-    points: Array = Sobol(d=2, rng=seed).random_base2((count - 1).bit_length())[:count]
-    return points
-
-
-def _grid(count: int, aspect: float) -> Array:
-    """Centres of at most `count` cells, nearly square for a y side of `aspect` z sides; shape [cells, 2]."""
-    along_y = min(count, max(1, round(math.sqrt(count * aspect))))
-    along_z = count // along_y
-    y, z = ((np.arange(n) + 0.5) / n for n in (along_y, along_z))
-    return np.stack(np.meshgrid(y, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    def grid(self, period: tuple[float, float]) -> tuple[int, int]:
+        """Cells of a grid along y and z, nearly square and at most `count`."""
+        assert self.count is not None  # validated
+        along_y = min(self.count, max(1, round(math.sqrt(self.count * period[0] / period[1]))))
+        return along_y, self.count // along_y
 
 
 @dataclass(frozen=True)
 class Shots:
-    """Shots as arrays, each of shape [shots], in SI and radians; `Impact` says what the angles are.
+    """Shots as arrays, each of shape [shots], in SI and radians; `Impact` and `Plate` say what the quantities are.
 
     Attributes:
         hit_y, hit_z: where the line of flight of the centre of mass crosses the front face [m].
@@ -133,6 +123,8 @@ class Shots:
         obliquity, azimuth: of the line of flight [rad].
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
+        resistance [Pa], shear_coefficient, degradation, thickness [m]: of the plate, and
+        mass: of the core [kg]; None where all shots have the scene's own value.
     """
 
     hit_y: Array
@@ -143,34 +135,26 @@ class Shots:
     pitch: Array
     yaw: Array
     spin: Array
+    resistance: Array | None = None
+    shear_coefficient: Array | None = None
+    degradation: Array | None = None
+    thickness: Array | None = None
+    mass: Array | None = None
 
     def __len__(self) -> int:
         """Number of shots."""
         return len(self.hit_y)
 
-    def __getitem__(self, which: slice) -> Self:
-        """The shots of a slice."""
-        return type(self)(*(getattr(self, field.name)[which] for field in fields(self)))
+    def __getitem__(self, which: slice | NDArray[np.int64]) -> Self:
+        """The shots of a slice or of some indices."""
+        return type(self)(**{name: values[which] for name, values in self.columns.items()})
 
+    @property
+    def columns(self) -> dict[str, Array]:
+        """The arrays that there are, by name."""
+        return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
 
-def symmetries_used(impact: Impact, hits: Hits, plate: Plate) -> tuple[Symmetry, ...]:
-    """Symmetries by which the hits are images of each other; the identity alone where none is asked for or there."""
-    return symmetries(plate, impact) if hits.irreducible else (IDENTITY,)
-
-
-def make_shots(impact: Impact, hits: Hits, plate: Plate) -> Shots:
-    """Shots at the hit points over one unit cell of the plate, or over all of a plate smaller than that.
-
-    With hits.irreducible each shot is followed by its images under `symmetries_used`, the first of which it is itself.
-    """
-    cell, group = plate.sampled_cell, symmetries_used(impact, hits, plate)
-    if hits.count is not None:
-        hits = hits.model_copy(update={"count": max(1, hits.count // len(group))})
-    part = irreducible_part(group)
-    extent_y, extent_z = (side * (high - low) for side, (low, high) in zip(cell, part, strict=True))
-    middle_y, middle_z = (0.5 * side * (high + low) for side, (low, high) in zip(cell, part, strict=True))
-    hit_y, hit_z = hits.points((extent_y, extent_z))
-    images = np.array([symmetry.image(hit_y + middle_y, hit_z + middle_z, cell) for symmetry in group])
-    hit_y, hit_z = images.transpose(1, 2, 0).reshape(2, -1)
-    alike = {name: np.full(len(hit_y), value) for name, value in impact}
-    return Shots(hit_y=hit_y, hit_z=hit_z, **alike)
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """One after the other; all have the same columns."""
+        return cls(**{name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns})

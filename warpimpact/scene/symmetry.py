@@ -4,15 +4,13 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .model import Array
 from .plate import Plate
-
-if TYPE_CHECKING:
-    from .shots import Impact
+from .scatter import Scatter
+from .shots import Hits, Impact
 
 _ROUNDING = 1e-12
 """A component of the unit vector along the line of flight, or an angle [rad], below this is none: cos 90° is 6e-17."""
@@ -62,12 +60,31 @@ SYMMETRIES = tuple(Symmetry(y, z, centred) for y, z, centred in product((1, -1),
 IDENTITY = SYMMETRIES[0]
 
 
-def symmetries(plate: Plate, impact: "Impact") -> tuple[Symmetry, ...]:
+def symmetries_used(impact: Impact, hits: Hits, plate: Plate) -> tuple[Symmetry, ...]:
+    """Symmetries by which the hits are images of each other; the identity alone where none is asked for or there."""
+    return symmetries(plate, impact) if hits.irreducible else (IDENTITY,)
+
+
+def check_scatter(hits: Hits, scatter: Scatter) -> None:
+    """Refuse scatter that leaves no symmetry to all shots.
+
+    Raises:
+        ValueError: says what scatters.
+    """
+    turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if name in scatter.given]
+    if hits.irreducible and turned:
+        raise ValueError(
+            f"got hits.irreducible = true beside a distribution of impact.{turned[0]}, but a symmetry must hold for "
+            "every shot; of the impact quantities only velocity may scatter with it"
+        )
+
+
+def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:
     """Those of SYMMETRIES, in their order, that plate and shot both have."""
     return tuple(s for s in SYMMETRIES if s == IDENTITY or (_of_shot(s, impact) and _of_plate(s, plate)))
 
 
-def _of_shot(symmetry: Symmetry, impact: "Impact") -> bool:
+def _of_shot(symmetry: Symmetry, impact: Impact) -> bool:
     """Whether the image of the shot, but for where it hits, is the shot itself."""
     across = math.sin(impact.obliquity)
     of_y = across * math.cos(impact.azimuth), impact.yaw

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from numbers import Real
@@ -101,6 +102,12 @@ def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
     return BeforeValidator(_Quantity(name, unit, example))
 
 
+def quantity(kind: Any) -> Callable[[object], float]:
+    """The reader of one of the types below, or of one that is made of it; its ValueError says what is allowed."""
+    (reader,) = (mark.func for mark in kind.__metadata__ if isinstance(mark, BeforeValidator))
+    return reader  # type: ignore[return-value]
+
+
 Number = Annotated[float, _quantity("a number", "", "0.05")]
 Length = Annotated[float, _quantity("a length", "m", "4 mm")]
 Mass = Annotated[float, _quantity("a mass", "kg", "4 g")]
@@ -110,6 +117,7 @@ Density = Annotated[float, _quantity("a density", "kg/m^3", "7850 kg/m^3")]
 Speed = Annotated[float, _quantity("a speed", "m/s", "825 m/s")]
 Angle = Annotated[float, _quantity("an angle", "rad", "20 deg")]
 AngularVelocity = Annotated[float, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
+Energy = Annotated[float, _quantity("an energy", "J", "10 J")]
 Inertia = Annotated[float, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]
 
 PositiveLength = Annotated[Length, Field(gt=0)]

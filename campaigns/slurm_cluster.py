@@ -1,0 +1,34 @@
+"""How does a campaign run on a SLURM cluster? Submit nothing by hand: `python slurm_cluster.py` on a login node.
+
+It needs `pip install 'warpimpact[cluster]' dask-jobqueue`, and your queue and account below. dask-jobqueue submits one
+job per worker; jobs may start late, end early or die, and others take over what they were computing. Where this script
+itself may end, start it again: it continues (`resume`).
+"""
+
+from pathlib import Path
+
+from dask_jobqueue import SLURMCluster
+
+from warpimpact import Campaign
+from warpimpact.campaign.run import run_to_file
+from warpimpact.campaign.team import cluster_team
+
+CAMPAIGN = Path(__file__).with_name("slotted_plate.toml")
+OUTPUT = Path("slotted_plate.nc")
+
+if __name__ == "__main__":
+    campaign = Campaign.from_toml(CAMPAIGN, count=10_000_000)
+    with SLURMCluster(
+        queue="gpu",
+        account="your-account",
+        processes=1,  # one worker per job, which takes all cores, or the GPU, of the job
+        cores=1,  # tasks at a time per worker: warpimpact itself uses every core that the job gives it
+        job_cpu=16,
+        memory="16GB",
+        walltime="02:00:00",
+        job_extra_directives=["--gpus=1"],
+        worker_extra_args=["--lifetime", "110m", "--lifetime-stagger", "5m"],  # ends before SLURM ends it
+    ) as cluster:
+        cluster.adapt(minimum_jobs=1, maximum_jobs=32)
+        team = cluster_team(campaign, address=cluster.scheduler_address)
+        run_to_file(campaign, OUTPUT, team=team, resume=True)

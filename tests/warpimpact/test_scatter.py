@@ -1,0 +1,247 @@
+"""Scatter: the distribution asked for, shot k a function of seed and k alone, and sentences for what cannot be."""
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from warpimpact import Campaign, Impact, Plate
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.compute import compute
+from warpimpact.campaign.run import run
+from warpimpact.cli import main
+from warpimpact.results import OUTCOME_VARIABLES
+from warpimpact.scene import Hits, NoPattern, Sampler, Scatter, Shots
+from warpimpact.scene.scatter import QUANTITIES
+from warpimpact.simulate import UnsupportedError
+
+SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())
+IMPACT = Impact(velocity=820.0)
+SCATTER = Scatter(
+    velocity={"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"},
+    obliquity={"distribution": "uniform", "low": "0 deg", "high": "10 deg"},
+    resistance={"distribution": "lognormal", "median": "2 GPa", "sigma": 0.05},
+)
+
+
+def sampler(sampling: str, count: int, *, scatter: Scatter = SCATTER, replicates: int = 1, **hits: int) -> Sampler:
+    return Sampler(IMPACT, Hits(sampling=sampling, count=count, **hits), PLATE, scatter, replicates)
+
+
+def same(one: Shots, other: Shots) -> bool:
+    return one.columns.keys() == other.columns.keys() and all(
+        np.array_equal(one.columns[name], other.columns[name]) for name in one.columns
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        ({"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"}, stats.norm(820, 10)),
+        (
+            {"distribution": "truncated_normal", "mean": 820, "std": 10, "low": "0.81 km/s", "high": 840},
+            stats.truncnorm(-1, 2, 820, 10),
+        ),
+        ({"distribution": "uniform", "low": 800, "high": 840}, stats.uniform(800, 40)),
+        ({"distribution": "triangular", "low": 800, "mode": 830, "high": 840}, stats.triang(0.75, 800, 40)),
+        ({"distribution": "lognormal", "median": 820, "sigma": 0.1}, stats.lognorm(0.1, scale=820)),
+    ],
+    ids=lambda value: value["distribution"] if isinstance(value, dict) else "",
+)
+@pytest.mark.parametrize("sampling", ["sobol", "random", "grid"])
+def test_draws_follow_the_distribution(parameters: dict[str, object], expected: object, sampling: str) -> None:
+    shots = sampler(sampling, 4096, scatter=Scatter(velocity=parameters)).shots(0, 4096)
+    assert stats.kstest(shots.velocity, expected.cdf).pvalue > 1e-3
+    assert abs(stats.spearmanr(shots.velocity, shots.hit_y).statistic) < 0.06  # 4096 independent pairs: ± 0.016
+
+
+def test_a_discrete_distribution_gives_its_values_as_often_as_its_weights_say() -> None:
+    scatter = Scatter(velocity={"distribution": "discrete", "values": ["830 m/s", 810], "weights": [1, 3]})
+    values, counts = np.unique(sampler("sobol", 4096, scatter=scatter).shots(0, 4096).velocity, return_counts=True)
+    assert values.tolist() == [810.0, 830.0]
+    assert counts.tolist() == [3072, 1024]  # a net is exact
+
+
+@pytest.mark.parametrize(("sampling", "replicates"), [("sobol", 1), ("sobol", 8), ("random", 1)])
+def test_a_shot_depends_on_the_seed_and_its_number_alone(sampling: str, replicates: int) -> None:
+    whole = sampler(sampling, 1000, seed=3, replicates=replicates).shots(0, 1000)
+    asked = sampler(sampling, 1000, seed=3, replicates=replicates)
+    for first, count in ((600, 100), (0, 7), (997, 50), (7, 300), (999, 1), (6, 1)):  # any order, any batch
+        assert same(asked.shots(first, count), whole[first : first + count])
+    longer = sampler(sampling, 5000, seed=3, replicates=replicates)
+    assert same(longer.shots(0, 1000), whole)
+    assert not same(sampler(sampling, 1000, seed=4, replicates=replicates).shots(0, 1000), whole)
+
+
+def test_what_else_scatters_changes_no_draw() -> None:
+    for sampling in ("sobol", "random"):
+        alone = sampler(sampling, 64, scatter=Scatter(velocity=SCATTER.velocity)).shots(0, 64)
+        assert np.array_equal(alone.velocity, sampler(sampling, 64).shots(0, 64).velocity)
+
+
+def test_far_shots_cost_what_near_ones_do() -> None:
+    for sampling in ("sobol", "random"):
+        far = sampler(sampling, 2**26).shots(2**26 - 10, 100)
+        assert len(far) == 10
+        assert len(np.unique(far.velocity)) == 10
+
+
+def test_replicates_are_independent_nets() -> None:
+    shots = sampler("sobol", 8 * 256, replicates=8).shots(0, 8 * 256)
+    for replicate in range(8):
+        y, z = (values[replicate::8] for values in (shots.hit_y, shots.hit_z))
+        counts = np.histogram2d(y / PLATE.sampled_cell[0], z / PLATE.sampled_cell[1], bins=16, range=[[-0.5, 0.5]] * 2)
+        assert (counts[0] == 1).all()
+    assert len(np.unique(shots.hit_y)) == 8 * 256
+
+
+def test_a_grid_is_shot_again_with_other_draws() -> None:
+    shots = sampler("grid", 16, repeats=3).shots(0, 100)
+    assert len(shots) == 48
+    assert np.array_equal(shots.hit_y[:16], shots.hit_y[32:])
+    assert len(np.unique(shots.velocity)) == 48
+    assert same(sampler("grid", 16, repeats=2).shots(0, 32), shots[:32])
+
+
+def test_columns_of_a_list_override(tmp_path: Path) -> None:
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z,velocity,yaw\n0,0,700,0.1\n0.001,0,710,0.2\n")
+    hits = Hits(sampling="list", file=tmp_path / "hits.csv", seed=2, repeats=2)
+    shots = Sampler(Impact(velocity=820, yaw=0.3), hits, PLATE, SCATTER).shots(0, 4)
+    assert shots.velocity.tolist() == [700.0, 710.0] * 2
+    assert shots.yaw.tolist() == [0.1, 0.2] * 2
+    assert len(np.unique(shots.obliquity)) == 4
+
+
+def campaign_with(tmp_path: Path, *changes: tuple[str, str]) -> Campaign:
+    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "64")
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    return Campaign.from_toml(tmp_path / "campaign.toml")
+
+
+NORMAL = '{ distribution = "normal", mean = "820 m/s", std = "10 m/s" }'
+VELOCITY = '"825 m/s"                    # obliquity, azimuth, pitch, yaw, spin default to 0'
+
+
+def test_a_distribution_stands_in_the_place_of_its_value(tmp_path: Path) -> None:
+    campaign = campaign_with(
+        tmp_path,
+        (VELOCITY, f'{NORMAL}\nyaw = {{ distribution = "triangular", low = "-2 deg", mode = 0, high = "2 deg" }}'),
+    )
+    assert campaign.impact.velocity == 820.0  # the median
+    assert set(campaign.scatter.given) == {"velocity", "yaw"}
+    assert campaign.scatter.yaw.high == pytest.approx(math.radians(2))
+    dataset = run(campaign, device="cpu")
+    shots = campaign.sampler().shots(0, 64)
+    assert np.array_equal(dataset.impact_velocity, shots.velocity)
+    np.testing.assert_allclose(dataset.impact_yaw, np.degrees(shots.yaw), rtol=1e-15)
+    assert np.ptp(dataset.impact_velocity.values) > 30.0
+    from warpimpact.campaign.replay import replay
+
+    assert replay(dataset, 40, folder=tmp_path).attrs["agreement"] == "bit-identical"
+
+
+def test_a_campaign_in_python_comes_back_from_its_text_and_from_another_process(tmp_path: Path) -> None:
+    campaign = campaign_with(tmp_path, (VELOCITY, NORMAL))
+    by_hand = Campaign(**{name: getattr(campaign, name) for name in Campaign.model_fields})
+    assert Campaign.from_text(by_hand.text, name="text", folder=tmp_path).model_dump() == by_hand.model_dump()
+    assert pickle.loads(pickle.dumps(campaign)).model_dump() == campaign.model_dump()
+
+
+def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
+    """The window on the plate is as large as the steepest shot of a batch needs."""
+    changes = 'obliquity = { distribution = "uniform", low = 0, high = "50 deg" }\nspin = 1e4'
+    campaign = campaign_with(tmp_path, (VELOCITY, f"{NORMAL}\n{changes}"))
+    whole = run(campaign, device="cpu")
+    for hit in range(0, 64, 9):
+        alone = compute(campaign, campaign.sampler().shots(hit, 1), device="cpu")
+        for name in OUTCOME_VARIABLES:
+            assert np.array_equal(alone[name][0], whole[name][hit], equal_nan=True), name
+
+
+@pytest.mark.parametrize("name", ["resistance", "shear_coefficient", "degradation", "thickness", "mass"])
+def test_what_the_kernels_take_as_one_number_is_refused_in_one_sentence(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    uniform = f'{name} = {{ distribution = "uniform", low = 0.001, high = 0.01 }}'
+    line = next(line for line in SLOTTED_PLATE.splitlines() if line.startswith(f"{name} = "))
+    campaign = campaign_with(tmp_path, (line, uniform))
+    assert campaign.sampler().shots(0, 4).columns[name].max() <= 0.01
+    with pytest.raises(UnsupportedError, match=f"^{name}: got values that differ from shot to shot"):
+        run(campaign, device="cpu")
+    output = tmp_path / "a.nc"
+    assert main(["run", str(tmp_path / "campaign.toml"), "-o", str(output), "--device", "cpu"]) == 2
+    assert capsys.readouterr().err.splitlines()[-1].startswith(f"warpimpact: error: {name}: got values that differ")
+    assert [path.name for path in tmp_path.iterdir()] == ["campaign.toml"]
+
+
+@pytest.mark.parametrize(
+    ("distribution", "sentence"),
+    [
+        (
+            '{ distribution = "normal", mean = "820 kg", std = 1 }',
+            'mean: got "820 kg", which is not a speed; give a number in m/s or a string such as "825 m/s"',
+        ),
+        (
+            '{ distribution = "normal", mean = "50 m/s", std = "10 m/s" }',
+            "got a normal distribution that reaches -11.2",
+        ),
+        ('{ distribution = "normal", mean = 820 }', "std: is missing, but must be given"),
+        ('{ distribution = "normal", mean = 820, std = 0 }', "std: got 0.0, but it must be greater than 0"),
+        ('{ distribution = "normal", mean = 820, sd = 1, std = 1 }', 'got the unknown key "sd"; did you mean "std"?'),
+        ('{ distribution = "gauss", mean = 820 }', 'distribution: got "gauss", but it must be one of'),
+        ("{ mean = 820 }", "distribution: is missing, but must be given"),
+        ('{ distribution = "uniform", low = 820, high = 810 }', "got low = 820 and high = 810, but high must be above"),
+        ('{ distribution = "discrete", values = [1, 2], weights = [1] }', "got 2 values and 1 weights"),
+        ('{ distribution = "triangular", low = 1, mode = 3, high = 2 }', "got mode = 3, but it must lie between"),
+    ],
+)
+def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, distribution: str, sentence: str) -> None:
+    with pytest.raises(CampaignError) as caught:
+        campaign_with(tmp_path, (VELOCITY, distribution))
+    shown = str(caught.value).removeprefix(f"{tmp_path / 'campaign.toml'}: ")
+    assert shown.startswith("impact.velocity")
+    assert sentence in shown
+    assert "\n" not in shown
+
+
+def test_attitude_does_not_scatter_beside_irreducible_hits(tmp_path: Path) -> None:
+    irreducible = ("seed = 1", "seed = 1\nirreducible = true")
+    assert campaign_with(tmp_path, (VELOCITY, NORMAL), irreducible).symmetries[1:]
+    yaw = '"825 m/s"\nyaw = { distribution = "normal", mean = 0, std = "1 deg" }'
+    with pytest.raises(CampaignError, match=r"campaign.toml: got hits.irreducible = true beside .* of impact.yaw, but"):
+        campaign_with(tmp_path, (VELOCITY, yaw), irreducible)
+
+
+def test_axes_that_would_flip_are_refused(tmp_path: Path) -> None:
+    steep = '825\nobliquity = { distribution = "uniform", low = 0, high = "60 deg" }\nyaw = "40 deg"'
+    with pytest.raises(CampaignError, match="yaw up to 40 deg and obliquity up to 60 deg, but their sum must"):
+        campaign_with(tmp_path, (VELOCITY, steep))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("hit_y,hit_z,velocity\n0,0,-3\n", "a column velocity that reaches -3, but it must be greater than 0"),
+        ("hit_y,hit_z,speed\n0,0,3\n", 'line 1: got "hit_y,hit_z,speed", but the header must be hit_y,hit_z and then'),
+        ("hit_y,hit_z,spin,spin\n0,0,3,3\n", "line 1: got"),
+        ("hit_y,velocity\n0,0\n", "line 1: got"),
+    ],
+)
+def test_a_bad_list_is_told(tmp_path: Path, text: str, sentence: str) -> None:
+    (tmp_path / "hits.csv").write_text(text)
+    hits = SLOTTED_PLATE.split("[hits]\n")[1].split("[numerics]")[0].replace("4096", "64")
+    with pytest.raises(CampaignError, match=sentence):
+        campaign_with(tmp_path, (hits, 'sampling = "list"\nfile = "hits.csv"\n'))
+
+
+def test_every_quantity_has_its_place() -> None:
+    assert list(Scatter.model_fields) == list(QUANTITIES)
+    assert all(name in Impact.model_fields for name, quantity in QUANTITIES.items() if quantity.table == "impact")
+    assert all(name in Plate.model_fields for name, quantity in QUANTITIES.items() if quantity.table == "plate")

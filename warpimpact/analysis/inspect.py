@@ -1,0 +1,95 @@
+"""What is in a result file: who made it, from what campaign, its numbers with their intervals, and what failed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray
+
+from warpimpact.analysis.summary import UNITS, estimated, main_measures, slices, stop_lines, symmetry_text
+from warpimpact.campaign.estimates import STATUSES, Estimate, Measure
+from warpimpact.kernels.status import Status
+from warpimpact.results import SCATTER_VARIABLES, SHOT_VARIABLES, failed
+
+_QUANTILES = (0.05, 0.5, 0.95)
+_SAMPLINGS = {
+    "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates gives valid ones.",
+    "grid": "Intervals are those of independent shots, which the hits of a grid are not.",
+    "list": "Intervals are those of independent shots, which the hits of a list may not be.",
+}
+
+
+def inspect_text(dataset: xarray.Dataset) -> str:
+    """All that a person may ask of a hit map, as text; of an open file only a part is in memory at a time."""
+    return "\n".join([*_origin(dataset), "", *_statuses(dataset), "", *_numbers(dataset), "", *failures(dataset)])
+
+
+def _origin(dataset: xarray.Dataset) -> Iterator[str]:
+    told = dataset.attrs
+    hits = f"{dataset.sizes['hit']} hits"
+    if "sampling" in told:
+        hits += f", {told['sampling']} sampling, seed {told['seed']}"
+        hits += f", {told['replicates']} replicates" if told["replicates"] > 1 else ""
+    yield told.get("title", "untitled")
+    yield f"{'hits':<12}{hits}"
+    if "symmetries" in told:
+        yield f"{'symmetry':<12}{symmetry_text(dataset)}"
+    for label, name in (("numerics", "numerics"), ("device", "device"), ("history", "history")):
+        if name in told:
+            yield f"{label:<12}{told[name]}"
+    if "warpimpact_version" in told:
+        yield f"{'made by':<12}warpimpact {told['warpimpact_version']}, Warp {told['warp_version']}"
+    if "compute_time" in told:
+        yield f"{'took':<12}{told['compute_time']:.4g} s of computing, {told['hits_per_second']:.4g} hits per second"
+
+
+def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
+    """Shares of the shots that ended, with intervals."""
+    yield f"{'status':<22}{'share':>10}   95 % interval"
+    for measure, estimate in estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES]).items():
+        if estimate.value > 0.0:
+            yield f"{measure.variable:<22}{estimate.value:>10.2%}   {estimate.low:.2%} to {estimate.high:.2%}"
+
+
+def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
+    """Means and quantiles of the cores that passed the plate, with intervals."""
+    yield f"{'passed the plate':<36}{'':>10}   95 % interval"
+    for mean in main_measures(dataset["standoff"].values.tolist()):
+        name = mean.text.removeprefix("mean(").removesuffix(")")
+        quantiles = [Measure.parse(f"quantile({name}, {share})") for share in _QUANTILES]
+        for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
+            if estimate.count:
+                yield _row(measure, estimate)
+    if int(dataset.attrs.get("replicates", 1)) == 1 and (note := _SAMPLINGS.get(dataset.attrs.get("sampling", ""))):
+        yield note
+    yield from stop_lines(dataset)
+
+
+def _row(measure: Measure, estimate: Estimate) -> str:
+    name, what = "", f"{measure.share:.0%} below"
+    if measure.kind == "mean":
+        at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
+        name, what = f"{measure.variable.replace('_', ' ')}{at}, {UNITS[measure.units].strip()}", "mean"
+    row = f"{name:<24}{what:<12}{estimate.value:>10.2f}   {estimate.low:.2f} to {estimate.high:.2f}"
+    return f"{row:<72}spread {estimate.spread:.2f}" if measure.kind == "mean" else row
+
+
+def failures(dataset: xarray.Dataset) -> Iterator[str]:
+    """Every shot whose computation failed: its number, status and inputs."""
+    inputs = ["hit_y", "hit_z", *SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
+    first = count = 0
+    for part in slices(dataset[["status", *inputs]]):
+        for place in np.flatnonzero(failed(part)):
+            shot = part.isel(hit=place)
+            if not count:
+                yield "failed shots: " + ", ".join(["hit", "status", *(_labelled(dataset, name) for name in inputs)])
+            count += 1
+            values = "".join(f"{float(shot[name]):>14.6g}" for name in inputs)
+            yield f"{first + place:>10d}  {Status(int(shot['status'])).name.lower():<14}{values}"
+        first += part.sizes["hit"]
+    yield f"{count} of {first} shots failed"
+
+
+def _labelled(dataset: xarray.Dataset, name: str) -> str:
+    return f"{name} [{dataset[name].attrs['units']}]"

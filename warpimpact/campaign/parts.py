@@ -1,0 +1,206 @@
+"""A run on its way to the disk: shards beside the result file, which appears when all of them are there.
+
+Beside RESULT.nc the folder RESULT.nc.parts holds a manifest, which says what is being computed, and the shards, each
+the result of a fixed range of shots. A file is written under another name, flushed and renamed, so that whatever has
+its name is whole; a process that is killed loses what it was computing and no more.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import xarray
+
+from warpimpact import results
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.results import OutputError
+
+_MANIFEST = "manifest.json"
+_SHARDS = "hits_*.nc"
+FEWEST, MOST, SHARDS = 2**10, 2**16, 256
+"""Shots per shard, and how many shards are aimed at between these. A shard costs some 40 ms beside its computing."""
+
+
+def extent(count: int) -> int:
+    """Shots per shard of a campaign of so many: a power of two, which follows from the campaign alone."""
+    return min(MOST, max(FEWEST, 1 << (count // SHARDS).bit_length()))
+
+
+def manifest(campaign: Campaign, made_by: Mapping[str, str]) -> dict[str, Any]:
+    """What decides every bit of a result: the campaign with the contents of its files, versions and kind of device."""
+    contents = json.loads(json.dumps(campaign.model_dump(), default=_digest))
+    return {"campaign": contents, "extent": extent(len(campaign.sampler())), **made_by}
+
+
+def _digest(path: Path) -> str:
+    return f"{path.name}, sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}"
+
+
+def fingerprint(content: Mapping[str, Any]) -> str:
+    """Short name of a manifest: results with the same have the same bits."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def difference(begun: Any, now: Any, place: str = "") -> str | None:
+    """The first difference between two manifests as a phrase, None if there is none."""
+    if isinstance(begun, dict) and isinstance(now, dict):
+        for name in sorted(begun.keys() | now.keys()):
+            found = difference(begun.get(name), now.get(name), f"{place}.{name}".removeprefix("campaign.").strip("."))
+            if found:
+                return found
+        return None
+    return None if begun == now else f"{place} was {_brief(begun)} and is {_brief(now)}"
+
+
+def _brief(value: Any) -> str:
+    text = "not given" if value is None else json.dumps(value, ensure_ascii=False)
+    return text if len(text) <= 80 else f"{text[:77]}..."
+
+
+class Parts:
+    """The shards of one run on the disk.
+
+    Attributes:
+        output: the result file.
+        folder: where the shards are.
+        saved: numbers of the shards that are there.
+    """
+
+    def __init__(self, output: Path, content: Mapping[str, Any], total: int) -> None:
+        self.output, self.content, self.total = output, content, total
+        self.folder = output.with_name(f"{output.name}.parts")
+        self.extent: int = content["extent"]
+        self.saved: set[int] = set()
+
+    @property
+    def count(self) -> int:
+        """Number of shards of the whole campaign."""
+        return -(-self.total // self.extent)
+
+    def begin(self, *, resume: bool, overwrite: bool) -> bool:
+        """Take the folder, with what is in it if that is to be resumed.
+
+        Returns:
+            Whether there is anything to do: the result of this very campaign may be complete already.
+
+        Raises:
+            OutputError: something is there that must be neither resumed nor overwritten.
+        """
+        begun = self._read_manifest()
+        if begun is not None and resume:
+            self._take_up(begun, overwrite=overwrite)
+            return True
+        if begun is not None and not overwrite:
+            raise OutputError(
+                f"{self.folder}: holds a run that has not ended ({len(self._shards())} of {self.count} shards); "
+                "continue it with --resume or begin anew with --overwrite"
+            )
+        if self.output.exists() and not overwrite:
+            if resume and self._is_complete():
+                self.discard()
+                return False
+            raise OutputError(f"{self.output}: exists already; name another file or give --overwrite")
+        self._start_anew(overwrite=overwrite)
+        return True
+
+    def _read_manifest(self) -> dict[str, Any] | None:
+        """What was begun here; a manifest that is not there means nothing was."""
+        try:
+            begun: dict[str, Any] = json.loads((self.folder / _MANIFEST).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as error:
+            raise OutputError(f"{self.folder / _MANIFEST}: cannot be read ({error})") from None
+        return begun
+
+    def _take_up(self, begun: dict[str, Any], *, overwrite: bool) -> None:
+        replaces = begun.pop("replaces")
+        changed = difference(begun, json.loads(json.dumps(self.content)))
+        if changed:
+            raise OutputError(
+                f"{self.folder}: cannot be resumed: {changed}; put it back, or begin anew with --overwrite"
+            )
+        if self.output.exists() and not (replaces or overwrite or self._is_complete()):
+            raise OutputError(f"{self.output}: exists already; name another file or give --overwrite")
+        for leftover in self.folder.glob(".*.part"):
+            leftover.unlink()
+        for path in self._shards():
+            index = int(path.stem.split("_")[1]) // self.extent
+            if self._is_whole(index):
+                self.saved.add(index)
+            else:
+                path.unlink()
+
+    def _is_complete(self) -> bool:
+        """Whether the result file is that of this very campaign."""
+        try:
+            with xarray.open_dataset(self.output, engine="netcdf4") as file:
+                return file.attrs.get("fingerprint") == fingerprint(self.content)
+        except (OSError, RuntimeError, ValueError):
+            return False
+
+    def _is_whole(self, index: int) -> bool:
+        try:
+            with xarray.open_dataset(self._path(index), engine="netcdf4") as file:
+                return file.sizes["hit"] == min(self.extent, self.total - index * self.extent)
+        except (OSError, RuntimeError, ValueError, KeyError):
+            return False
+
+    def _start_anew(self, *, overwrite: bool) -> None:
+        try:
+            self.discard()
+            self.folder.mkdir()
+        except OSError as error:
+            raise OutputError(f"{self.folder}: cannot be written into ({error.strerror})") from None
+        try:
+            with results.aside(self.folder / _MANIFEST) as file:
+                file.write_text(json.dumps({**self.content, "replaces": overwrite}, indent=1), encoding="utf-8")
+        except OutputError:
+            self.discard()
+            raise
+
+    def _shards(self) -> list[Path]:
+        return sorted(self.folder.glob(_SHARDS))
+
+    def _path(self, index: int) -> Path:
+        return self.folder / f"hits_{index * self.extent:010d}.nc"
+
+    def save(self, index: int, dataset: xarray.Dataset) -> None:
+        """Put a shard on the disk.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        results.write(dataset, self._path(index))
+        self.saved.add(index)
+
+    def load(self, index: int) -> xarray.Dataset:
+        """A shard that is there."""
+        return results.read(self._path(index))
+
+    def finish(self, count: int, attributes: Callable[[xarray.Dataset], Mapping[str, Any]]) -> None:
+        """Join the first `count` shards into the result file, and remove them.
+
+        Args:
+            attributes: global attributes from the first shard.
+
+        Raises:
+            OutputError: the file cannot be written; the shards are still there.
+        """
+        paths = [self._path(index) for index in range(count)]
+        results.join(paths, self.output, {**attributes(self.load(0)), "fingerprint": fingerprint(self.content)})
+        self.discard()
+
+    def discard(self) -> None:
+        """Remove the folder: first its manifest, without which the rest means nothing."""
+        (self.folder / _MANIFEST).unlink(missing_ok=True)
+        for path in (*self._shards(), *self.folder.glob(".*.part")):
+            path.unlink()
+        with suppress(FileNotFoundError):
+            os.rmdir(self.folder)

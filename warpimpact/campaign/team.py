@@ -1,0 +1,177 @@
+"""Who computes the shards of a campaign: the devices of this machine, or the workers of a Dask cluster."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from queue import SimpleQueue
+from typing import Any
+
+import xarray
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.compute import compute, made_by
+from warpimpact.scene import Shots
+from warpimpact.simulate import DeviceError, cores, find_device
+
+CUDA_SHOTS = 2**17
+"""Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
+
+
+class ClusterError(RuntimeError):
+    """A cluster that cannot be used; the message is for a person."""
+
+
+@dataclass(frozen=True)
+class Team:
+    """Computes shots in the background.
+
+    Attributes:
+        submit: hands over shots; their Dataset comes in the future.
+        width: tells how many tasks to keep under way: as many as compute, and as many that wait.
+        task: shots per task.
+        made_by: versions and kind of device, which decide the bits.
+        underway: how many shots of unfinished tasks are done.
+    """
+
+    submit: Callable[[Shots], Future[xarray.Dataset]]
+    width: Callable[[], int]
+    task: int
+    made_by: dict[str, str]
+    underway: Callable[[], int]
+
+
+@contextmanager
+def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
+    """The devices of this machine, each computing one task at a time.
+
+    Args:
+        device: "auto" (every CUDA device if there is one, else the CPU), or names with commas between them.
+
+    Raises:
+        DeviceError: a device is absent, or they are of different kinds, which compute different bits.
+    """
+    devices = _devices(device)
+    idle, done, stopping = SimpleQueue[str](), dict[int, int](), threading.Event()
+    for chosen in devices:
+        idle.put(str(chosen))
+
+    def work(shots: Shots) -> xarray.Dataset:
+        name, thread = idle.get(), threading.get_ident()
+
+        def progress(finished: int, total: int) -> None:
+            if stopping.is_set():
+                raise InterruptedError
+            done[thread] = finished
+
+        try:
+            return compute(campaign, shots, device=name, progress=progress)
+        finally:
+            done[thread] = 0
+            idle.put(name)
+
+    pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
+    try:
+        yield Team(
+            submit=lambda shots: pool.submit(work, shots),
+            width=lambda: 2 * len(devices),
+            task=_task_size(kind),
+            made_by=kind,
+            underway=lambda: sum(done.copy().values()),
+        )
+    finally:
+        stopping.set()
+        pool.shutdown(cancel_futures=True)
+
+
+def _task_size(kind: dict[str, str]) -> int:
+    return 1 if kind["device"] == "cpu" else CUDA_SHOTS
+
+
+@contextmanager
+def cluster_team(
+    campaign: Campaign, *, address: str | None = None, workers: int | None = None, device: str = "auto"
+) -> Iterator[Team]:
+    """The workers of a Dask cluster; what one that dies was computing goes to another.
+
+    Args:
+        address: of a scheduler.
+        workers: processes to start on this machine, where there is no address.
+        device: that every worker computes on.
+
+    Raises:
+        ClusterError: dask is not installed, the scheduler cannot be reached, or shots kill one worker after another.
+        DeviceError: the workers lack the device, or compute other bits than the first one asked.
+    """
+    try:
+        from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
+    except ImportError:
+        raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
+    with ExitStack() as stack:
+        threads = None
+        if address is None:
+            assert workers is not None
+            threads = max(1, cores() // workers)
+            cluster = LocalCluster(
+                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL
+            )
+            address = stack.enter_context(cluster).scheduler_address
+        try:
+            client = stack.enter_context(Client(address, timeout="20s"))
+        except (OSError, ValueError) as error:
+            raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
+        if threads is not None:
+            client.register_plugin(_ignoring_interrupts(WorkerPlugin))
+        kind = client.submit(made_by, device, pure=False).result()
+        executor = client.get_executor(pure=False)
+        try:
+            yield Team(
+                submit=lambda shots: executor.submit(_compute_alike, campaign, shots, device, threads, kind),
+                width=lambda: 2 * max(1, sum(client.nthreads().values())),
+                task=_task_size(kind),
+                made_by=kind,
+                underway=lambda: 0,
+            )
+        except KilledWorker as error:
+            raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+def _ignoring_interrupts(plugin: Any) -> Any:
+    """Plugin of workers on this machine, which Ctrl-C reaches, too: this process is the one that ends them."""
+
+    class Ignoring(plugin):
+        def setup(self, worker: Any) -> None:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    return Ignoring()
+
+
+def _compute_alike(
+    campaign: Campaign, shots: Shots, device: str, threads: int | None, kind: dict[str, str]
+) -> xarray.Dataset:
+    """Compute shots on a worker that gives the same bits as the others."""
+    own = made_by(device)
+    if own != kind:
+        name = next(name for name in kind if own[name] != kind[name])
+        raise DeviceError(
+            f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
+        )
+    return compute(campaign, shots, device=device, threads=threads)
+
+
+def _devices(names: str) -> list[Any]:
+    """The devices of some names with commas between them."""
+    first = find_device(names.split(",")[0].strip())
+    if names == "auto":
+        import warp
+
+        return [first] if first.is_cpu else list(warp.get_cuda_devices())
+    devices = [first, *(find_device(name.strip()) for name in names.split(",")[1:])]
+    if len({kind for chosen in devices if (kind := made_by(str(chosen))["device"])}) > 1:
+        raise DeviceError(f'device: got "{names}", but these are of different kinds, which compute different bits')
+    return devices

@@ -1,0 +1,158 @@
+"""Sampling: shot k as a function of seed and k alone, whatever the batch, the thread, the worker or the order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import Array
+from .plate import Plate
+from .scatter import EDGE, QUANTITIES, Scatter
+from .shots import Hits, Impact, Shots
+from .symmetry import check_scatter, irreducible_part, symmetries_used
+
+_HIT_COLUMNS = 2
+"""Columns of uniform numbers for y and z of the hit; those of QUANTITIES follow."""
+
+
+class Sampler:
+    """The shots of a campaign, any of them at any time.
+
+    With hits.irreducible each shot is followed by its images under `symmetries_used`, the first of which it is itself;
+    but for where they hit, they are the same shot.
+
+    Args:
+        impact: velocity and attitude where nothing else is said.
+        hits: where, and how numbers are drawn.
+        plate: hits cover one unit cell of it, or all of a plate smaller than that.
+        scatter: what differs from shot to shot.
+        replicates: independent scramblings of a sobol sampling.
+
+    Raises:
+        ValueError: hits.irreducible beside scatter that leaves no symmetry to all shots.
+    """
+
+    def __init__(
+        self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None, replicates: int = 1
+    ) -> None:
+        check_scatter(hits, scatter or Scatter())
+        self._impact, self._cell, self._group = impact, plate.sampled_cell, symmetries_used(impact, hits, plate)
+        (low_y, high_y), (low_z, high_z) = irreducible_part(self._group)
+        self._extent = self._cell[0] * (high_y - low_y), self._cell[1] * (high_z - low_z)
+        self._middle = 0.5 * self._cell[0] * (high_y + low_y), 0.5 * self._cell[1] * (high_z + low_z)
+        computed = None if hits.count is None else max(1, hits.count // len(self._group))
+        self._hits = hits.model_copy(update={"count": computed})
+        self._scatter = (scatter or Scatter()).given
+        dimensions = _HIT_COLUMNS + (len(QUANTITIES) if self._scatter else 0)
+        self._sobol = [_Sobol(dimensions, hits.seed, replicate) for replicate in range(replicates)]
+
+    def __len__(self) -> int:
+        """Number of shots."""
+        return self._hits.total(self._extent) * len(self._group)
+
+    def shots(self, first: int, count: int) -> Shots:
+        """`count` shots from number `first` on."""
+        count = min(count, len(self) - first)
+        original, skipped = divmod(first, len(self._group))
+        originals = self._originals(original, -(-(skipped + count) // len(self._group)))
+        return self._with_images(originals)[skipped : skipped + count]
+
+    def _with_images(self, shots: Shots) -> Shots:
+        """Every shot followed by its images."""
+        images = np.array([symmetry.image(shots.hit_y, shots.hit_z, self._cell) for symmetry in self._group])
+        hit_y, hit_z = images.transpose(1, 2, 0).reshape(2, -1)
+        return replace(shots[np.repeat(np.arange(len(shots)), len(self._group))], hit_y=hit_y, hit_z=hit_z)
+
+    def _originals(self, first: int, count: int) -> Shots:
+        """`count` shots that are no images of another, from number `first` of these on."""
+        columns = [_HIT_COLUMNS + list(QUANTITIES).index(name) for name in self._scatter]
+        hit_y, hit_z, *uniform = self._uniform([0, 1, *columns], first, count)
+        values = {name: np.full(count, value) for name, value in self._impact}
+        values |= {
+            name: distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))
+            for (name, distribution), share in zip(self._scatter.items(), uniform, strict=True)
+        }
+        values |= {
+            "hit_y": (hit_y - 0.5) * self._extent[0] + self._middle[0],
+            "hit_z": (hit_z - 0.5) * self._extent[1] + self._middle[1],
+        }
+        if self._hits.listed is not None:
+            rows = np.arange(first, first + count) % len(self._hits.listed["hit_y"])
+            values |= {name: column[rows] for name, column in self._hits.listed.items()}
+        return Shots(**values)
+
+    def _uniform(self, columns: list[int], first: int, count: int) -> list[Array]:
+        """Numbers in [0, 1) of some columns, each of shape [count]."""
+        if self._hits.sampling == "sobol":
+            points = self._net(first, count)
+            return [points[:, column] for column in columns]
+        hits = self._grid(first, count) if self._hits.sampling == "grid" else _pairs(self._hits.seed, first, count)
+        return [*hits, *(_stream(self._hits.seed, column, first, count) for column in columns[_HIT_COLUMNS:])]
+
+    def _grid(self, first: int, count: int) -> tuple[Array, Array]:
+        """Cell centres, row by row."""
+        along_y, along_z = self._hits.grid(self._extent)
+        cell = np.arange(first, first + count) % (along_y * along_z)
+        return (cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z
+
+    def _net(self, first: int, count: int) -> Array:
+        """Sobol points, shape [count, dimensions], dealt out to the replicates in turn."""
+        replicates, last = len(self._sobol), first + count
+        points = np.empty((count, self._sobol[0].dimensions))
+        for offset, sobol in enumerate(self._sobol):
+            start, stop = (-((offset - end) // replicates) for end in (first, last))  # of its own points
+            if stop > start:
+                points[start * replicates + offset - first :: replicates] = sobol.points(start, stop - start)
+        return points
+
+
+def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> Shots:
+    """All shots at once: at the hit points over one unit cell of the plate, or over all of a plate smaller than that.
+
+    With hits.irreducible a shot's images follow it. A campaign of any size takes them from a `Sampler` bit by bit.
+    """
+    sampler = Sampler(impact, hits, plate, scatter, hits.replicates or 1)
+    return sampler.shots(0, len(sampler))
+
+
+class _Sobol:
+    """One scrambled Sobol sequence that stands where it was last read."""
+
+    def __init__(self, dimensions: int, seed: int, replicate: int) -> None:
+        self.dimensions, self._seed = dimensions, seed
+        self._key = (replicate,) if replicate else ()
+        self._engine: Any = None
+
+    def points(self, first: int, count: int) -> Array:
+        """Points of the unit cube from number `first` on, shape [count, dimensions]."""
+        from scipy.stats.qmc import Sobol  # a second to import
+
+        if self._engine is None or self._engine.num_generated > first:
+            seed = np.random.SeedSequence(self._seed, spawn_key=self._key)  # anew, as the engine counts what it spawns
+            self._engine = Sobol(d=self.dimensions, rng=np.random.default_rng(seed))
+        if first > self._engine.num_generated:
+            self._engine.fast_forward(first - self._engine.num_generated)
+        # The sequence is balanced at powers of two; scipy wants the first points to be as many.
+        drawn = 1 << (count - 1).bit_length() if first == 0 else count
+        points: Array = self._engine.random(drawn)
+        return points[:count]
+
+
+def _pairs(seed: int, first: int, count: int) -> tuple[Array, Array]:
+    """Independent numbers, two of shape [count]: shot k has the draws 2k and 2k + 1."""
+    pairs = _draws(np.random.Philox(seed), 2 * first, 2 * count)
+    return pairs[::2], pairs[1::2]
+
+
+def _stream(seed: int, column: int, first: int, count: int) -> Array:
+    """Independent numbers of one column, shape [count]: shot k has draw k."""
+    return _draws(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(column,))), first, count)
+
+
+def _draws(generator: np.random.Philox, first: int, count: int) -> NDArray[np.float64]:
+    """Draws from number `first` on: Philox counts blocks of four, and can start at any."""
+    block, within = divmod(first, 4)
+    return np.random.Generator(generator.advance(block)).random(within + count)[within:]

@@ -1,0 +1,263 @@
+"""Scatter: distributions of what differs from shot to shot, over scipy.stats."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NamedTuple, Self
+
+import numpy as np
+from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
+
+from .model import Array, Model
+from .shots import Obliquity, Shots, Tilt
+from .units import (
+    Angle,
+    AngularVelocity,
+    NonNegativeNumber,
+    NonNegativeStress,
+    Number,
+    PositiveLength,
+    PositiveMass,
+    PositiveSpeed,
+    quantity,
+)
+
+EDGE = 2.0**-31
+"""Uniform numbers are drawn between this and 1 less this, half a step of the Sobol sequence: a normal distribution
+ends at 6.2 standard deviations, so that what it can reach is known beforehand."""
+
+
+class Quantity(NamedTuple):
+    """What may scatter: its table in a campaign file, and its type."""
+
+    table: str
+    type: Any
+
+
+QUANTITIES = {
+    "velocity": Quantity("impact", PositiveSpeed),
+    "obliquity": Quantity("impact", Obliquity),
+    "azimuth": Quantity("impact", Angle),
+    "pitch": Quantity("impact", Tilt),
+    "yaw": Quantity("impact", Tilt),
+    "spin": Quantity("impact", AngularVelocity),
+    "resistance": Quantity("plate", NonNegativeStress),
+    "shear_coefficient": Quantity("plate", NonNegativeNumber),
+    "degradation": Quantity("plate", Annotated[Number, Field(ge=0, le=1)]),
+    "thickness": Quantity("plate", PositiveLength),
+    "mass": Quantity("core", PositiveMass),
+}
+"""By name. The place in this table is the column of the random numbers: what else scatters changes no draw."""
+
+
+def check_range(name: str, low: float, high: float) -> None:
+    """Refuse values of a quantity from `low` to `high` that leave what it may be.
+
+    Raises:
+        ValueError: says what was reached and what is allowed.
+    """
+    for value in (low, high):
+        try:
+            TypeAdapter(QUANTITIES[name].type).validate_python(float(value))
+        except ValidationError as error:
+            allowed = error.errors()[0]["msg"].replace("Input should", "it must")
+            raise ValueError(f"reaches {value:.6g}, but {allowed}") from None
+
+
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Distribution(Model):
+    """A distribution of one quantity, its parameters in SI and radians."""
+
+    distribution: str
+
+    def quantile(self, share: Array) -> Array:
+        """Values below which these shares lie, of the same shape."""
+        values: Array = self._frozen().ppf(share)
+        return values
+
+    def _frozen(self) -> Any:
+        """The distribution of scipy.stats."""
+        raise NotImplementedError
+
+
+class Normal(Distribution):
+    """Mean and standard deviation."""
+
+    distribution: Literal["normal"] = "normal"
+    mean: _Finite
+    std: _Positive
+
+    def _frozen(self) -> Any:
+        from scipy import stats  # a second to import
+
+        return stats.norm(self.mean, self.std)
+
+
+class TruncatedNormal(Distribution):
+    """The part of a normal distribution between low and high; `mean` and `std` are those of the whole."""
+
+    distribution: Literal["truncated_normal"] = "truncated_normal"
+    mean: _Finite
+    std: _Positive
+    low: _Finite
+    high: _Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        return _increasing(self, "low", "high")
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        ends = ((end - self.mean) / self.std for end in (self.low, self.high))
+        return stats.truncnorm(*ends, loc=self.mean, scale=self.std)
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`; rounding does not pass the ends."""
+        return np.clip(super().quantile(share), self.low, self.high)
+
+
+class Uniform(Distribution):
+    """Evenly between low and high."""
+
+    distribution: Literal["uniform"] = "uniform"
+    low: _Finite
+    high: _Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        return _increasing(self, "low", "high")
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        return stats.uniform(self.low, self.high - self.low)
+
+
+class Triangular(Distribution):
+    """From low to high with its peak at mode."""
+
+    distribution: Literal["triangular"] = "triangular"
+    low: _Finite
+    mode: _Finite
+    high: _Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.low <= self.mode <= self.high:
+            raise ValueError(f"got mode = {self.mode:g}, but it must lie between low and high")
+        return _increasing(self, "low", "high")
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        width = self.high - self.low
+        return stats.triang((self.mode - self.low) / width, loc=self.low, scale=width)
+
+
+class Lognormal(Distribution):
+    """The logarithm is normal: half lie below the median; `sigma` is the standard deviation of the logarithm."""
+
+    distribution: Literal["lognormal"] = "lognormal"
+    median: _Positive
+    sigma: _Positive
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        return stats.lognorm(self.sigma, scale=self.median)
+
+
+class Discrete(Distribution):
+    """One of some values, as often as the weights say; evenly without them."""
+
+    distribution: Literal["discrete"] = "discrete"
+    values: Annotated[tuple[_Finite, ...], Field(min_length=1)]
+    weights: tuple[_Positive, ...] | None = None
+
+    @model_validator(mode="after")
+    def _paired(self) -> Self:
+        if self.weights is not None and len(self.weights) != len(self.values):
+            raise ValueError(f"got {len(self.values)} values and {len(self.weights)} weights, which must be pairs")
+        return self
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`."""
+        weights = np.ones(len(self.values)) if self.weights is None else np.array(self.weights)
+        order = np.argsort(self.values)
+        ends = np.cumsum(weights[order])
+        which = np.searchsorted(ends[:-1] / ends[-1], share, side="right")
+        values: Array = np.array(self.values)[order][which]
+        return values
+
+
+AnyDistribution = Annotated[
+    Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Discrete, Field(discriminator="distribution")
+]
+_PURE_NUMBERS = {"distribution", "sigma", "weights"}
+
+
+def _increasing(distribution: Any, low: str, high: str) -> Any:
+    before, after = getattr(distribution, low), getattr(distribution, high)
+    if not before < after:
+        raise ValueError(f"got {low} = {before:g} and {high} = {after:g}, but {high} must be above {low}")
+    return distribution
+
+
+class Scatter(Model):
+    """What differs from shot to shot beside the hit point; what is None does not.
+
+    In a campaign file a distribution stands in the place of the value itself:
+    ``velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }``.
+    """
+
+    velocity: AnyDistribution | None = None
+    obliquity: AnyDistribution | None = None
+    azimuth: AnyDistribution | None = None
+    pitch: AnyDistribution | None = None
+    yaw: AnyDistribution | None = None
+    spin: AnyDistribution | None = None
+    resistance: AnyDistribution | None = None
+    shear_coefficient: AnyDistribution | None = None
+    degradation: AnyDistribution | None = None
+    thickness: AnyDistribution | None = None
+    mass: AnyDistribution | None = None
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
+        """Parameters may carry units of their quantity."""
+        if not isinstance(value, dict):
+            return value
+        assert info.field_name is not None
+        read = quantity(QUANTITIES[info.field_name].type)
+        return {name: part if name in _PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _is_possible(cls, value: Distribution | None, info: ValidationInfo) -> Distribution | None:
+        if value is not None:
+            assert info.field_name is not None
+            low, high = value.quantile(np.array([EDGE, 1.0 - EDGE]))
+            try:
+                check_range(info.field_name, low, high)
+            except ValueError as error:
+                raise ValueError(f"got a {value.distribution} distribution that {error}") from None
+        return value
+
+    @property
+    def given(self) -> dict[str, Distribution]:
+        """The distributions that there are, by name."""
+        return {name: value for name, value in self if value is not None}
+
+
+def _read(read: Any, name: str, value: Any) -> Any:
+    try:
+        return [read(one) for one in value] if isinstance(value, list | tuple) else read(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+assert set(QUANTITIES) == set(Scatter.model_fields) == set(Shots.__dataclass_fields__) - {"hit_y", "hit_z"}
