@@ -21,9 +21,8 @@ def shots(y: np.ndarray = Y, z: np.ndarray = Z, **changes: float) -> Shots:
     return shots_at(y, z, **ATTITUDE | changes)
 
 
-# Only rounding tells the scenes apart. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 3e-6 rad (4e-5
-# after 130 mm),
-# but 4e-5 rad where a core points across the view (pitch near 90°); double precision: 5e8 times less.
+# Only rounding tells the scenes apart. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 3e-6 rad
+# and 4e-5 rad of tilt, and where a core points across the view (pitch near 90°); double precision: 5e8 times less.
 SINGLE_TOLERANCE = {
     "residual_velocity": 1e-3,
     "deflection": 4e-6,
