@@ -19,6 +19,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """The march kernel and the structs it takes, for one variant."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     zero, half = real(0.0), real(0.5)
+    tiny = wp.float64(1.0e-9)
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     contacts = contact.build(variant)
@@ -63,9 +64,10 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Pace:
         """The time step [s], or if that is 0 the way per step [m] at impact velocity, of which `way_along` at most may
-        lie in the plane of the plate; the most that any step may take; and the way [m], at impact velocity, after
-        which a shot that has not ended is given up. `rows` of the trace belong to each shot; none if it is 0: not a
-        build of its own, so that a shot computes the same bits with a trace and without."""
+        lie in the plane of the plate, if a quarter of the way is enough for that; the most that any step may take;
+        and the way [m], at impact velocity, after which a shot that has not ended is given up. `rows` of the trace
+        belong to each shot; none if it is 0: not a build of its own, so that a shot computes the same bits with a
+        trace and without."""
 
         time_step: wp.float64
         way: wp.float64
@@ -89,7 +91,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Time step of a shot [s]."""
         way = pace.time_step * speed
         if way == wp.float64(0.0):
-            way = wp.min(pace.way, pace.way_along / wp.max(wp.sin(obliquity), wp.float64(1.0e-9)))
+            way = wp.clamp(pace.way_along / wp.max(wp.sin(obliquity), tiny), wp.float64(0.25) * pace.way, pace.way)
         return real(wp.min(way, pace.longest_step) / speed)
 
     @wp.func

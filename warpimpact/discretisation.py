@@ -72,7 +72,7 @@ class Resolution:
     time_step: float | None
     way: float
     way_along: float
-    """The most of a step's way that may lie in the plane of the plate [m]."""
+    """The most of a step's way that may lie in the plane of the plate [m], if a quarter of the way is enough for that."""
     longest_step: float
     """The most that any step, also a given one, may take [m]: a longer one jumps over what happens in the plate."""
     patches_axial: int
@@ -84,7 +84,7 @@ class Resolution:
 
     def step_at(self, velocity: float, obliquity: float = 0.0) -> float:
         """Time step [s] at an impact velocity [m/s] and an obliquity [rad]."""
-        way = min(self.way, self.way_along / max(math.sin(obliquity), 1e-9))
+        way = min(self.way, max(0.25 * self.way, self.way_along / max(math.sin(obliquity), 1e-9)))
         if self.time_step is not None:
             way = self.time_step * velocity
         return min(way, self.longest_step) / velocity
