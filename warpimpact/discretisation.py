@@ -72,7 +72,7 @@ class Resolution:
     time_step: float | None
     way: float
     way_along: float
-    """The most of a step's way that may lie in the plane of the plate [m], if a quarter of the way is enough for that."""
+    """The most of a step's way that may lie in the plane of the plate [m], if a quarter of it is enough for that."""
     longest_step: float
     """The most that any step, also a given one, may take [m]: a longer one jumps over what happens in the plate."""
     patches_axial: int

@@ -86,7 +86,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
             campaign.core, campaign.plate, shots, numerics=campaign.numerics, standoffs=(0.05,), device="cpu", threads=4
         )
 
-    plenty, granted, original = computed(), 0, simulate._Task._fields
+    plenty, granted, original = computed(), 0, simulate._Task._scratch
 
     def scarce(task: Any, *arguments: int) -> Any:
         """Memory for one slot in the first two attempts and for two later."""
@@ -96,7 +96,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
             raise RuntimeError("Failed to allocate 1000 bytes on device 'cpu'")
         return original(task, *arguments)
 
-    monkeypatch.setattr(simulate._Task, "_fields", scarce)
+    monkeypatch.setattr(simulate._Task, "_scratch", scarce)
     little = computed()
     assert granted == 5  # 4 slots fail at the second, 2 at the second, 1 does not
     assert np.array_equal(plenty.residual_velocity, little.residual_velocity)

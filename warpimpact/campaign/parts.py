@@ -180,6 +180,10 @@ class Parts:
         results.write(dataset, self._path(index))
         self.saved.add(index)
 
+    def kept(self) -> int:
+        """Shards on the disk, one included that an interrupt has kept from being counted."""
+        return len(self._shards())
+
     def load(self, index: int) -> xarray.Dataset:
         """A shard that is there."""
         return results.read(self._path(index))

@@ -123,10 +123,11 @@ def run_to_file(
 
 def _kept(parts: Parts) -> str:
     """What a run that breaks off leaves behind; the folder goes if that is nothing."""
-    if not parts.saved:
+    kept = parts.kept()
+    if not kept:
         parts.discard()
         return "nothing is saved"
-    return f"{len(parts.saved)} of {parts.count} shards are saved in {parts.folder}; continue with --resume"
+    return f"{kept} of {parts.count} shards are saved in {parts.folder}; continue with --resume"
 
 
 class _Store(Protocol):
