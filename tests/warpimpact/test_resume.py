@@ -176,7 +176,7 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
         run_to_file(campaign, broken_off, device="cpu")
     standings: list[Standing] = []
     run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
-    assert standings[0].resumed >= 512
+    assert standings[0].resumed >= 256
     assert standings[-1].done == standings[-1].total == COUNT
     assert_same_bits(broken_off, undisturbed)
     before = broken_off.stat()
