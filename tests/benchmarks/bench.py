@@ -39,7 +39,7 @@ def shots_of(campaign: Any, count: int) -> Shots:
 
 def copied(shots: Shots, copies: int) -> Shots:
     """The shots `copies` times over."""
-    return Shots(*(np.tile(values, copies) for values in vars(shots).values()))
+    return Shots(**{name: np.tile(values, copies) for name, values in shots.columns.items()})
 
 
 def launch_state(core: Core, shots: Shots) -> tuple[Array, Array, Array]:

@@ -71,7 +71,7 @@ def main() -> None:
 
 
 def moved(shots: Shots, at: float) -> Shots:
-    values = vars(shots) | {name: np.full(len(shots), at) for name in ("hit_y", "hit_z")}
+    values = shots.columns | {name: np.full(len(shots), at) for name in ("hit_y", "hit_z")}
     return Shots(**values)
 
 
