@@ -27,17 +27,19 @@ def build(variant: Variant) -> SimpleNamespace:
     reals, integers = memory.build(real), memory.build(wp.int32)
     read, write, read_index, write_index = reals.read, reals.write, integers.read, integers.write
     tiny = real(1.0e-30)
+    far = wp.constant(2**20)  # nodes away: beyond any window
 
     @wp.struct
     class Footprint:
-        """What a step can touch: the first and last ring that can be in the slab (none: last < first), the span
-        of the core along x [m], and the nodes around those rings; `inside` tells whether the window holds them."""
+        """What a step can touch: the first and last ring that can be in the slab (none: last < first), whether all
+        rings are beyond its rear face (`through`) or before its front face (`back`), and the nodes around those in the
+        slab; `inside` tells whether the window holds them."""
 
         first_ring: wp.int32
         last_ring: wp.int32
+        through: wp.bool
+        back: wp.bool
         inside: wp.bool
-        rear: real
-        front: real
         box: Box
 
     @wp.struct
@@ -82,40 +84,50 @@ def build(variant: Variant) -> SimpleNamespace:
         slopes_cs: real
 
     @wp.func
+    def node_below(window: Window, place: real):
+        """Nodes from the hit to the last one before a place along one direction."""
+        return wp.int32(wp.floor(place * window.per_cell))
+
+    @wp.func
     def footprint_of(surface: Surface, plate: Plate, fields: Fields, window: Window, pose: Pose, dt: real):
         """The footprint in mid-step; patches act at their centres, so a ring covers centre ± radius."""
-        found = Footprint()
-        found.first_ring = surface.rings
-        found.last_ring = -1
-        found.rear = real(wp.inf)
-        found.front = -real(wp.inf)
         broadside = surfaces.broadside(pose)
         across_y = wp.sqrt(wp.max(zero, one - pose.axis[1] * pose.axis[1]))
         across_z = wp.sqrt(wp.max(zero, one - pose.axis[2] * pose.axis[2]))
         advance = half * dt * wp.abs(wp.dot(pose.velocity, vec3(pose.axis[0], pose.right[0], pose.up[0])))
         turning = half * dt * wp.length(pose.omega)
-        low_y, high_y = real(wp.inf), -real(wp.inf)
-        low_z, high_z = real(wp.inf), -real(wp.inf)
-        for index in range(surface.rings):
+        # Integers, because a CPU takes the least of a vector of them, but not of numbers that may be NaN.
+        first_ring, last_ring, not_through, not_back = int(surface.rings), int(-1), int(0), int(0)
+        y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
+        index = int(0)
+        while index < surface.rings:
             ring = ring_at(surface, pose, index)
             reach = surfaces.reach_along_x(ring, pose, broadside, advance, turning)
-            found.rear = wp.min(found.rear, ring.centre[0] - reach)
-            found.front = wp.max(found.front, ring.centre[0] + reach)
-            if ring.centre[0] + reach > zero and ring.centre[0] - reach < plate.thickness:
-                found.first_ring = wp.min(found.first_ring, index)
-                found.last_ring = index
-                low_y = wp.min(low_y, ring.centre[1] - ring.radius * across_y)
-                high_y = wp.max(high_y, ring.centre[1] + ring.radius * across_y)
-                low_z = wp.min(low_z, ring.centre[2] - ring.radius * across_z)
-                high_z = wp.max(high_z, ring.centre[2] + ring.radius * across_z)
+            foremost, rearmost = ring.centre[0] + reach, ring.centre[0] - reach
+            within = foremost > zero and rearmost < plate.thickness
+            first_ring = wp.min(first_ring, wp.where(within, index, surface.rings))
+            last_ring = wp.max(last_ring, wp.where(within, index, -1))
+            not_through += wp.where(rearmost > plate.thickness, 0, 1)
+            not_back += wp.where(foremost < zero, 0, 1)
+            wide_y, wide_z = ring.radius * across_y, ring.radius * across_z
+            y_low = wp.min(y_low, wp.where(within, node_below(window, ring.centre[1] - wide_y), far))
+            z_low = wp.min(z_low, wp.where(within, node_below(window, ring.centre[2] - wide_z), far))
+            y_high = wp.max(y_high, wp.where(within, node_below(window, ring.centre[1] + wide_y), -far))
+            z_high = wp.max(z_high, wp.where(within, node_below(window, ring.centre[2] + wide_z), -far))
+            index += 1
+        found = Footprint()
+        found.first_ring = first_ring
+        found.last_ring = last_ring
+        found.through = not_through == 0
+        found.back = not_back == 0
         found.inside = True
-        if found.last_ring >= 0:
+        if last_ring >= 0:
             # One node of slack: rounding of a patch on the ring's outermost point must stay inside.
             home_y, home_z = fields.cells_y // 2, fields.cells_z // 2
-            found.box.y_low = home_y + wp.int32(wp.floor(low_y * window.per_cell)) - 1
-            found.box.z_low = home_z + wp.int32(wp.floor(low_z * window.per_cell)) - 1
-            found.box.y_high = home_y + wp.int32(wp.floor(high_y * window.per_cell)) + 2
-            found.box.z_high = home_z + wp.int32(wp.floor(high_z * window.per_cell)) + 2
+            found.box.y_low = home_y + y_low - 1
+            found.box.y_high = home_y + y_high + 2
+            found.box.z_low = home_z + z_low - 1
+            found.box.z_high = home_z + z_high + 2
             # The filter's second pass looks at rows twice its reach away, and at the next in any case.
             rows = wp.max(2 * plate.reach, 1)
             found.inside = (

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from . import memory
 from .variant import Variant
 
 
@@ -14,6 +15,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the surface for one variant."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
+    read = memory.build(real).read
     quarter, half_turn = real(0.25), real(math.pi)
     widest_ratio, flattest = real(0.02), real(1.0e-3)  # floors that keep the convolution's quotient finite
 
@@ -104,15 +106,15 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def ring_at(surface: Surface, pose: Pose, index: wp.int32):
         ring = Ring()
-        ring.station = surface.station[index]
-        ring.radius = surface.radius[index]
-        ring.area = surface.area[index]
-        ring.normal_axial = surface.normal_axial[index]
-        ring.normal_radial = surface.normal_radial[index]
-        ring.half_axial = surface.half_axial[index]
-        ring.half_radial = surface.half_radial[index]
-        ring.turn_axial = surface.turn_axial[index]
-        ring.turn_radial = surface.turn_radial[index]
+        ring.station = read(surface.station, index)
+        ring.radius = read(surface.radius, index)
+        ring.area = read(surface.area, index)
+        ring.normal_axial = read(surface.normal_axial, index)
+        ring.normal_radial = read(surface.normal_radial, index)
+        ring.half_axial = read(surface.half_axial, index)
+        ring.half_radial = read(surface.half_radial, index)
+        ring.turn_axial = read(surface.turn_axial, index)
+        ring.turn_radial = read(surface.turn_radial, index)
         ring.centre = pose.position + ring.station * pose.axis
         ring.sector = half_turn / real(surface.around)
         ring.first = (index % 2) * surface.around

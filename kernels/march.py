@@ -25,7 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
     contacts = contact.build(variant)
     scheme = nodal.build(variant) if variant.nodal else contacts
     Surface, Pose, Plate, Fields, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Fields, laws.Law
-    Body, State, Load = motion.Body, motion.State, motion.Load
+    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Footprint, Touches = contacts.Footprint, contacts.Touches
     PERFORATED, ARRESTED, RICOCHETED = (
         wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
@@ -64,14 +64,15 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Pace:
         """The time step [s], or if that is 0 the way per step [m] at impact velocity, of which `way_along` at most may
-        lie in the plane of the plate, if a quarter of the way is enough for that; the most that any step may take;
-        and the way [m], at impact velocity, after which a shot that has not ended is given up. `rows` of the trace
-        belong to each shot; none if it is 0: not a build of its own, so that a shot computes the same bits with a
-        trace and without."""
+        lie in the plane of the plate and which takes `longest_time` [s] at most, if a quarter of the way is enough for
+        both; the most that any step may take; and the way [m], at impact velocity, after which a shot that has not
+        ended is given up. `rows` of the trace belong to each shot; none if it is 0: not a build of its own, so that a
+        shot computes the same bits with a trace and without."""
 
         time_step: wp.float64
         way: wp.float64
         way_along: wp.float64
+        longest_time: wp.float64
         longest_step: wp.float64
         longest_way: wp.float64
         rows: wp.int32
@@ -91,7 +92,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """Time step of a shot [s]."""
         way = pace.time_step * speed
         if way == wp.float64(0.0):
-            way = wp.clamp(pace.way_along / wp.max(wp.sin(obliquity), tiny), wp.float64(0.25) * pace.way, pace.way)
+            bound = wp.min(pace.way_along / wp.max(wp.sin(obliquity), tiny), pace.longest_time * speed)
+            way = wp.clamp(bound, wp.float64(0.25) * pace.way, pace.way)
         return real(wp.min(way, pace.longest_step) / speed)
 
     @wp.func
@@ -161,9 +163,9 @@ def build(variant: Variant) -> SimpleNamespace:
         gone = leaving > turning or beyond > surface.bounding_radius
         if not wp.isfinite(energy):
             status = NOT_FINITE
-        elif found.rear > thickness and state.velocity[0] > zero and gone:
+        elif found.through and state.velocity[0] > zero and gone:
             status = wp.where(touched, PERFORATED, MISSED)
-        elif found.front < zero and state.velocity[0] < zero and gone:
+        elif found.back and state.velocity[0] < zero and gone:
             status = wp.where(touched, RICOCHETED, MISSED)
         elif touched and energy - about_axis < still * initial_energy:
             status = ARRESTED
@@ -223,10 +225,14 @@ def build(variant: Variant) -> SimpleNamespace:
             status = int(MISSED)
         touched = bool(False)
         contact_steps = int(0)
+        last = Change()
         step = int(0)
         while status == RUNNING and step < max_steps:
             omega = motion.angular_velocity(body, motion.axis_of(state.attitude), state.angular_momentum)
             pose = surfaces.pose_of(surface, state.position, state.attitude, state.velocity, omega)
+            # What closes in is what mid-step will see, if the step changes what the last one did.
+            pose.velocity += half * last.velocity
+            pose.omega += half * last.omega
             found = contacts.footprint_of(surface, plate, fields, window, pose, dt)
             status = ended(surface, body, state, pose, found, touched, initial_energy, plate.thickness)
             if status == RUNNING:
@@ -235,10 +241,16 @@ def build(variant: Variant) -> SimpleNamespace:
                 before = state
                 if found.last_ring >= 0:
                     load = scheme.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
-                    if load.touching:
-                        touched = True
-                        contact_steps += 1
-                        state = motion.kick(body, state, load, dt)
+                if load.touching:
+                    touched = True
+                    contact_steps += 1
+                    # Back to the speeds at the start of the step, which the damping counts from.
+                    load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
+                    load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
+                    state = motion.kick(body, state, load, dt)
+                    last = motion.change_between(body, before, state)
+                else:
+                    last = Change()
                 if pace.rows > 0:
                     force, moment = motion.mean_load(body, before, load, dt)
                     record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, force, moment)

@@ -53,6 +53,13 @@ def build(variant: Variant) -> SimpleNamespace:
         damped: wp.bool
         touching: wp.bool
 
+    @wp.struct
+    class Change:
+        """What a step changes of velocity [m/s] and angular velocity [rad/s], along the body axes."""
+
+        velocity: vec3
+        omega: vec3
+
     @wp.func
     def axis_of(attitude: quat):
         """Unit vector along the core towards its nose."""
@@ -157,6 +164,15 @@ def build(variant: Variant) -> SimpleNamespace:
         return kicked
 
     @wp.func
+    def change_between(body: Body, before: State, after: State):
+        """The change that a kick has made."""
+        momentum = after.angular_momentum - before.angular_momentum
+        change = Change()
+        change.velocity = wp.quat_rotate_inv(before.attitude, after.velocity - before.velocity)
+        change.omega = wp.quat_rotate_inv(before.attitude, angular_velocity(body, axis_of(before.attitude), momentum))
+        return change
+
+    @wp.func
     def mean_load(body: Body, state: State, load: Load, dt: real):
         """The force and moment, in the plate frame, that a kick applies on average over its step: λ (F − D Δu)."""
         dv, dw = velocity_change(body, load, dt)
@@ -170,6 +186,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Body=Body,
         State=State,
         Load=Load,
+        Change=Change,
         axis_of=axis_of,
         angular_velocity=angular_velocity,
         angular_momentum=angular_momentum,
@@ -177,5 +194,6 @@ def build(variant: Variant) -> SimpleNamespace:
         turned=turned,
         drift=drift,
         kick=kick,
+        change_between=change_between,
         mean_load=mean_load,
     )

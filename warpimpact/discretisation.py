@@ -50,9 +50,13 @@ ALONG = 1.6
 """Way of a step in the plane of the plate, in degradation lengths and per unit of `travel`: contact that sweeps
 sideways by more than that leaves gaps in the exposure."""
 
+WEAKENING = 2.8
+"""ln of what a step may take off the resistance where it acts all the time, per unit of `travel`: exposure counts as
+it is in mid-step, and a longer step leaves too little of a plate that weakens at once."""
+
 FIDELITIES = {
     "draft": Fidelity(16, 16, 1.0, 0.5),
-    "standard": Fidelity(32, 32, 1.5, 0.3),
+    "standard": Fidelity(32, 32, 1.5, 0.36),
     "reference": Fidelity(72, 56, 5.0, 0.05),
 }
 NODAL: dict[str, Any] = {
@@ -73,6 +77,8 @@ class Resolution:
     way: float
     way_along: float
     """The most of a step's way that may lie in the plane of the plate [m], if a quarter of it is enough for that."""
+    longest_time: float
+    """The time [s] in which contact weakens the plate by as much as a step may, if a quarter of the way is enough."""
     longest_step: float
     """The most that any step, also a given one, may take [m]: a longer one jumps over what happens in the plate."""
     patches_axial: int
@@ -84,7 +90,8 @@ class Resolution:
 
     def step_at(self, velocity: float, obliquity: float = 0.0) -> float:
         """Time step [s] at an impact velocity [m/s] and an obliquity [rad]."""
-        way = min(self.way, max(0.25 * self.way, self.way_along / max(math.sin(obliquity), 1e-9)))
+        bound = min(self.way_along / max(math.sin(obliquity), 1e-9), self.longest_time * velocity)
+        way = min(self.way, max(0.25 * self.way, bound))
         if self.time_step is not None:
             way = self.time_step * velocity
         return min(way, self.longest_step) / velocity
@@ -114,10 +121,18 @@ def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resoluti
         double=fidelity.double if numerics.precision is None else numerics.precision == "double",
         way=fidelity.travel * passage,
         way_along=ALONG * fidelity.travel * plate.degradation_length,
+        longest_time=WEAKENING * fidelity.travel / decay_rate(plate) if plate.degradation < 1.0 else math.inf,
         longest_step=passage,
         patch_width=math.inf if numerics.scheme == "nodal" else width,
         **(defaults | given),
     )
+
+
+def decay_rate(plate: Plate) -> float:
+    """−ln β / Δt_β [1/s], finite: β = 0 takes all resistance at the first touch, at a rate beyond any exposure."""
+    fastest = 1.0e30
+    log = -math.log(plate.degradation) if plate.degradation > 0.0 else fastest
+    return min(log / plate.degradation_interval, fastest)
 
 
 def spelt_out(fidelity: Fidelity, core: Core, plate: Plate, impact: Impact) -> Numerics:

@@ -316,10 +316,7 @@ class _Task:
         if self.resolution.nodal:
             law.decay_rate = plate.degradation
         else:
-            # β = 0 takes all resistance at the first touch: a rate beyond any exposure, yet finite (0 × it is 0).
-            fastest = 1.0e30
-            log = math.log(plate.degradation) if plate.degradation > 0.0 else -fastest
-            law.decay_rate = max(log / plate.degradation_interval, -fastest)
+            law.decay_rate = -discretisation.decay_rate(plate)
         return law
 
     def _shots(self) -> Any:
@@ -332,6 +329,7 @@ class _Task:
         pace, passage = self.stage.Pace(), self.plate.thickness + 2.0 * self.core.bounding_radius
         pace.time_step = self.resolution.time_step or 0.0
         pace.way, pace.way_along = self.resolution.way, self.resolution.way_along
+        pace.longest_time = self.resolution.longest_time
         pace.longest_step = self.resolution.longest_step
         pace.longest_way = STEP_ALLOWANCE * passage
         if self.traced:

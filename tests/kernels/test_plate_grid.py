@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 VARIANT, SINGLE = Variant(double=True), Variant()
 real = VARIANT.real
-grid = plate_grid.build(VARIANT)
+grid, single_grid = plate_grid.build(VARIANT), plate_grid.build(SINGLE)
 Plate, Fields, Window, Cell, Box = grid.Plate, grid.Fields, grid.Window, grid.Cell, grid.Box
 
 CELL = 0.25e-3
@@ -55,6 +55,20 @@ def look_up(
     i = wp.tid()
     cell = grid.cell_at(fields, windows[slot], y[i], z[i])
     values[i] = grid.gather(field, fields.cells_z, cell.index, cell.y, cell.z)
+
+
+def gathers(
+    stride: wp.int32,
+    field: wp.array(dtype=wp.float32),
+    index: wp.array(dtype=wp.int32),
+    y: wp.array(dtype=wp.float32),
+    z: wp.array(dtype=wp.float32),
+    plain: wp.array(dtype=wp.float32),
+    native: wp.array(dtype=wp.float32),
+) -> None:
+    i = wp.tid()
+    plain[i] = single_grid.gather_plain(field, stride, index[i], y[i], z[i])
+    native[i] = single_grid.gather(field, stride, index[i], y[i], z[i])
 
 
 def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, found: wp.array(dtype=Cell)) -> None:
@@ -104,6 +118,7 @@ def beneath_kernel(variant: Variant) -> Any:
     return variant.kernel(beneath)
 
 
+GATHERS = SINGLE.kernel(gathers)
 BENEATH = {variant: beneath_kernel(variant) for variant in (VARIANT, SINGLE)}
 
 
@@ -237,6 +252,17 @@ def test_interpolation_reproduces_a_linear_field(device: str) -> None:
     inputs += [wp.array(a, dtype=real, device=device) for a in (at_y, at_z)]
     wp.launch(LOOK_UP, 500, inputs=inputs, outputs=[found], device=device)
     np.testing.assert_allclose(found.numpy(), 3.0 + 2e3 * at_y - 5e3 * at_z, rtol=1e-12, atol=1e-12)
+
+
+def test_native_gather_is_the_plain_one(device: str) -> None:
+    rng = np.random.default_rng(5)
+    stride, count = 37, 1000
+    index = rng.integers(0, 36 * 29, count).astype(np.int32)
+    y, z = rng.random((2, count)).astype(np.float32)
+    inputs = [wp.array(a, device=device) for a in (rng.standard_normal(37 * 31).astype(np.float32), index, y, z)]
+    plain, native = (poisoned(count, wp.float32, device) for _ in range(2))
+    wp.launch(GATHERS, count, inputs=[stride, *inputs], outputs=[plain, native], device=device)
+    np.testing.assert_allclose(native.numpy(), plain.numpy(), rtol=0, atol=1e-6)
 
 
 def test_scatter_conserves_amount_and_place(device: str) -> None:
