@@ -30,7 +30,8 @@ def shoulder_tolerance(fidelity: str, shear_coefficient: float, residual: float)
     plate = solid_plate()
     resolution = discretisation.resolve(Numerics(fidelity=fidelity), PAPER_CORE, plate)
     velocity, curvature = PAPER_SHOT["velocity"], 2 * abs(references.PAPER_COEFFICIENTS[2])
-    onset = discretisation.onset_jump(PAPER_CORE, plate, plate.resistance) * resolution.way / velocity
+    step = resolution.step_at(velocity, 0.0, plate.thickness)
+    onset = step * discretisation.onset_jump(PAPER_CORE, plate.thickness, references.PAPER_MASS, plate.resistance)
     ring, ramp = PAPER_CORE.length / resolution.patches_axial, onset / (velocity * curvature)
     length = ring / 2 + ramp / 2
     projected = curvature * ((ring / 2) ** 2 / 2 + ramp**2 / 6)

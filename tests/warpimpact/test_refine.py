@@ -53,7 +53,7 @@ def patch_steps(shots: Shots, numerics: Any, outcomes: Outcomes) -> float:
     resolution = resolve(numerics, CORE, PLATE)
     around = resolution.patches_around
     rings = rings_of(CORE, resolution.patches_axial, around, resolution.patch_width)
-    steps = outcomes.contact_duration * shots.velocity / resolution.way
+    steps = outcomes.contact_duration / resolution.step_at(shots.velocity, shots.obliquity, PLATE.thickness)
     return float(len(rings.station) * around * steps.sum())
 
 
