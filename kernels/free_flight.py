@@ -18,8 +18,8 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, undefined = real(0.0), real(wp.nan)
     motion = rigid_body.build(variant)
     marching = march_stage.build(variant)
-    Body, Shots, Contact = motion.Body, marching.Shots, marching.Outcomes
-    line_of_flight = marching.line_of_flight
+    Body, Shots, Own, Contact = motion.Body, marching.Shots, marching.Own, marching.Outcomes
+    line_of_flight, own_body = marching.line_of_flight, marching.own_body
     angular_velocity = motion.angular_velocity
     turned = motion.turned
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
@@ -70,18 +70,21 @@ def build(variant: Variant) -> SimpleNamespace:
         # inputs
         body: Body,
         shots: Shots,
+        own: Own,
         contact: Contact,
-        standoff_planes: wp.array(dtype=real),
+        planes: wp.array(dtype=real),
         ahead: real,
         # outputs
         report: Report,
     ):
         """Report one shot per thread.
 
-        `standoff_planes` are x [m] of the stand-offs; `ahead` [m] tells which point of the axis has to pass
-        them, from the centre of mass towards the nose.
+        `planes` are x [m] of the stand-offs, from the rear face where the thickness is each shot's own; `ahead` [m]
+        tells which point of the axis has to pass them, from the centre of mass towards the nose.
         """
         shot = wp.tid()
+        if wp.static(variant.scattered):
+            body = own_body(body, own, shot)
         status = contact.status[shot]
         direction = line_of_flight(shots.obliquity[shot], shots.azimuth[shot])
         flight = vec3(real(direction[0]), real(direction[1]), real(direction[2]))
@@ -98,9 +101,11 @@ def build(variant: Variant) -> SimpleNamespace:
         report.angular_velocity[shot] = wp.where(moves, omega, wp.where(failed, nothing, vec3()))
         report.energy_loss[shot] = wp.where(failed, undefined, contact.energy_loss[shot])
         report.contact_duration[shot] = wp.where(failed, undefined, contact.contact_duration[shot])
-        for k in range(standoff_planes.shape[0]):
+        for k in range(planes.shape[0]):
             if passes:
-                distance = standoff_planes[k] - contact.position[shot][0]
+                distance = planes[k] - contact.position[shot][0]
+                if wp.static(variant.scattered):
+                    distance += own.thickness[shot]
                 then = axis_at(body, axis, momentum, ahead, velocity[0], distance)
                 report_standoff(report, shot, k, then, flight, velocity)
             else:

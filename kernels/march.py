@@ -49,6 +49,25 @@ def build(variant: Variant) -> SimpleNamespace:
         spin: wp.array(dtype=wp.float64)
 
     @wp.struct
+    class Own:
+        """What every shot has in the place of the scene's, where it scatters: arrays of shape [shots]; the names are
+        those of Plate, Body, Law and Pace."""
+
+        thickness: wp.array(dtype=real)
+        mass: wp.array(dtype=real)
+        inertia_axial: wp.array(dtype=real)
+        inertia_transverse: wp.array(dtype=real)
+        a0: wp.array(dtype=real)
+        a1: wp.array(dtype=real)
+        friction: wp.array(dtype=real)
+        decay_rate: wp.array(dtype=real)
+        onset_jump: wp.array(dtype=real)
+        way: wp.array(dtype=wp.float64)
+        longest_time: wp.array(dtype=wp.float64)
+        longest_step: wp.array(dtype=wp.float64)
+        longest_way: wp.array(dtype=wp.float64)
+
+    @wp.struct
     class Outcomes:
         """How each shot's contact ended: arrays of shape [shots]; position relative to the hit point."""
 
@@ -86,6 +105,33 @@ def build(variant: Variant) -> SimpleNamespace:
     def attitude_of(axis: wp.vec3d):
         """The shortest turn that takes the plate normal to the axis (axis_x > 0)."""
         return wp.normalize(wp.quatd(wp.float64(0.0), -axis[2], axis[1], wp.float64(1.0) + axis[0]))
+
+    @wp.func
+    def own_body(scene: Body, own: Own, shot: wp.int32):
+        body = scene
+        body.mass = own.mass[shot]
+        body.inertia_axial = own.inertia_axial[shot]
+        body.inertia_transverse = own.inertia_transverse[shot]
+        return body
+
+    @wp.func
+    def own_law(scene: Law, own: Own, shot: wp.int32):
+        law = scene
+        law.a0 = own.a0[shot]
+        law.a1 = own.a1[shot]
+        law.friction = own.friction[shot]
+        law.decay_rate = own.decay_rate[shot]
+        law.onset_jump = own.onset_jump[shot]
+        return law
+
+    @wp.func
+    def own_pace(scene: Pace, own: Own, shot: wp.int32):
+        pace = scene
+        pace.way = own.way[shot]
+        pace.longest_time = own.longest_time[shot]
+        pace.longest_step = own.longest_step[shot]
+        pace.longest_way = own.longest_way[shot]
+        return pace
 
     @wp.func
     def step_of(pace: Pace, speed: wp.float64, obliquity: wp.float64):
@@ -200,6 +246,7 @@ def build(variant: Variant) -> SimpleNamespace:
         plate: Plate,
         law: Law,
         shots: Shots,
+        own: Own,
         pace: Pace,
         # scratch
         fields: Fields,
@@ -210,6 +257,11 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots."""
         shot = order[first + wp.tid()]
+        if wp.static(variant.scattered):
+            plate.thickness = own.thickness[shot]
+            body = own_body(body, own, shot)
+            law = own_law(law, own, shot)
+            pace = own_pace(pace, own, shot)
         speed = shots.velocity[shot]
         dt = step_of(pace, speed, shots.obliquity[shot])
         max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
@@ -276,6 +328,7 @@ def build(variant: Variant) -> SimpleNamespace:
     return SimpleNamespace(
         kernel=variant.kernel(march),
         line_of_flight=line_of_flight,
+        own_body=own_body,
         Surface=Surface,
         Body=Body,
         Plate=Plate,
@@ -283,6 +336,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Touches=Touches,
         Law=Law,
         Shots=Shots,
+        Own=Own,
         Outcomes=Outcomes,
         Pace=Pace,
     )

@@ -37,10 +37,10 @@ def _mistakes() -> tuple[type[Exception], ...]:
     """Errors whose message is for the user; imported once there is an error, to keep `--help` quick."""
     from .campaign.campaign import CampaignError
     from .campaign.team import ClusterError
+    from .device import DeviceError
     from .results import OutputError, ResultError
-    from .simulate import DeviceError, UnsupportedError
 
-    return CampaignError, ClusterError, OutputError, ResultError, DeviceError, UnsupportedError
+    return CampaignError, ClusterError, OutputError, ResultError, DeviceError
 
 
 def _parser() -> argparse.ArgumentParser:

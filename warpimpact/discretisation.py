@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import psutil
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.optimize import brentq, minimize_scalar
 
@@ -74,13 +75,14 @@ class Resolution:
 
     nodal: bool
     time_step: float | None
-    way: float
+    travel: float
+    """Way per step at impact velocity, as a share of the passage: the thickness of the plate, or `slender` [m] where
+    that is less. A step, also a given one, that is longer than the passage jumps over what happens in the plate."""
+    slender: float
     way_along: float
     """The most of a step's way that may lie in the plane of the plate [m], if a quarter of it is enough for that."""
-    longest_time: float
-    """The time [s] in which contact weakens the plate by as much as a step may, if a quarter of the way is enough."""
-    longest_step: float
-    """The most that any step, also a given one, may take [m]: a longer one jumps over what happens in the plate."""
+    weakening: float
+    """The most that contact may take off ln of the resistance in a step, likewise."""
     patches_axial: int
     patches_around: int
     grid_spacing: float
@@ -88,25 +90,47 @@ class Resolution:
     patch_width: float
     """No ring is wider than this radially [m]."""
 
-    def step_at(self, velocity: float, obliquity: float = 0.0) -> float:
-        """Time step [s] at an impact velocity [m/s] and an obliquity [rad]."""
-        bound = min(self.way_along / max(math.sin(obliquity), 1e-9), self.longest_time * velocity)
-        way = min(self.way, max(0.25 * self.way, bound))
+    def passage(self, thickness: ArrayLike) -> Array:
+        """Way [m] on which the plate acts on a core, for some thicknesses [m], of their shape."""
+        return np.minimum(thickness, self.slender)
+
+    def longest_time(self, degradation: Array, interval: float) -> Array:
+        """Time [s] in which contact weakens a plate by as much as a step may, for some β, of their shape."""
+        return np.asarray(self.weakening / np.maximum(-decay_rate(degradation, interval), SLOWEST_DECAY))
+
+    def step_at(
+        self, velocity: ArrayLike, obliquity: ArrayLike, thickness: ArrayLike, longest_time: ArrayLike
+    ) -> Array:
+        """Time steps [s] at impact velocities [m/s], obliquities [rad], thicknesses of the plate [m] and `longest_time`
+        [s], of their shape."""
+        passage = self.passage(thickness)
+        longest = self.travel * passage
+        aslant = self.way_along / np.maximum(np.sin(obliquity), 1e-9)
+        way = np.clip(np.minimum(aslant, np.multiply(longest_time, velocity)), 0.25 * longest, longest)
         if self.time_step is not None:
-            way = self.time_step * velocity
-        return min(way, self.longest_step) / velocity
+            way = self.time_step * np.asarray(velocity)
+        return np.asarray(np.minimum(way, passage) / velocity)
+
+    def step_of(self, impact: Impact, plate: Plate) -> float:
+        """Time step [s] of a scene, or where it scatters, of its means."""
+        longest_time = self.longest_time(np.array(plate.degradation), plate.degradation_interval)
+        return float(self.step_at(impact.velocity, impact.obliquity, plate.thickness, longest_time))
 
 
-def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resolution:
-    """Fill in what the numerics leave to fidelity and scheme; a fidelity need not have a name."""
+def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate, scattered: Collection[str] = ()) -> Resolution:
+    """Fill in what the numerics leave to fidelity and scheme; a fidelity need not have a name.
+
+    Args:
+        scattered: names of the quantities of the scene that differ from shot to shot.
+    """
     if isinstance(numerics, Fidelity):
         fidelity, numerics = numerics, Numerics()
     else:
         fidelity = FIDELITIES[numerics.fidelity]
     if numerics.tolerance is not None:
         raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
-    passage = min(plate.thickness, SLENDER * core.length)
-    width = fidelity.patch_width * plate.degradation_length if plate.degradation < 1.0 else math.inf
+    degrades = plate.degradation < 1.0 or "degradation" in scattered
+    width = fidelity.patch_width * plate.degradation_length if degrades else math.inf
     defaults: dict[str, Any] = {
         "time_step": None,
         "patches_axial": fidelity.patches_axial,
@@ -119,26 +143,19 @@ def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate) -> Resoluti
     return Resolution(
         nodal=numerics.scheme == "nodal",
         double=fidelity.double if numerics.precision is None else numerics.precision == "double",
-        way=fidelity.travel * passage,
+        travel=fidelity.travel,
+        slender=SLENDER * core.length,
         way_along=ALONG * fidelity.travel * plate.degradation_length,
-        longest_time=WEAKENING * fidelity.travel / decay_rate(plate) if plate.degradation < 1.0 else math.inf,
-        longest_step=passage,
+        weakening=WEAKENING * fidelity.travel,
         patch_width=math.inf if numerics.scheme == "nodal" else width,
         **(defaults | given),
     )
 
 
-def decay_rate(plate: Plate) -> float:
-    """−ln β / Δt_β [1/s], finite: β = 0 takes all resistance at the first touch, at a rate beyond any exposure."""
-    fastest = 1.0e30
-    log = -math.log(plate.degradation) if plate.degradation > 0.0 else fastest
-    return min(log / plate.degradation_interval, fastest)
-
-
 def spelt_out(fidelity: Fidelity, core: Core, plate: Plate, impact: Impact) -> Numerics:
     """Numerics that give, for one impact, what `resolve` would make of the fidelity if it had a name."""
     return Numerics(
-        time_step=resolve(fidelity, core, plate).step_at(impact.velocity, impact.obliquity),
+        time_step=resolve(fidelity, core, plate).step_of(impact, plate),
         patches_axial=fidelity.patches_axial,
         patches_around=fidelity.patches_around,
         grid_spacing=plate.degradation_length / fidelity.cells_per_length,
@@ -371,7 +388,21 @@ LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
 
 
-def onset_jump(core: Core, plate: Plate, static_stress: float) -> float:
-    """Onset speed of contact per time step [m/s²]; positive, also for a plate without resistance."""
-    wall = 2.0 * core.max_radius * min(plate.thickness, core.length)
-    return max(ONSET * static_stress * wall / core.mass_properties.mass, 1.0)
+def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) -> Array:
+    """Onset speed of contact per time step [m/s²] of cores of some masses [kg] in plates of some thicknesses [m] and
+    static stresses [Pa], of their shape; positive, also for a plate without resistance."""
+    wall = 2.0 * core.max_radius * np.minimum(thickness, core.length)
+    return np.maximum(ONSET * static_stress * wall / mass, 1.0)
+
+
+FASTEST_DECAY = 1.0e30
+"""Of the resistance [1/s]: β = 0 takes all of it at the first touch, a rate beyond any exposure, yet finite (0 × it
+is 0)."""
+SLOWEST_DECAY = 1.0e-30
+"""Below which nothing weakens [1/s]."""
+
+
+def decay_rate(degradation: Array, interval: float) -> Array:
+    """ln(β)/Δt_β [1/s] for some β, of their shape."""
+    log = np.log(degradation, where=degradation > 0.0, out=np.full_like(degradation, -np.inf))
+    return np.maximum(log / interval, -FASTEST_DECAY)

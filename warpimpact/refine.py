@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.discretisation import Fidelity
+from warpimpact.marching import Progress
 from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots, Tolerance
-from warpimpact.simulate import Outcomes, Progress, simulate
+from warpimpact.simulate import Outcomes, simulate
 
 Array = NDArray[np.float64]
 

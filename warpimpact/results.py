@@ -273,7 +273,7 @@ def history_dataset(
     )
     return dataset.assign(
         {name: _described(variable, values[name]) for name, variable in HISTORY_VARIABLES.items()}
-    ).assign_attrs(dict(attributes) | {"plate_thickness": plate.thickness})
+    ).assign_attrs(dict(attributes) | {"plate_thickness": float(hit.get("thickness", plate.thickness))})
 
 
 def _described(variable: Variable, values: Any) -> tuple[tuple[str, ...], Any, dict[str, str]]:
@@ -303,6 +303,11 @@ def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
 def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
     return np.isin(dataset["status"].values, [status for status in Status if status.failed])
+
+
+def shot_variables(dataset: xarray.Dataset) -> list[str]:
+    """Names of the variables that say how the cores came and what they hit, but for where."""
+    return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
 
 
 def images(dataset: xarray.Dataset) -> int:

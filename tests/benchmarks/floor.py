@@ -54,7 +54,7 @@ def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
 
     steps, in_slab, in_contact = 0, 0, 0
     for rows in trace(core, plate, shots, numerics=numerics):
-        history = History.from_trace(rows[:-1], core)  # the last row is the end
+        history = History.from_trace(rows[:-1], core.mass_properties)  # the last row is the end
         steps += len(history.time)
         for position, attitude, velocity, omega in zip(
             history.position, history.attitude, history.velocity, history.angular_velocity, strict=True

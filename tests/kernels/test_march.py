@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact import simulate
+from warpimpact import inputs, marching, simulate
 from warpimpact.kernels.status import Status
 from warpimpact.scene import CirclePattern, ConeCore, Core, Impact, Numerics, OgiveCore, Plate, PolynomialCore, Shots
 
@@ -127,7 +127,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
-    monkeypatch.setattr(simulate, "STEP_ALLOWANCE", 0.1)
+    monkeypatch.setattr(inputs, "STEP_ALLOWANCE", 0.1)
     outcomes = simulate.simulate(PAPER, SOLID, shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
@@ -140,7 +140,7 @@ def test_shot_that_leaves_its_window_is_told_or_computed_in_a_wider_one(
     shots = shots_of(velocity=200.0, hit_y=5e-3)
     outcomes = simulate.simulate(PAPER, HOLES, shots, numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.PERFORATED
-    monkeypatch.setattr(simulate, "MAX_DOUBLINGS", 1)
+    monkeypatch.setattr(marching, "MAX_DOUBLINGS", 1)
     outcomes = simulate.simulate(PAPER, HOLES, shots, numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.LEFT_WINDOW
     assert np.isnan(outcomes.residual_velocity[0])

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import simulate as simulation
+from warpimpact import marching
 from warpimpact.scene import Shots
 from warpimpact.simulate import Outcomes
 
@@ -65,12 +65,12 @@ def test_any_split(shots: Shots, numerics: dict[str, Any], size: int, device: st
 @pytest.mark.parametrize("threads", [1, 3, 8])
 def test_any_number_of_threads(shots: Shots, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = outcomes_of(shots, "cpu", {})
-    monkeypatch.setattr(simulation, "cores", lambda: threads)
+    monkeypatch.setattr(marching, "cores", lambda: threads)
     assert_identical(outcomes_of(shots, "cpu", {}), expected)
 
 
 @KINDS
 def test_any_chunk(shots: Shots, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = outcomes_of(shots, "cpu", {})
-    monkeypatch.setattr(simulation, "CPU_CHUNK", 5)
+    monkeypatch.setattr(marching, "CPU_CHUNK", 5)
     assert_identical(outcomes_of(shots, "cpu", {}), expected)

@@ -138,4 +138,4 @@ def test_extremes(precision: Any, scene: tuple[Core, Plate, Interaction, Shots])
     (steps,) = trace(core, plate, shots, interaction=interaction, numerics=numerics)
     properties = core.mass_properties
     impact = 0.5 * (properties.mass * shots.velocity[0] ** 2 + properties.inertia_axial * shots.spin[0] ** 2)
-    check_history(History.from_trace(steps, core), impact, precision)
+    check_history(History.from_trace(steps, core.mass_properties), impact, precision)

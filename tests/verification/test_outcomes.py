@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import simulate as simulation
+from warpimpact import marching
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Plate, ProfileCore
 
@@ -66,15 +66,15 @@ class Windows:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, first: tuple[int, int] | None = None) -> None:
         self.marched: list[tuple[int, int]] = []
-        march_some = simulation._Task._march_some
+        march_some = marching.March._march_some
 
         def watched(task: Any, which: Any, *rest: Any) -> None:
             self.marched.append((len(which), task.cells[0]))
             march_some(task, which, *rest)
 
-        monkeypatch.setattr(simulation._Task, "_march_some", watched)
+        monkeypatch.setattr(marching.March, "_march_some", watched)
         if first is not None:
-            monkeypatch.setattr(simulation._Task, "_window_cells", lambda task: first)
+            monkeypatch.setattr(marching.March, "_window_cells", lambda task: first)
 
 
 def test_shots_that_leave_their_window_are_marched_in_wider_ones(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
@@ -100,7 +100,7 @@ def test_glancing_hits_end_within_the_windows_they_are_given(monkeypatch: pytest
 
 def test_window_that_cannot_grow_is_a_named_failure(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     Windows(monkeypatch, first=(32, 32))
-    monkeypatch.setattr(simulation, "MAX_DOUBLINGS", 1)
+    monkeypatch.setattr(marching, "MAX_DOUBLINGS", 1)
     outcomes = simulate(paper_plate(), shots_at(1e-3, 2e-3, **GLANCING), device=device)
     assert outcomes.status[0] == Status.LEFT_WINDOW
     assert np.isnan(outcomes.residual_velocity[0])

@@ -7,7 +7,7 @@ import pytest
 
 from warpimpact import discretisation
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Numerics, ProfileCore
+from warpimpact.scene import Impact, Numerics, ProfileCore
 
 from . import references
 from .scenes import PAPER_CORE, shots_at, simulate, solid_plate
@@ -30,7 +30,8 @@ def shoulder_tolerance(fidelity: str, shear_coefficient: float, residual: float)
     plate = solid_plate()
     resolution = discretisation.resolve(Numerics(fidelity=fidelity), PAPER_CORE, plate)
     velocity, curvature = PAPER_SHOT["velocity"], 2 * abs(references.PAPER_COEFFICIENTS[2])
-    onset = discretisation.onset_jump(PAPER_CORE, plate, plate.resistance) * resolution.way / velocity
+    step = resolution.step_of(Impact(velocity=velocity), plate)
+    onset = step * discretisation.onset_jump(PAPER_CORE, plate.thickness, references.PAPER_MASS, plate.resistance)
     ring, ramp = PAPER_CORE.length / resolution.patches_axial, onset / (velocity * curvature)
     length = ring / 2 + ramp / 2
     projected = curvature * ((ring / 2) ** 2 / 2 + ramp**2 / 6)

@@ -11,12 +11,16 @@ from warpimpact import Campaign
 from warpimpact.campaign.run import Standing, run_to_file
 from warpimpact.campaign.team import _compute_alike, cluster_team
 from warpimpact.cli import main
-from warpimpact.simulate import DeviceError
+from warpimpact.device import DeviceError
 
 distributed = pytest.importorskip("distributed")
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
-SCATTERED = SLOTTED_PLATE.replace('"825 m/s"  ', '{ distribution = "normal", mean = "825 m/s", std = "10 m/s" }  ')
+SCATTERED = (
+    SLOTTED_PLATE.replace('"825 m/s"  ', '{ distribution = "normal", mean = "825 m/s", std = "10 m/s" }  ')
+    .replace('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }')
+    .replace('"4 g"  ', '{ distribution = "normal", mean = "4 g", std = "50 mg" }  ')
+)
 
 pytestmark = pytest.mark.usefixtures("small_shards")
 

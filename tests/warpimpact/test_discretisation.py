@@ -20,6 +20,7 @@ from warpimpact.scene import (
     CirclePattern,
     ConeCore,
     Core,
+    Impact,
     Numerics,
     OgiveCore,
     Plate,
@@ -88,22 +89,39 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(fidelity: str) -> None:
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
-    thin, thick = (resolve(Numerics(), PAPER, PLATE.model_copy(update={"thickness": h})) for h in (1e-3, 1.0))
+    way = 800.0 * resolve(Numerics(), PAPER, PLATE).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
     standard = FIDELITIES["standard"].travel
-    assert thin.way == pytest.approx(standard * 1e-3)
-    assert thick.way == pytest.approx(standard * discretisation.SLENDER * PAPER.length)
+    np.testing.assert_allclose(way, [standard * 1e-3, standard * discretisation.SLENDER * PAPER.length])
+
+
+def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
+    resolution, velocity = resolve(Numerics(), PAPER, PLATE), 800.0
+    free = resolution.step_at(velocity, 0.0, PLATE.thickness, np.inf)
+    for degradation, interval in ((1.0, 1e-6), (0.9, 1e-6), (0.05, 1e-6), (0.05, 1e-9), (0.0, 1e-6)):
+        plate = PLATE.model_copy(update={"degradation": degradation, "degradation_interval": interval})
+        step = resolution.step_of(Impact(velocity=velocity), plate)
+        bound = np.inf if degradation == 1.0 else 0.0
+        if 0.0 < degradation < 1.0:
+            bound = discretisation.WEAKENING * FIDELITIES["standard"].travel * interval / -np.log(degradation)
+        assert step == pytest.approx(min(free, max(bound, 0.25 * free)))
 
 
 def test_onset_is_a_share_of_what_a_wall_does_in_one_step() -> None:
     # One patch of wall, 2R × h, at full contact: a0·2R·h/m.
     mass = PAPER.mass_properties.mass
     wall = 2 * PAPER.max_radius * 4e-3
-    assert onset_jump(PAPER, PLATE, 2.6e9) == pytest.approx(discretisation.ONSET * 2.6e9 * wall / mass)
-    long = PLATE.model_copy(update={"thickness": 1.0})
-    assert onset_jump(PAPER, long, 2.6e9) == pytest.approx(
-        discretisation.ONSET * 2.6e9 * 2 * PAPER.max_radius * PAPER.length / mass
-    )
-    assert onset_jump(PAPER, PLATE, 0.0) > 0.0
+    longest = 2 * PAPER.max_radius * PAPER.length
+    jumps = onset_jump(PAPER, np.array([4e-3, 1.0]), mass * np.array([1.0, 2.0]), np.array([2.6e9, 1e9]))
+    share = discretisation.ONSET / mass
+    np.testing.assert_allclose(jumps, [share * 2.6e9 * wall, share * 0.5e9 * longest])
+    assert onset_jump(PAPER, 4e-3, mass, 0.0) > 0.0
+
+
+def test_decay_rate_is_that_of_an_interval_of_contact() -> None:
+    rates = discretisation.decay_rate(np.array([0.8, 1.0, 0.0]), 2e-6)
+    np.testing.assert_allclose(0.8, np.exp(rates[0] * 2e-6), rtol=1e-15)
+    assert rates[1] == 0.0
+    assert rates[2] == -discretisation.FASTEST_DECAY
 
 
 # --- Rings ---

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, results, simulate
+from warpimpact import Campaign, marching, results, simulate
 from warpimpact.campaign.run import run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Shots
-from warpimpact.simulate import Outcomes, _halving
+from warpimpact.simulate import Outcomes
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -62,7 +62,7 @@ def test_scratch_is_halved_until_it_can_be_had() -> None:
             raise RuntimeError(f"Failed to allocate {slots} bytes on device 'cuda:0'")
         return f"{slots} slots"
 
-    assert _halving(1000, allocate) == (62, "62 slots")
+    assert marching._halving(1000, allocate) == (62, "62 slots")
 
 
 @pytest.mark.parametrize("error", [RuntimeError("Failed to allocate 8 bytes"), MemoryError(), RuntimeError("other")])
@@ -74,7 +74,7 @@ def test_what_halving_cannot_cure_is_told(error: Exception) -> None:
         raise error
 
     with pytest.raises(type(error)):
-        _halving(8, allocate)
+        marching._halving(8, allocate)
     assert asked == ([8] if str(error) == "other" else [8, 4, 2, 1])
 
 
@@ -86,7 +86,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
             campaign.core, campaign.plate, shots, numerics=campaign.numerics, standoffs=(0.05,), device="cpu", threads=4
         )
 
-    plenty, granted, original = computed(), 0, simulate._Task._scratch
+    plenty, granted, original = computed(), 0, marching.March._scratch
 
     def scarce(task: Any, *arguments: int) -> Any:
         """Memory for one slot in the first two attempts and for two later."""
@@ -96,7 +96,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
             raise RuntimeError("Failed to allocate 1000 bytes on device 'cpu'")
         return original(task, *arguments)
 
-    monkeypatch.setattr(simulate._Task, "_scratch", scarce)
+    monkeypatch.setattr(marching.March, "_scratch", scarce)
     little = computed()
     assert granted >= 5  # 4 slots fail at the second, 2 at the second, 1 does not; wider windows come after these
     assert np.array_equal(plenty.residual_velocity, little.residual_velocity)

@@ -2,21 +2,22 @@
 
 import math
 import pickle
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from warpimpact import Campaign, Impact, Plate
+from warpimpact import Campaign, Impact, Plate, results
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.compute import compute
-from warpimpact.campaign.run import run
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
 from warpimpact.results import OUTCOME_VARIABLES
-from warpimpact.scene import Hits, NoPattern, Sampler, Scatter, Shots
+from warpimpact.scene import Hits, NoPattern, Numerics, Sampler, Scatter, Shots
 from warpimpact.scene.scatter import QUANTITIES
-from warpimpact.simulate import UnsupportedError
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())
@@ -142,8 +143,6 @@ def test_a_distribution_stands_in_the_place_of_its_value(tmp_path: Path) -> None
     assert np.array_equal(dataset.impact_velocity, shots.velocity)
     np.testing.assert_allclose(dataset.impact_yaw, np.degrees(shots.yaw), rtol=1e-15)
     assert np.ptp(dataset.impact_velocity.values) > 30.0
-    from warpimpact.campaign.replay import replay
-
     assert replay(dataset, 40, folder=tmp_path).attrs["agreement"] == "bit-identical"
 
 
@@ -165,20 +164,78 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
             assert np.array_equal(alone[name][0], whole[name][hit], equal_nan=True), name
 
 
-@pytest.mark.parametrize("name", ["resistance", "shear_coefficient", "degradation", "thickness", "mass"])
-def test_what_the_kernels_take_as_one_number_is_refused_in_one_sentence(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+OWN = {
+    "resistance": '{ distribution = "lognormal", median = "2600 MPa", sigma = 0.1 }',
+    "shear_coefficient": '{ distribution = "uniform", low = 0.02, high = 0.08 }',
+    "degradation": '{ distribution = "truncated_normal", mean = 0.8, std = 0.05, low = 0.6, high = 0.95 }',
+    "thickness": '{ distribution = "triangular", low = "3.6 mm", mode = "4 mm", high = "4.4 mm" }',
+    "mass": '{ distribution = "normal", mean = "4 g", std = "50 mg" }',
+}
+
+
+def line_of(name: str) -> str:
+    return next(line for line in SLOTTED_PLATE.splitlines() if line.startswith(f"{name} = "))
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Campaign:
+    """All that plate and core have scatters, and the velocity."""
+    changes = [(line_of(name), f"{name} = {distribution}") for name, distribution in OWN.items()]
+    return campaign_with(tmp_path, (VELOCITY, NORMAL), *changes)
+
+
+@pytest.mark.usefixtures("small_shards")
+def test_scatter_in_plate_and_core_from_file_to_result(
+    own: Campaign, tmp_path: Path, assert_same_bits: Callable[[Path, Path], None], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    uniform = f'{name} = {{ distribution = "uniform", low = 0.001, high = 0.01 }}'
-    line = next(line for line in SLOTTED_PLATE.splitlines() if line.startswith(f"{name} = "))
-    campaign = campaign_with(tmp_path, (line, uniform))
-    assert campaign.sampler().shots(0, 4).columns[name].max() <= 0.01
-    with pytest.raises(UnsupportedError, match=f"^{name}: got values that differ from shot to shot"):
-        run(campaign, device="cpu")
-    output = tmp_path / "a.nc"
-    assert main(["run", str(tmp_path / "campaign.toml"), "-o", str(output), "--device", "cpu"]) == 2
-    assert capsys.readouterr().err.splitlines()[-1].startswith(f"warpimpact: error: {name}: got values that differ")
-    assert [path.name for path in tmp_path.iterdir()] == ["campaign.toml"]
+    count = 1000
+    campaign = own.model_copy(update={"hits": own.hits.model_copy(update={"count": count})})
+
+    def break_off(standing: Standing) -> None:
+        if standing.done >= 256:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted):
+        run_to_file(campaign, tmp_path / "a.nc", device="cpu", progress=break_off)
+    run_to_file(campaign, tmp_path / "a.nc", device="cpu", resume=True)
+    run_to_file(campaign, tmp_path / "straight.nc", device="cpu")
+    assert_same_bits(tmp_path / "a.nc", tmp_path / "straight.nc")
+
+    dataset, shots = results.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
+    for name in OWN:
+        assert np.array_equal(dataset[name], shots.columns[name])
+        assert len(np.unique(dataset[name])) == count
+    # What is lost in translation is no more than all that is lost, each core with its own mass.
+    energy = 0.5 * dataset.mass * (dataset.impact_velocity**2 - dataset.residual_velocity**2)
+    assert (np.abs(energy - dataset.energy_loss) < 0.15 * dataset.energy_loss).all()
+    assert (energy >= dataset.energy_loss * (1.0 - 1e-4)).all()  # what turns was taken from the flight
+    for hit in (3, 700):
+        history = replay(dataset, hit, folder=tmp_path)
+        assert history.attrs["agreement"] == "bit-identical"
+        assert history.attrs["plate_thickness"] == shots.thickness[hit]
+    assert main(["inspect", str(tmp_path / "a.nc")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f"0 of {count} shots failed"
+
+
+def test_scatter_in_plate_and_core_beside_symmetry_and_tolerance(own: Campaign) -> None:
+    hits = own.hits.model_copy(update={"irreducible": True})
+    numerics = Numerics(tolerance={"residual_velocity": "5 m/s", "tilt": "5 deg"})
+    dataset = run(own.model_copy(update={"hits": hits, "numerics": numerics}), device="cpu")
+    assert dataset.attrs["computed_hits"] == 8
+    for name in (*OWN, "residual_velocity", "energy_loss", "tilt"):
+        values = dataset[name].values.reshape(8, 8, -1)
+        assert (values == values[:, :1]).all(), name  # a hit and its images
+        assert len(np.unique(values[:, 0, 0])) == 8
+    assert dataset.converged.mean() > 0.8
+
+
+def test_a_list_may_bring_its_own_plates(tmp_path: Path) -> None:
+    rows = ("hit_y,hit_z,degradation,mass", "0,0.006,1,4e-3", "0,0.006,0.8,4e-3", "0,0.006,0.8,8e-3")
+    (tmp_path / "hits.csv").write_text("\n".join(rows))
+    hits = SLOTTED_PLATE.split("[hits]\n")[1].split("[numerics]")[0].replace("4096", "64")
+    campaign = campaign_with(tmp_path, (hits, 'sampling = "list"\nfile = "hits.csv"\n'))
+    lasting, weakening, heavy = run(campaign, device="cpu").residual_velocity.values
+    assert lasting < weakening < heavy
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ from warpimpact.discretisation import FIDELITIES, Fidelity, resolve, spelt_out
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import study_figure
 from warpimpact.results import STUDY_COORDINATES, STUDY_VARIABLES, write
-from warpimpact.scene import Numerics
+from warpimpact.scene import Numerics, Shots
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 LADDER = {"coarse": Fidelity(8, 16, 1.0, 0.8), "middle": Fidelity(16, 32, 2.0, 0.4), "fine": Fidelity(32, 64, 4.0, 0.2)}
@@ -125,8 +125,8 @@ def test_speed_is_that_of_many_hits_without_their_preparation(
 ) -> None:
     clock = [0.0]
 
-    def fake(*scene: object, **options: object) -> Answer:
-        clock[0] += 1.0 + 0.01 * len(scene[2])  # type: ignore[arg-type]
+    def fake(core: object, plate: object, shots: Shots, **options: object) -> Answer:
+        clock[0] += 1.0 + 0.01 * len(shots)
         return answer([1.0])
 
     monkeypatch.setattr(studies, "simulate", fake)
@@ -148,8 +148,8 @@ def test_spelt_out_fidelities_resolve_as_their_names_do(campaign: Campaign) -> N
     for name, fidelity in FIDELITIES.items():
         named = resolve(Numerics(fidelity=name), campaign.core, campaign.plate)
         spelt = resolve(spelt_out(fidelity, campaign.core, campaign.plate, impact), campaign.core, campaign.plate)
-        step = named.step_at(impact.velocity, impact.obliquity)
-        assert spelt.step_at(impact.velocity, impact.obliquity) == pytest.approx(step, rel=1e-12)
+        step = named.step_of(impact, campaign.plate)
+        assert spelt.step_of(impact, campaign.plate) == pytest.approx(step, rel=1e-12)
         assert spelt.time_step == pytest.approx(step, rel=1e-12)
         for field in ("nodal", "double", "patches_axial", "patches_around", "grid_spacing"):
             assert getattr(spelt, field) == getattr(named, field)

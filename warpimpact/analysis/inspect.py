@@ -10,7 +10,7 @@ import xarray
 from warpimpact.analysis.summary import UNITS, estimated, main_measures, slices, stop_lines, symmetry_text
 from warpimpact.campaign.estimates import STATUSES, Estimate, Measure
 from warpimpact.kernels.status import Status
-from warpimpact.results import SCATTER_VARIABLES, SHOT_VARIABLES, failed
+from warpimpact.results import failed, shot_variables
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _SAMPLINGS = {
@@ -77,7 +77,7 @@ def _row(measure: Measure, estimate: Estimate) -> str:
 
 def failures(dataset: xarray.Dataset) -> Iterator[str]:
     """Every shot whose computation failed: its number, status and inputs."""
-    inputs = ["hit_y", "hit_z", *SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
+    inputs = ["hit_y", "hit_z", *shot_variables(dataset)]
     first = count = 0
     for part in slices(dataset[["status", *inputs]]):
         for place in np.flatnonzero(failed(part)):

@@ -23,10 +23,12 @@ from numpy.typing import NDArray
 
 import warpimpact
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.discretisation import FIDELITIES, Fidelity, resolve, spelt_out
+from warpimpact.device import find_device
+from warpimpact.discretisation import FIDELITIES, Fidelity, Resolution, resolve, spelt_out
+from warpimpact.marching import Progress
 from warpimpact.results import study_dataset
 from warpimpact.scene import Hits, Numerics, Shots, make_shots
-from warpimpact.simulate import Outcomes, Progress, find_device, simulate
+from warpimpact.simulate import Outcomes, simulate
 
 Array = NDArray[np.float64]
 
@@ -165,8 +167,13 @@ def label(campaign: Campaign, numerics: Numerics) -> str:
     """Patches, cells per degradation length and time step as one short name."""
     resolution = resolve(numerics, campaign.core, campaign.plate)
     cells = campaign.plate.degradation_length / resolution.grid_spacing
-    step = resolution.step_at(campaign.impact.velocity, campaign.impact.obliquity)
+    step = _time_step(campaign, resolution)
     return f"{resolution.patches_axial}×{resolution.patches_around}, ℓ/{cells:.3g}, {step * 1e6:.3g} µs"
+
+
+def _time_step(campaign: Campaign, resolution: Resolution) -> float:
+    """Of the campaign's impact [s]."""
+    return resolution.step_of(campaign.impact, campaign.plate)
 
 
 def extrapolated(double: Answer, single: Answer) -> Answer:
@@ -309,8 +316,7 @@ class _Bench:
     def _work(self, numerics: Numerics) -> float:
         """Patches times steps of a hit, up to a factor."""
         resolution = resolve(numerics, self.campaign.core, self.campaign.plate)
-        steps = 1.0 / resolution.step_at(self.campaign.impact.velocity, self.campaign.impact.obliquity)
-        return resolution.patches_axial * resolution.patches_around * steps
+        return resolution.patches_axial * resolution.patches_around / _time_step(self.campaign, resolution)
 
     def _simulate(self, numerics: Numerics, shots: Shots, progress: Progress) -> Outcomes:
         campaign = self.campaign
@@ -343,7 +349,7 @@ def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> di
         name: np.array([getattr(resolution, name) for resolution in resolutions])
         for name in ("patches_axial", "patches_around", "grid_spacing")
     }
-    steps = [resolution.step_at(campaign.impact.velocity, campaign.impact.obliquity) for resolution in resolutions]
+    steps = [_time_step(campaign, resolution) for resolution in resolutions]
     return values | {"scheme": [numerics.scheme for numerics in settings.values()], "time_step": np.array(steps)}
 
 

@@ -13,11 +13,13 @@ import xarray
 
 import warpimpact
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.device import find_device
 from warpimpact.discretisation import resolve
+from warpimpact.marching import Progress
 from warpimpact.refine import LADDER, simulate_to_tolerance
 from warpimpact.results import to_dataset
 from warpimpact.scene import Shots, Symmetry
-from warpimpact.simulate import Progress, find_device, simulate
+from warpimpact.simulate import simulate
 from warpimpact.unfold import unfolded, unfolded_estimates
 
 
@@ -40,7 +42,6 @@ def compute(
 
     Raises:
         DeviceError: the device is absent.
-        UnsupportedError: the kernels cannot compute these shots yet.
     """
     group = campaign.symmetries
     computed = shots[:: len(group)]
@@ -79,7 +80,7 @@ def compute(
             "standoff_point": campaign.output.standoff_point,
             "open_area": campaign.plate.open_area,
             "areal_density": campaign.plate.areal_density,
-            "numerics": _numerics(campaign),
+            "numerics": _numerics(campaign, shots),
             "failed_share": campaign.output.failed_share,
             "compute_time": elapsed,
             "hits_per_second": len(computed) / elapsed,
@@ -105,7 +106,7 @@ def made_by(device: str) -> dict[str, str]:
     }
 
 
-def _numerics(campaign: Campaign) -> str:
+def _numerics(campaign: Campaign, shots: Shots) -> str:
     """The numerics in force, every choice made, as one line."""
     tolerance = campaign.numerics.tolerance
     if tolerance is not None:
@@ -113,10 +114,11 @@ def _numerics(campaign: Campaign) -> str:
             f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg, "
             f"at most {LADDER[-1].patches_axial} by {LADDER[-1].patches_around} patches"
         )
-    resolution = resolve(campaign.numerics, campaign.core, campaign.plate)
+    resolution = resolve(campaign.numerics, campaign.core, campaign.plate, shots.columns)
+    impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
-        f"time_step {resolution.step_at(campaign.impact.velocity, campaign.impact.obliquity):.4g} s, "
+        f"time_step {resolution.step_of(impact, campaign.plate):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
     )

@@ -14,7 +14,7 @@ from warpimpact import simulate
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.discretisation import Fidelity
 from warpimpact.refine import level
-from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, ResultError, history_dataset, to_dataset
+from warpimpact.results import OUTCOME_VARIABLES, ResultError, history_dataset, shot_variables, to_dataset
 from warpimpact.scene import Numerics
 from warpimpact.unfold import image_of
 
@@ -75,7 +75,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         attributes={},
     ).isel(hit=0)
     stored = result.isel(hit=hit)
-    if not _same(end, stored, ("hit_y", "hit_z", *SHOT_VARIABLES)):
+    if not _same(end, stored, ("hit_y", "hit_z", *shot_variables(end))):
         raise ResultError(f"hit: got {hit}, whose shot is no longer what the campaign and the files it names give")
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
         "history": f"{result.attrs['history']}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",

@@ -59,7 +59,6 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
 
     Raises:
         DeviceError: the device is absent.
-        UnsupportedError: the kernels cannot compute these shots yet.
     """
     total = len(campaign.sampler())
     with local_team(campaign, device) as team:
@@ -102,7 +101,6 @@ def run_to_file(
     Raises:
         OutputError: something cannot be written, must not be overwritten or is no part of this campaign.
         DeviceError: the device is absent.
-        UnsupportedError: the kernels cannot compute these shots yet.
         Interrupted: by the keyboard; what is saved can be resumed.
     """
     with team or local_team(campaign, device) as members:

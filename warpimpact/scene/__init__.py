@@ -15,12 +15,13 @@ from .patterns import (
 )
 from .plate import Plate
 from .sampling import Sampler, make_shots
-from .scatter import Scatter
+from .scatter import OF_THE_SCENE, Scatter
 from .shots import Hits, Impact, Shots
 from .symmetry import IDENTITY, Symmetry, symmetries_used
 
 __all__ = [
     "IDENTITY",
+    "OF_THE_SCENE",
     "AnyCore",
     "AnyPattern",
     "CirclePattern",

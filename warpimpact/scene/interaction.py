@@ -1,9 +1,8 @@
 """Localized interaction: normal stress on an advancing surface element (MODEL §4, Ben-Dor et al.)."""
 
-import math
+import numpy as np
 
-from .model import Model
-from .plate import Plate
+from .model import Array, Model
 from .units import NonNegativeNumber
 
 
@@ -18,11 +17,11 @@ class Interaction(Model):
     linear: NonNegativeNumber = 0.0
     quadratic: NonNegativeNumber = 0.0
 
-    def coefficients(self, plate: Plate) -> tuple[float, float, float]:
-        """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material."""
-        resistance, density = plate.resistance, plate.density
-        return (
-            self.static * resistance,
-            self.linear * math.sqrt(density * resistance),
-            self.quadratic * density,
-        )
+    def coefficients(self, resistance: Array, density: float) -> tuple[Array, Array, float]:
+        """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material.
+
+        Args:
+            resistance: Y [Pa], of any shape, which a0 and a1 have, too.
+            density: ρ [kg/m³].
+        """
+        return self.static * resistance, self.linear * np.sqrt(density * resistance), self.quadratic * density

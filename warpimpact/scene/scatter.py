@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
@@ -47,6 +48,8 @@ QUANTITIES = {
     "mass": Quantity("core", PositiveMass),
 }
 """By name. The place in this table is the column of the random numbers: what else scatters changes no draw."""
+OF_THE_SCENE = tuple(name for name, quantity in QUANTITIES.items() if quantity.table != "impact")
+"""Quantities of plate and core, which shots may have of their own."""
 
 
 def check_range(name: str, low: float, high: float) -> None:
@@ -67,22 +70,43 @@ _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class Distribution(Model):
+class Distribution(Model, ABC):
     """A distribution of one quantity, its parameters in SI and radians."""
 
     distribution: str
 
+    @abstractmethod
     def quantile(self, share: Array) -> Array:
         """Values below which these shares lie, of the same shape."""
+
+
+class Continuous(Distribution, ABC):
+    """One of those that scipy.stats has."""
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`."""
         values: Array = self._frozen().ppf(share)
         return values
 
+    @abstractmethod
     def _frozen(self) -> Any:
         """The distribution of scipy.stats."""
-        raise NotImplementedError
 
 
-class Normal(Distribution):
+class Bounded(Continuous, ABC):
+    """One that ends at low and high."""
+
+    low: _Finite
+    high: _Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.low < self.high:
+            raise ValueError(f"got low = {self.low:g} and high = {self.high:g}, but high must be above low")
+        return self
+
+
+class Normal(Continuous):
     """Mean and standard deviation."""
 
     distribution: Literal["normal"] = "normal"
@@ -95,18 +119,12 @@ class Normal(Distribution):
         return stats.norm(self.mean, self.std)
 
 
-class TruncatedNormal(Distribution):
+class TruncatedNormal(Bounded):
     """The part of a normal distribution between low and high; `mean` and `std` are those of the whole."""
 
     distribution: Literal["truncated_normal"] = "truncated_normal"
     mean: _Finite
     std: _Positive
-    low: _Finite
-    high: _Finite
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        return _increasing(self, "low", "high")
 
     def _frozen(self) -> Any:
         from scipy import stats
@@ -119,16 +137,10 @@ class TruncatedNormal(Distribution):
         return np.clip(super().quantile(share), self.low, self.high)
 
 
-class Uniform(Distribution):
+class Uniform(Bounded):
     """Evenly between low and high."""
 
     distribution: Literal["uniform"] = "uniform"
-    low: _Finite
-    high: _Finite
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        return _increasing(self, "low", "high")
 
     def _frozen(self) -> Any:
         from scipy import stats
@@ -136,19 +148,17 @@ class Uniform(Distribution):
         return stats.uniform(self.low, self.high - self.low)
 
 
-class Triangular(Distribution):
+class Triangular(Bounded):
     """From low to high with its peak at mode."""
 
     distribution: Literal["triangular"] = "triangular"
-    low: _Finite
     mode: _Finite
-    high: _Finite
 
     @model_validator(mode="after")
-    def _ordered(self) -> Self:
+    def _peaks_within(self) -> Self:
         if not self.low <= self.mode <= self.high:
             raise ValueError(f"got mode = {self.mode:g}, but it must lie between low and high")
-        return _increasing(self, "low", "high")
+        return self
 
     def _frozen(self) -> Any:
         from scipy import stats
@@ -157,7 +167,7 @@ class Triangular(Distribution):
         return stats.triang((self.mode - self.low) / width, loc=self.low, scale=width)
 
 
-class Lognormal(Distribution):
+class Lognormal(Continuous):
     """The logarithm is normal: half lie below the median; `sigma` is the standard deviation of the logarithm."""
 
     distribution: Literal["lognormal"] = "lognormal"
@@ -197,13 +207,6 @@ AnyDistribution = Annotated[
     Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Discrete, Field(discriminator="distribution")
 ]
 _PURE_NUMBERS = {"distribution", "sigma", "weights"}
-
-
-def _increasing(distribution: Any, low: str, high: str) -> Any:
-    before, after = getattr(distribution, low), getattr(distribution, high)
-    if not before < after:
-        raise ValueError(f"got {low} = {before:g} and {high} = {after:g}, but {high} must be above {low}")
-    return distribution
 
 
 class Scatter(Model):

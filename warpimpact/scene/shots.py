@@ -154,6 +154,10 @@ class Shots:
         """The arrays that there are, by name."""
         return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
 
+    def own(self, name: str, otherwise: float) -> Array:
+        """A quantity of every shot, where they do not have one of their own that of the scene; shape [shots]."""
+        return self.columns.get(name, np.full(len(self), otherwise))
+
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """One after the other; all have the same columns."""

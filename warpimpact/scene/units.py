@@ -104,8 +104,9 @@ def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
 
 def quantity(kind: Any) -> Callable[[object], float]:
     """The reader of one of the types below, or of one that is made of it; its ValueError says what is allowed."""
-    (reader,) = (mark.func for mark in kind.__metadata__ if isinstance(mark, BeforeValidator))
-    return reader  # type: ignore[return-value]
+    validators = (mark.func for mark in kind.__metadata__ if isinstance(mark, BeforeValidator))
+    (reader,) = (function for function in validators if isinstance(function, _Quantity))
+    return reader
 
 
 Number = Annotated[float, _quantity("a number", "", "0.05")]

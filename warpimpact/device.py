@@ -1,0 +1,53 @@
+"""The device that computes, and Warp on it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from typing import Any
+
+import warp as wp
+
+
+class DeviceError(RuntimeError):
+    """The device asked for is not there; the message is for a person."""
+
+
+def find_device(name: str) -> Any:
+    """The Warp device of a name; "auto" takes CUDA where there is one."""
+    _start_warp()
+    if name == "auto":
+        return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
+    try:
+        return wp.get_device(name)
+    except (ValueError, RuntimeError):
+        present = ", ".join(str(d) for d in wp.get_devices())
+        raise DeviceError(f'device: got "{name}", which this machine lacks; allowed: auto, {present}') from None
+
+
+def _start_warp() -> None:
+    """Start Warp, quietly and fit for launches from several threads.
+
+    Warp writes its word that there is no CUDA driver straight to file descriptor 2, where it is no concern of who
+    asked for no GPU; everything else written there is passed on. Tile storage on the stack, which no kernel here
+    uses, goes through one unguarded static and crashes threads in debug mode.
+    """
+    wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
+    wp.config.enable_tiles_in_stack_memory = False
+    kept = os.dup(2)
+    with tempfile.TemporaryFile() as aside:
+        os.dup2(aside.fileno(), 2)
+        try:
+            wp.init()
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+            aside.seek(0)
+            for line in aside:
+                if b"find or load the NVIDIA CUDA driver" not in line:
+                    os.write(2, line)
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

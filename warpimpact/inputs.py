@@ -1,0 +1,167 @@
+"""What the kernels read of a scene and its shots, on one device."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact import discretisation
+from warpimpact.discretisation import Fidelity
+from warpimpact.kernels import march
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import OF_THE_SCENE, Core, Interaction, Numerics, Plate, Shots
+
+Array = NDArray[np.float64]
+
+STEP_ALLOWANCE = 200
+"""How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+
+
+class Inputs:
+    """The structs of the march (kernels/march.py), filled.
+
+    Attributes:
+        resolution: the numerics with every choice made.
+        variant, stage: the build of the kernels that the scene needs, and its march.
+        surface, body, plate, law, pace, shots, own: structs on the device.
+        each: what every shot has of its own or from the scene, by the names of the march's Shots and Own, of shape
+            [shots].
+        spacing: of the window's grid [m].
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        plate: Plate,
+        interaction: Interaction,
+        numerics: Numerics | Fidelity,
+        shots: Shots,
+        device: Any,
+        *,
+        traced: bool,
+    ) -> None:
+        self._device = device
+        self.resolution = discretisation.resolve(numerics, core, plate, shots.columns)
+        self.variant = Variant(
+            double=self.resolution.double,
+            nodal=self.resolution.nodal,
+            degrades=plate.degradation < 1.0 or "degradation" in shots.columns,
+            rubs=plate.shear_coefficient > 0.0 or "shear_coefficient" in shots.columns,
+            rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
+            rimmed=plate.size is not None,
+            scattered=any(name in shots.columns for name in OF_THE_SCENE),
+        )
+        self.stage = march.build(self.variant)
+        self.spacing = self.resolution.grid_spacing
+        self.surface = self._surface(core)
+        self.plate = self._plate(plate)
+        self.law = self.stage.Law()
+        self.law.a2, self.law.onset_limit = interaction.quadratic * plate.density, discretisation.LARGEST_ONSET
+        self.body, self.shots, self.own = self.stage.Body(), self.stage.Shots(), self.stage.Own()
+        self.each = self._each(core, plate, interaction, shots)
+        self.pace = self._pace(shots, traced)
+        for name in self.stage.Shots.vars:
+            setattr(self.shots, name, self.array(self.each[name], dtype=wp.float64))
+        self._fill_in_what_may_scatter()
+
+    def array(self, values: NDArray[Any], dtype: Any = None) -> Any:
+        """Values on the device, if not said otherwise in the floating-point type of the kernels."""
+        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.variant.real, device=self._device)
+
+    def _fill_in_what_may_scatter(self) -> None:
+        """Give it to the scene's structs where it does not, and else to every shot."""
+        stage, names = self.stage, self.stage.Own.vars
+        if self.variant.scattered:
+            for name in names:
+                setattr(self.own, name, self.array(self.each[name], dtype=names[name].type.dtype))
+            return
+        for struct, kind in (
+            (self.body, stage.Body),
+            (self.plate, stage.Plate),
+            (self.law, stage.Law),
+            (self.pace, stage.Pace),
+        ):
+            for name in names.keys() & kind.vars.keys():
+                setattr(struct, name, float(self.each[name][0]))
+
+    def give_up_after(self, way: float) -> None:
+        """Let no shot go on for longer than a way [m] at impact velocity."""
+        self.pace.longest_way = way
+        if self.variant.scattered:
+            self.own.longest_way.fill_(way)
+
+    def _surface(self, core: Core) -> Any:
+        r = self.resolution
+        rings = discretisation.rings_of(core, r.patches_axial, r.patches_around, r.patch_width, discs=not r.nodal)
+        azimuths = discretisation.azimuths_of(r.patches_around)
+        surface = self.stage.Surface()
+        for name in ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial"):
+            setattr(surface, name, self.array(getattr(rings, name)))
+        area = np.hypot(rings.area_axial, rings.area_radial)
+        surface.area = self.array(area)
+        surface.normal_axial = self.array(rings.area_axial / area)
+        surface.normal_radial = self.array(rings.area_radial / area)
+        surface.cosine, surface.sine = self.array(np.cos(azimuths)), self.array(np.sin(azimuths))
+        surface.rings, surface.around = len(rings.station), r.patches_around
+        surface.max_radius = core.max_radius
+        surface.bounding_radius = core.bounding_radius
+        return surface
+
+    def _pace(self, shots: Shots, traced: bool) -> Any:
+        resolution, pace, each = self.resolution, self.stage.Pace(), self.each
+        pace.time_step, pace.way_along = resolution.time_step or 0.0, resolution.way_along
+        if traced:
+            steps = each["longest_way"] / (
+                shots.velocity
+                * resolution.step_at(shots.velocity, shots.obliquity, each["thickness"], each["longest_time"])
+            )
+            pace.rows = math.ceil(steps.max()) + 2  # the end, and a step that rounding may add
+        return pace
+
+    def _plate(self, plate: Plate) -> Any:
+        nodal = self.resolution.nodal
+        finer = 1 if nodal else discretisation.FINER
+        tile = discretisation.tile_of(plate, self.spacing / finer, sharp=nodal)
+        struct = self.stage.Plate()
+        struct.tile = self.array(np.pad(tile.material, (0, 1), mode="wrap").reshape(-1))
+        struct.clear = self.array(tile.clearance.reshape(-1))
+        struct.tile_y, struct.tile_z = tile.material.shape
+        struct.period_y, struct.period_z = plate.pattern.period
+        if nodal:  # nodes are the tile's cells, which fit the period
+            self.spacing = min(tile.dy, tile.dz)
+        struct.spacing = self.spacing
+        size = plate.size or (math.inf, math.inf)
+        struct.half_y, struct.half_z = 0.5 * size[0], 0.5 * size[1]
+        taps = discretisation.tent_taps(0.0 if nodal else plate.degradation_length, self.spacing)
+        struct.reach = len(taps) // 2
+        struct.taps = self.array(np.append(taps[struct.reach :], 0.0))
+        return struct
+
+    def _each(self, core: Core, plate: Plate, interaction: Interaction, shots: Shots) -> dict[str, Array]:
+        thickness, degradation = shots.own("thickness", plate.thickness), shots.own("degradation", plate.degradation)
+        body, passage = core.mass_properties, self.resolution.passage(thickness)
+        mass = shots.own("mass", body.mass)
+        scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
+        a0, a1, _ = interaction.coefficients(shots.own("resistance", plate.resistance), plate.density)
+        longest_time = self.resolution.longest_time(degradation, plate.degradation_interval)
+        if not self.resolution.nodal:  # the literal scheme takes β itself, once a step
+            degradation = discretisation.decay_rate(degradation, plate.degradation_interval)
+        return shots.columns | {
+            "thickness": thickness,
+            "mass": mass,
+            "inertia_axial": scale * body.inertia_axial,
+            "inertia_transverse": scale * body.inertia_transverse,
+            "a0": a0,
+            "a1": a1,
+            "friction": shots.own("shear_coefficient", plate.shear_coefficient),
+            "decay_rate": degradation,
+            "onset_jump": discretisation.onset_jump(core, thickness, mass, a0),
+            "way": self.resolution.travel * passage,
+            "longest_time": longest_time,
+            "longest_step": passage,
+            "longest_way": STEP_ALLOWANCE * (thickness + 2.0 * core.bounding_radius),
+        }

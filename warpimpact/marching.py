@@ -1,0 +1,291 @@
+"""Marches the shots of a scene on a device: windows, memory and threads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from queue import SimpleQueue
+from typing import Any, TypeVar
+
+import numpy as np
+import psutil
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.device import cores
+from warpimpact.discretisation import Fidelity
+from warpimpact.inputs import Inputs
+from warpimpact.kernels import free_flight
+from warpimpact.kernels.march import TRACE_COLUMNS
+from warpimpact.kernels.status import Status
+from warpimpact.scene import Core, Interaction, MassProperties, Numerics, Plate, Shots
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int], None]
+Progress1 = Callable[[int], None]
+Scratch = TypeVar("Scratch")
+
+CPU_CHUNK = 32
+"""Shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
+CUDA_CHUNK = 65536
+WINDOW_SLACK = 1.2
+"""Half the width of a first window in radii of the core, for a straight shot."""
+MAX_DOUBLINGS = 6
+"""How often a shot that leaves its window is computed again in one twice as wide."""
+MEMORY_SHARE = 0.5
+"""Share of the free memory that scratch may take."""
+
+
+class March:
+    """One scene on one device, ready to march; see `simulate` for the arguments.
+
+    Args:
+        traced: keep the history of every shot.
+    """
+
+    def __init__(
+        self,
+        core: Core,
+        plate: Plate,
+        interaction: Interaction,
+        numerics: Numerics | Fidelity,
+        shots: Shots,
+        device: Any,
+        *,
+        threads: int | None = None,
+        traced: bool = False,
+    ) -> None:
+        self.core, self.plate, self.shots, self.device = core, plate, shots, device
+        self.threads = threads or cores()
+        self.inputs = Inputs(core, plate, interaction, numerics, shots, device, traced=traced)
+        self.variant, self.stage = self.inputs.variant, self.inputs.stage
+        shape = (len(shots) * self.inputs.pace.rows, TRACE_COLUMNS)
+        self.history = wp.empty(shape, dtype=self.variant.real, device=device)
+        self.cells = self._window_cells()
+
+    def march(self, progress: Progress | None = None) -> Any:
+        """March all shots; those that leave their window again in wider ones."""
+        progress = progress or (lambda done, total: None)
+        count = len(self.shots)
+        outcomes = self._empty(self.stage.Outcomes, (count,))
+        pending = np.arange(count)
+        for _ in range(MAX_DOUBLINGS):
+            self._march_some(pending, outcomes, _after(count - len(pending), count, progress))
+            pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
+            if not len(pending) or not self._fits(2 * self.cells[0], 2 * self.cells[1]):
+                break
+            self.cells = (2 * self.cells[0], 2 * self.cells[1])
+        progress(count, count)
+        return outcomes
+
+    def traces(self, contact: Any) -> list[Array]:
+        """What every shot of a traced march wrote, the state at its end included."""
+        rows = self.history.numpy().reshape(len(self.shots), self.inputs.pace.rows, TRACE_COLUMNS)
+        return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
+
+    def plate_after(self, steps: int, time_step: float) -> Array:
+        """Share of the resistance left for the first shot after some steps on the CPU, in its window once marched."""
+        scratch = self._scratch(1, *self.cells)
+        self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
+        first = self.inputs.array(np.zeros(1), dtype=wp.int32)
+        self._launch(first, self._empty(self.stage.Outcomes, (1,)), scratch, 1, 0, 1)
+        left = _host(scratch[0].exposure).reshape(self.cells) if self._field_count() else np.zeros(self.cells)
+        if self.variant.nodal:
+            return left
+        return self._material() * np.exp(self.inputs.each["decay_rate"][0] * left)
+
+    def body(self) -> MassProperties:
+        """Mass properties of the first shot."""
+        names = ("mass", "inertia_axial", "inertia_transverse")
+        return self.core.mass_properties._replace(**{name: float(self.inputs.each[name][0]) for name in names})
+
+    def nodes(self) -> tuple[Array, Array]:
+        """Where the nodes of the first shot's window are in the plate [m], along y and z."""
+        hit = self.shots.hit_y[0], self.shots.hit_z[0]
+        spacing = self.inputs.spacing
+        y, z = (at + (np.arange(count) - count // 2) * spacing for at, count in zip(hit, self.cells, strict=True))
+        return y, z
+
+    def _material(self) -> Array:
+        """Share of material about every node of the first shot's window."""
+        samples = 16
+        fine = (np.arange(samples) + 0.5) / samples - 0.5
+        y, z = ((nodes[:, None] + self.inputs.spacing * fine).reshape(-1) for nodes in self.nodes())
+        solid = self.plate.is_solid(y[:, None], z[None, :])
+        shape = (self.cells[0], samples, self.cells[1], samples)
+        return np.asarray(solid.reshape(shape).mean(axis=(1, 3)))
+
+    def report(self, contact: Any, standoffs: Array, standoff_point: str) -> dict[str, NDArray[Any]]:
+        """Free flight to the stand-offs, and everything back on the host, by the names of `Outcomes`."""
+        count, inputs = len(self.shots), self.inputs
+        flight = free_flight.build(self.variant)
+        report = self._empty(flight.Report, (count,), (count, len(standoffs)))
+        ahead = self.core.mass_properties.centre_of_mass if standoff_point == "nose" else 0.0
+        planes = standoffs + (0.0 if self.variant.scattered else self.plate.thickness)
+        wp.launch(
+            flight.kernel,
+            count,
+            inputs=[inputs.body, inputs.shots, inputs.own, contact, inputs.array(planes), ahead],
+            outputs=[report],
+            device=self.device,
+        )
+        values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
+        return {"status": contact.status.numpy().astype(np.int8)} | values
+
+    def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
+        """A struct of arrays, each of the shape that has its number of dimensions."""
+        filled = struct()
+        for name, variable in struct.vars.items():
+            array = variable.type
+            shape = shapes[array.ndim - 1]
+            setattr(filled, name, wp.empty(shape, dtype=array.dtype, device=self.device))
+        return filled
+
+    def _window_cells(self) -> tuple[int, int]:
+        """Cells of a window that holds the footprint of a core that keeps its attitude through the plate."""
+        shots, inputs = self.shots, self.inputs
+        steepest = float(shots.obliquity.max())
+        turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
+        half = (
+            WINDOW_SLACK * self.core.max_radius / math.cos(steepest)
+            + float(inputs.each["thickness"].max()) * math.tan(steepest)
+            + self.core.bounding_radius * turned
+        )
+        cells_y = cells_z = 2 * (math.ceil(half / inputs.spacing) + 2 * inputs.plate.reach + 3)
+        while not self._fits(cells_y, cells_z):  # what leaves a smaller window gets its named status
+            cells_y, cells_z = cells_y // 2, cells_z // 2
+        return cells_y, cells_z
+
+    def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
+        size = 8 if self.variant.double else 4
+        return self._field_count() * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4)
+
+    def _field_count(self) -> int:
+        return 2 if self.variant.nodal else 3 if self.variant.degrades else 0
+
+    def _patches(self) -> int:
+        """Patches of a slot's touches."""
+        return 0 if self.variant.nodal else self.inputs.surface.rings * self.inputs.surface.around
+
+    def _slots(self, cells_y: int, cells_z: int) -> int:
+        """Slots of scratch that the device's free memory and 32-bit indices allow."""
+        free = psutil.virtual_memory().available if self.device.is_cpu else self.device.free_memory
+        wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
+        affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
+        return min(wanted, affordable, (2**31 - 1) // (cells_y * cells_z))
+
+    def _fits(self, cells_y: int, cells_z: int) -> bool:
+        return self._slots(cells_y, cells_z) > 0
+
+    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, Any]:
+        """Fields and touches of some slots."""
+        empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
+        scratch, touches = self.stage.Fields(), self.stage.Touches()
+        scratch.cells_y, scratch.cells_z = cells_y, cells_z
+        for name in ("exposure", "gain", "filtered")[: self._field_count()]:
+            setattr(scratch, name, empty(slots * cells_y * cells_z))
+        patches = slots * self._patches()
+        for name in ("area", "gain", "tile_y", "tile_z", "y", "z"):
+            setattr(touches, name, empty(patches))
+        for name in ("tile", "cell"):
+            setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
+        touches.ring_area = empty(slots * self.inputs.surface.rings)
+        return scratch, touches
+
+    def _launch(
+        self,
+        order: Any,
+        outcomes: Any,
+        scratch: tuple[Any, Any],
+        slots: int,
+        first: int,
+        count: int,
+    ) -> int:
+        """March `count` shots from order[first] on; returns `count`."""
+        inputs = self.inputs
+        wp.launch(
+            self.stage.kernel,
+            count,
+            inputs=[
+                first,
+                slots,
+                order,
+                inputs.surface,
+                inputs.body,
+                inputs.plate,
+                inputs.law,
+                inputs.shots,
+                inputs.own,
+                inputs.pace,
+                *scratch,
+            ],
+            outputs=[outcomes, self.history],
+            device=self.device,
+        )
+        return count
+
+    def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
+        """March the shots of the given indices in windows of one size."""
+        self.stage.kernel.module.load(self.device)
+        launch = partial(self._launch, self.inputs.array(which, dtype=wp.int32), outcomes)
+        if self.device.is_cpu:
+            self._on_threads(launch, self._cpu_scratch(), len(which), progress)
+        else:
+            slots, scratch = _halving(self._slots(*self.cells), lambda slots: self._scratch(slots, *self.cells))
+            for first, count in _chunks(len(which), slots):
+                launch(scratch, slots, first, count)
+                wp.synchronize_device(self.device)
+                progress(first + count)
+
+    def _cpu_scratch(self) -> list[Any]:
+        """Scratch of one slot for every thread."""
+        slots = self._slots(*self.cells)
+        return _halving(slots, lambda slots: [self._scratch(1, *self.cells) for _ in range(slots)])[1]
+
+    def _on_threads(self, launch: Callable[..., int], slots: list[Any], total: int, progress: Progress1) -> None:
+        """Share chunks out over threads, each with one slot: a CPU launch runs its shots one after another on
+        the calling thread, without the interpreter lock."""
+        idle = SimpleQueue[Any]()
+        for scratch in slots:
+            idle.put(scratch)
+
+        def work(chunk: tuple[int, int]) -> int:
+            scratch = idle.get()
+            try:
+                return launch(scratch, 1, *chunk)
+            finally:
+                idle.put(scratch)
+
+        done = 0
+        with ThreadPoolExecutor(len(slots)) as pool:
+            for count in pool.map(work, _chunks(total, CPU_CHUNK)):
+                done += count
+                progress(done)
+
+
+def _after(finished: int, total: int, progress: Progress) -> Progress1:
+    """Progress of what comes after the shots already finished."""
+    return lambda done: progress(finished + done, total)
+
+
+def _chunks(total: int, size: int) -> Iterator[tuple[int, int]]:
+    """(first, count) of consecutive chunks."""
+    return ((first, min(size, total - first)) for first in range(0, total, size))
+
+
+def _halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
+    """Slots and their scratch: half as many while there is no memory for more, which free memory only estimates."""
+    while True:
+        try:
+            return slots, allocate(slots)
+        except (RuntimeError, MemoryError) as error:
+            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
+                raise
+        slots //= 2
+
+
+def _host(array: Any) -> Array:
+    values: Array = array.numpy().astype(np.float64)
+    return values
