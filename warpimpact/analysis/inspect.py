@@ -8,7 +8,8 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.summary import UNITS, estimated, main_measures, slices, stop_lines, symmetry_text
-from warpimpact.campaign.estimates import STATUSES, Estimate, Measure
+from warpimpact.campaign.estimates import STATUSES, Measure
+from warpimpact.campaign.intervals import Estimate
 from warpimpact.kernels.status import Status
 from warpimpact.results import SCATTER_VARIABLES, SHOT_VARIABLES, failed
 

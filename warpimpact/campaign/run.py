@@ -13,7 +13,8 @@ from typing import Any, Protocol
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.estimates import Estimate, Measure, Tally, looks
+from warpimpact.campaign.estimates import Measure, Tally, looks
+from warpimpact.campaign.intervals import Estimate
 from warpimpact.campaign.parts import Parts, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import OutputError, failed, images
