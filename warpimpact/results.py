@@ -17,6 +17,7 @@ import netCDF4
 import numpy as np
 import xarray
 
+from warpimpact.interrupts import uninterrupted
 from warpimpact.kernels.status import Status
 
 if TYPE_CHECKING:
@@ -357,7 +358,7 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    with aside(path) as file:
+    with uninterrupted(), aside(path) as file:
         dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=_encoding(dataset))
 
 
@@ -381,10 +382,10 @@ def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> No
         with netCDF4.Dataset(part) as source:
             hits += len(source.dimensions["hit"])
     with aside(path, parts[0].parent) as file:
-        with xarray.open_dataset(parts[0], engine="netcdf4") as first:
-            dataset = first.load().assign_attrs(attributes).drop_encoding()
-        encoding = _encoding(dataset, chunk=min(hits, CHUNK))
-        dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=encoding, unlimited_dims=["hit"])
+        with uninterrupted():
+            dataset = read(parts[0]).assign_attrs(attributes).drop_encoding()
+            encoding = _encoding(dataset, chunk=min(hits, CHUNK))
+            dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=encoding, unlimited_dims=["hit"])
         at = dataset.sizes["hit"]
         with netCDF4.Dataset(file, "a") as joined:
             joined.set_auto_maskandscale(False)
@@ -462,7 +463,7 @@ def read(path: Path) -> xarray.Dataset:
     Raises:
         ResultError: The file is missing, is not netCDF, or is not a warpimpact result.
     """
-    with opened(path) as file:
+    with uninterrupted(), opened(path) as file:
         return file.load()
 
 
