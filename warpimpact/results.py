@@ -17,6 +17,7 @@ import netCDF4
 import numpy as np
 import xarray
 
+from warpimpact.interrupts import uninterrupted
 from warpimpact.kernels.status import Status
 
 if TYPE_CHECKING:
@@ -80,6 +81,17 @@ OUTCOME_VARIABLES = {
     "yaw": Variable(("hit", "standoff"), "degree", "yaw of the core, projected into the x-y plane"),
     "total_yaw": Variable(("hit", "standoff"), "degree", "angle between core axis and residual velocity"),
 }
+
+SOLID_VARIABLES = {
+    f"solid_{name}": Variable(
+        tuple("solid_hit" if dim == "hit" else dim for dim in OUTCOME_VARIABLES[name].dims),
+        OUTCOME_VARIABLES[name].units,
+        f"{OUTCOME_VARIABLES[name].long_name}, solid plate of equal areal density",
+    )
+    for name in ("status", "residual_velocity", "tilt")
+}
+"""What the solid plate of equal areal density makes of the first shots; of the first one alone where no two differ but
+in where they hit. Only of a perforated plate, where `output.solid_reference` asks for it."""
 
 ESTIMATE_VARIABLES = {
     "residual_velocity_error": Variable(("hit",), "m s-1", "estimated error of the residual velocity"),
@@ -216,6 +228,36 @@ def _with_flags(dataset: xarray.Dataset) -> xarray.Dataset:
     return dataset
 
 
+def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
+    """What the solid plate of equal areal density makes of the first shots, to stand beside the Dataset of all.
+
+    Args:
+        outcomes: SI and radians.
+    """
+    return xarray.Dataset(
+        {
+            name: _described(variable, getattr(outcomes, name.removeprefix("solid_")))
+            for name, variable in SOLID_VARIABLES.items()
+        }
+    )
+
+
+def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
+    """Shots and outcomes of the solid plate under the names of the hits' own, along "hit"; None if there are none.
+
+    A plate that is solid is its own reference.
+    """
+    if dataset.attrs.get("open_area") == 0.0:
+        return dataset
+    if not SOLID_VARIABLES.keys() <= dataset.variables.keys():
+        return None
+    solid = dataset[list(SOLID_VARIABLES)].isel(solid_hit=slice(dataset.sizes["hit"])).load()
+    solid = solid.rename({name: name.removeprefix("solid_") for name in SOLID_VARIABLES} | {"solid_hit": "hit"})
+    shots = [name for name in (*SHOT_VARIABLES, *SCATTER_VARIABLES) if name in dataset]
+    first = dataset[shots].isel(hit=slice(solid.sizes["hit"]))
+    return solid.merge(first.load())
+
+
 def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, str | int | float]) -> xarray.Dataset:
     """Gather a study of speed and accuracy.
 
@@ -321,7 +363,7 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    with aside(path) as file:
+    with uninterrupted(), aside(path) as file:
         dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=_encoding(dataset))
 
 
@@ -345,10 +387,10 @@ def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> No
         with netCDF4.Dataset(part) as source:
             hits += len(source.dimensions["hit"])
     with aside(path, parts[0].parent) as file:
-        with xarray.open_dataset(parts[0], engine="netcdf4") as first:
-            dataset = first.load().assign_attrs(attributes).drop_encoding()
-        encoding = _encoding(dataset, chunk=min(hits, CHUNK))
-        dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=encoding, unlimited_dims=["hit"])
+        with uninterrupted():
+            dataset = read(parts[0]).assign_attrs(attributes).drop_encoding()
+            encoding = _encoding(dataset, chunk=min(hits, CHUNK))
+            dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=encoding, unlimited_dims=["hit"])
         at = dataset.sizes["hit"]
         with netCDF4.Dataset(file, "a") as joined:
             joined.set_auto_maskandscale(False)
@@ -426,7 +468,7 @@ def read(path: Path) -> xarray.Dataset:
     Raises:
         ResultError: The file is missing, is not netCDF, or is not a warpimpact result.
     """
-    with opened(path) as file:
+    with uninterrupted(), opened(path) as file:
         return file.load()
 
 

@@ -7,22 +7,28 @@ from collections.abc import Iterator
 import numpy as np
 import xarray
 
-from warpimpact.analysis.summary import UNITS, estimated, main_measures, slices, stop_lines, symmetry_text
-from warpimpact.campaign.estimates import STATUSES, Estimate, Measure
+from warpimpact.analysis.effectiveness import effectiveness_text
+from warpimpact.analysis.summary import (
+    UNITS,
+    estimated,
+    main_measures,
+    sampling_note,
+    slices,
+    stop_lines,
+    symmetry_text,
+)
+from warpimpact.campaign.estimates import STATUSES, Measure
+from warpimpact.campaign.intervals import Estimate
 from warpimpact.kernels.status import Status
 from warpimpact.results import failed, shot_variables
 
 _QUANTILES = (0.05, 0.5, 0.95)
-_SAMPLINGS = {
-    "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates gives valid ones.",
-    "grid": "Intervals are those of independent shots, which the hits of a grid are not.",
-    "list": "Intervals are those of independent shots, which the hits of a list may not be.",
-}
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
     """All that a person may ask of a hit map, as text; of an open file only a part is in memory at a time."""
-    return "\n".join([*_origin(dataset), "", *_statuses(dataset), "", *_numbers(dataset), "", *failures(dataset)])
+    tables = [_origin(dataset), _statuses(dataset), _numbers(dataset), [effectiveness_text(dataset)], failures(dataset)]
+    return "\n\n".join("\n".join(table) for table in tables)
 
 
 def _origin(dataset: xarray.Dataset) -> Iterator[str]:
@@ -61,7 +67,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
         for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
             if estimate.count:
                 yield _row(measure, estimate)
-    if int(dataset.attrs.get("replicates", 1)) == 1 and (note := _SAMPLINGS.get(dataset.attrs.get("sampling", ""))):
+    if note := sampling_note(dataset):
         yield note
     yield from stop_lines(dataset)
 

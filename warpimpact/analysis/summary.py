@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 
-from warpimpact.campaign.estimates import MEASURED, Estimate, Measure, Tally
+from warpimpact.campaign.estimates import MEASURED, Measure, Tally
+from warpimpact.campaign.intervals import Estimate
 from warpimpact.results import images, status_codes
 
 SLICE = 2**18
@@ -80,6 +81,19 @@ def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
     """Its hits in slices that are loaded one at a time."""
     for first in range(0, dataset.sizes["hit"], SLICE):
         yield dataset.isel(hit=slice(first, first + SLICE)).load()
+
+
+_SAMPLINGS = {
+    "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates gives valid ones.",
+    "grid": "Intervals are those of independent shots, which the hits of a grid are not.",
+    "list": "Intervals are those of independent shots, which the hits of a list may not be.",
+}
+
+
+def sampling_note(dataset: xarray.Dataset) -> str:
+    """What there is to say of the intervals of a result because of its sampling, if anything."""
+    told = dataset.attrs
+    return _SAMPLINGS.get(told.get("sampling", ""), "") if told.get("replicates", 1) == 1 else ""
 
 
 def summary_text(dataset: xarray.Dataset) -> str:

@@ -30,11 +30,13 @@ class Output(Model):
         standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
         standoff_point: the point of the core that passes them.
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
+        solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1)] = (0.05, 0.13)
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
+    solid_reference: Annotated[bool, Field(strict=True)] = True
 
     @field_validator("standoffs")
     @classmethod
@@ -77,7 +79,7 @@ class Campaign(Model):
             CampaignError: the file is missing, is no TOML, or asks for something that cannot be.
         """
         path = Path(path)
-        return cls.from_text(_read(path), name=str(path), folder=path.parent, count=count)
+        return cls.from_text(read_text(path), name=str(path), folder=path.parent, count=count)
 
     @classmethod
     def from_text(cls, text: str, *, name: str, folder: Path, count: int | None = None) -> Self:
@@ -92,10 +94,12 @@ class Campaign(Model):
         Raises:
             CampaignError: the text is no TOML, or asks for something that cannot be.
         """
-        try:
-            data = json.loads(text) if text.startswith("{") else tomllib.loads(text)
-        except ValueError as error:
-            raise CampaignError(f"{name}: is not valid TOML: {error}") from None
+        data = parsed(text, name)
+        if isinstance(plates := data.get("plate"), list):
+            raise CampaignError(
+                f"{name}: plate: got {len(plates)} plates, but this takes one; warpimpact compare {name} runs them all "
+                "and compares them"
+            )
         if count is not None:
             _override_count(data, count)
         data = _with_scatter_apart(data, name)
@@ -218,7 +222,25 @@ def _with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
     return data | {"scatter": scatter} if scatter else data
 
 
-def _read(path: Path) -> str:
+def parsed(text: str, name: str) -> dict[str, Any]:
+    """The tables of a campaign, TOML or JSON, not yet validated.
+
+    Raises:
+        CampaignError: the text, which errors call `name`, is neither.
+    """
+    try:
+        data: dict[str, Any] = json.loads(text) if text.startswith("{") else tomllib.loads(text)
+    except ValueError as error:
+        raise CampaignError(f"{name}: is not valid TOML: {error}") from None
+    return data
+
+
+def read_text(path: Path) -> str:
+    """The text of a campaign file.
+
+    Raises:
+        CampaignError: it is missing or cannot be read.
+    """
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:

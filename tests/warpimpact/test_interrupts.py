@@ -1,0 +1,50 @@
+"""Signals that wait for what must not be broken off."""
+
+import signal
+import threading
+
+import pytest
+
+from warpimpact.interrupts import uninterrupted
+
+
+@pytest.fixture
+def interrupted_by_sigterm():
+    """SIGTERM as a run takes it."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_waits_for_the_end_of_the_block(number: signal.Signals, interrupted_by_sigterm: None) -> None:
+    reached = []
+    handler = signal.getsignal(number)
+    with pytest.raises(KeyboardInterrupt):  # noqa: PT012
+        with uninterrupted():
+            signal.raise_signal(number)
+            reached.append("the end")
+        reached.append("what follows")
+    assert reached == ["the end"]
+    assert signal.getsignal(number) is handler
+
+
+def test_what_goes_wrong_inside_is_told() -> None:
+    with pytest.raises(OSError, match="full"), uninterrupted():
+        raise OSError("full")
+
+
+def test_other_threads_need_no_signals() -> None:
+    def work() -> None:
+        with uninterrupted():
+            done.append(True)
+
+    done: list[bool] = []
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert done == [True]
