@@ -50,6 +50,7 @@ def compute(
         "numerics": campaign.numerics,
         "standoffs": campaign.output.standoffs,
         "standoff_point": campaign.output.standoff_point,
+        "bending": campaign.output.bending,
         "device": device,
         "threads": threads,
         "progress": progress and (lambda done, total: progress(done * len(group), total * len(group))),
