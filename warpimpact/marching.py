@@ -176,7 +176,9 @@ class March:
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        return self._field_count() * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4)
+        per_ring = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        rings = self.inputs.surface.rings * per_ring
+        return self._field_count() * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
 
     def _field_count(self) -> int:
         return 2 if self.variant.nodal else 3 if self.variant.degrades else 0
