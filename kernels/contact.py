@@ -43,10 +43,23 @@ def build(variant: Variant) -> SimpleNamespace:
         box: Box
 
     @wp.struct
+    class Sums:
+        """Over a ring: force [N] and moment [N m] along the body axes; the tractions' derivative by the closing speed
+        [N s/m], weighted by 1, cos, sin, cos² and cos sin of the azimuth."""
+
+        force: vec3
+        moment: vec3
+        slopes: real
+        slopes_c: real
+        slopes_s: real
+        slopes_cc: real
+        slopes_cs: real
+
+    @wp.struct
     class Touches:
         """What the first pass finds, for every patch of every slot: area [m²] of material that it immerses, exposure
-        per node [s] that it is about to give, cells of the tile and of the grid with the place in them; and the
-        area of every ring's patches together."""
+        per node [s] that it is about to give, cells of the tile and of the grid with the place in them; the area of
+        every ring's patches together; and, where the core bends, what the second pass sums over each ring."""
 
         area: wp.array(dtype=real)
         gain: wp.array(dtype=real)
@@ -57,6 +70,7 @@ def build(variant: Variant) -> SimpleNamespace:
         y: wp.array(dtype=real)
         z: wp.array(dtype=real)
         ring_area: wp.array(dtype=real)
+        sums: wp.array(dtype=Sums)
 
     @wp.struct
     class Grip:
@@ -69,19 +83,6 @@ def build(variant: Variant) -> SimpleNamespace:
         around: real
         closing: real
         width: real
-
-    @wp.struct
-    class Sums:
-        """Over a ring: force [N] and moment [N m] along the body axes; the tractions' derivative by the closing speed
-        [N s/m], weighted by 1, cos, sin, cos² and cos sin of the azimuth."""
-
-        force: vec3
-        moment: vec3
-        slopes: real
-        slopes_c: real
-        slopes_s: real
-        slopes_cc: real
-        slopes_cs: real
 
     @wp.func
     def node_below(window: Window, place: real):
@@ -353,6 +354,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 if touches.ring_area[slot * surface.rings + index] > zero:
                     ring = ring_at(surface, pose, index)
                     sums = sum_ring(surface, law, fields, touches, pose, ring, base + index * surface.around)
+                    if wp.static(variant.bends):
+                        touches.sums[slot * surface.rings + index] = sums
                     load.force += sums.force
                     load.moment += sums.moment
                     if sums.slopes > zero:
@@ -367,7 +370,11 @@ def build(variant: Variant) -> SimpleNamespace:
     return SimpleNamespace(
         Footprint=Footprint,
         Touches=Touches,
+        Sums=Sums,
         Grip=Grip,
+        damping_vv=damping_vv,
+        damping_vw=damping_vw,
+        damping_ww=damping_ww,
         open_window=open_window,
         footprint_of=footprint_of,
         grip_of=grip_of,

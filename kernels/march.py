@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, interaction, nodal, plate_grid, rigid_body
+from . import bending, contact, core_surface, interaction, nodal, plate_grid, rigid_body
 from .status import Status
 from .variant import Variant
 
@@ -22,11 +22,12 @@ def build(variant: Variant) -> SimpleNamespace:
     tiny = wp.float64(1.0e-9)
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    contacts = contact.build(variant)
+    contacts, bends = contact.build(variant), bending.build(variant)
     scheme = nodal.build(variant) if variant.nodal else contacts
     Surface, Pose, Plate, Fields, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Fields, laws.Law
     Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Footprint, Touches = contacts.Footprint, contacts.Touches
+    Sections, Bending = bends.Sections, bends.Bending
     PERFORATED, ARRESTED, RICOCHETED = (
         wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
     )
@@ -243,6 +244,7 @@ def build(variant: Variant) -> SimpleNamespace:
         order: wp.array(dtype=wp.int32),
         surface: Surface,
         body: Body,
+        sections: Sections,
         plate: Plate,
         law: Law,
         shots: Shots,
@@ -253,6 +255,7 @@ def build(variant: Variant) -> SimpleNamespace:
         touches: Touches,
         # outputs
         outcomes: Outcomes,
+        bending: wp.array(dtype=Bending),
         trace: wp.array2d(dtype=real),
     ):
         """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots."""
@@ -276,6 +279,8 @@ def build(variant: Variant) -> SimpleNamespace:
         if grid.clearance(plate, window) > reach_of(surface, plate, state):
             status = int(MISSED)
         touched = bool(False)
+        if wp.static(variant.bends):
+            worst = Bending()
         contact_steps = int(0)
         last = Change()
         step = int(0)
@@ -299,6 +304,10 @@ def build(variant: Variant) -> SimpleNamespace:
                     # Back to the speeds at the start of the step, which the damping counts from.
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
+                    if wp.static(variant.bends):
+                        worst = bends.bent(
+                            worst, surface, sections, body, touches, slot, found, pose, state, load, last, dt
+                        )
                     state = motion.kick(body, state, load, dt)
                     last = motion.change_between(body, before, state)
                 else:
@@ -320,6 +329,8 @@ def build(variant: Variant) -> SimpleNamespace:
         if touched:
             energy_loss = initial_energy - motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
         outcomes.energy_loss[shot] = energy_loss
+        if wp.static(variant.bends):
+            bending[shot] = worst
         outcomes.position[shot] = state.position
         outcomes.axis[shot] = axis
         outcomes.velocity[shot] = state.velocity
@@ -331,9 +342,12 @@ def build(variant: Variant) -> SimpleNamespace:
         own_body=own_body,
         Surface=Surface,
         Body=Body,
+        Sections=Sections,
+        Bending=Bending,
         Plate=Plate,
         Fields=Fields,
         Touches=Touches,
+        Sums=contacts.Sums,
         Law=Law,
         Shots=Shots,
         Own=Own,

@@ -150,6 +150,12 @@ def build(variant: Variant) -> SimpleNamespace:
         return share
 
     @wp.func
+    def restraint_of(body: Body, state: State, dv: vec3, dw: vec3):
+        """The restraint of a change of velocities along the body axes."""
+        dv_plate, dw_plate = wp.quat_rotate(state.attitude, dv), wp.quat_rotate(state.attitude, dw)
+        return restraint(body, axis_of(state.attitude), state, dv_plate, dw_plate)
+
+    @wp.func
     def kick(body: Body, state: State, load: Load, dt: real):
         """Change the velocities by the load over dt."""
         axis = axis_of(state.attitude)
@@ -178,8 +184,7 @@ def build(variant: Variant) -> SimpleNamespace:
         dv, dw = velocity_change(body, load, dt)
         force = load.force - load.damping_vv * dv - load.damping_vw * dw
         moment = load.moment - wp.transpose(load.damping_vw) * dv - load.damping_ww * dw
-        dv, dw = wp.quat_rotate(state.attitude, dv), wp.quat_rotate(state.attitude, dw)
-        share = restraint(body, axis_of(state.attitude), state, dv, dw)
+        share = restraint_of(body, state, dv, dw)
         return share * wp.quat_rotate(state.attitude, force), share * wp.quat_rotate(state.attitude, moment)
 
     return SimpleNamespace(
@@ -193,6 +198,8 @@ def build(variant: Variant) -> SimpleNamespace:
         kinetic_energy=kinetic_energy,
         turned=turned,
         drift=drift,
+        velocity_change=velocity_change,
+        restraint_of=restraint_of,
         kick=kick,
         change_between=change_between,
         mean_load=mean_load,

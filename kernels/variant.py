@@ -25,6 +25,7 @@ class Variant:
         rate_dependent: the normal stress depends on the normal velocity (a1 or a2 > 0).
         rimmed: the plate is finite.
         scattered: resistance, friction, degradation, thickness or mass differ from shot to shot.
+        bends: the core's largest bending moment is recorded.
     """
 
     double: bool = False
@@ -34,6 +35,7 @@ class Variant:
     rate_dependent: bool = False
     rimmed: bool = False
     scattered: bool = False
+    bends: bool = False
 
     @property
     def real(self) -> Any:

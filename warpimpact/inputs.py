@@ -10,6 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact import discretisation
+from warpimpact.bending import check_bending, sections_of
 from warpimpact.discretisation import Fidelity
 from warpimpact.kernels import march
 from warpimpact.kernels.variant import Variant
@@ -27,7 +28,7 @@ class Inputs:
     Attributes:
         resolution: the numerics with every choice made.
         variant, stage: the build of the kernels that the scene needs, and its march.
-        surface, body, plate, law, pace, shots, own: structs on the device.
+        surface, body, sections, plate, law, pace, shots, own: structs on the device.
         each: what every shot has of its own or from the scene, by the names of the march's Shots and Own, of shape
             [shots].
         spacing: of the window's grid [m].
@@ -43,7 +44,10 @@ class Inputs:
         device: Any,
         *,
         traced: bool,
+        bending: bool,
     ) -> None:
+        if bending:
+            check_bending(core, numerics)
         self._device = device
         self.resolution = discretisation.resolve(numerics, core, plate, shots.columns)
         self.variant = Variant(
@@ -53,11 +57,20 @@ class Inputs:
             rubs=plate.shear_coefficient > 0.0 or "shear_coefficient" in shots.columns,
             rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
             rimmed=plate.size is not None,
+            bends=bending,
             scattered=any(name in shots.columns for name in OF_THE_SCENE),
         )
         self.stage = march.build(self.variant)
         self.spacing = self.resolution.grid_spacing
+        self._rings = discretisation.rings_of(
+            core,
+            self.resolution.patches_axial,
+            self.resolution.patches_around,
+            self.resolution.patch_width,
+            discs=not self.resolution.nodal,
+        )
         self.surface = self._surface(core)
+        self.sections = self._sections(core)
         self.plate = self._plate(plate)
         self.law = self.stage.Law()
         self.law.a2, self.law.onset_limit = interaction.quadratic * plate.density, discretisation.LARGEST_ONSET
@@ -95,9 +108,8 @@ class Inputs:
             self.own.longest_way.fill_(way)
 
     def _surface(self, core: Core) -> Any:
-        r = self.resolution
-        rings = discretisation.rings_of(core, r.patches_axial, r.patches_around, r.patch_width, discs=not r.nodal)
-        azimuths = discretisation.azimuths_of(r.patches_around)
+        rings, around = self._rings, self.resolution.patches_around
+        azimuths = discretisation.azimuths_of(around)
         surface = self.stage.Surface()
         for name in ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial"):
             setattr(surface, name, self.array(getattr(rings, name)))
@@ -106,10 +118,18 @@ class Inputs:
         surface.normal_axial = self.array(rings.area_axial / area)
         surface.normal_radial = self.array(rings.area_radial / area)
         surface.cosine, surface.sine = self.array(np.cos(azimuths)), self.array(np.sin(azimuths))
-        surface.rings, surface.around = len(rings.station), r.patches_around
+        surface.rings, surface.around = len(rings.station), around
         surface.max_radius = core.max_radius
         surface.bounding_radius = core.bounding_radius
         return surface
+
+    def _sections(self, core: Core) -> Any:
+        struct = self.stage.Sections()
+        if self.variant.bends:
+            sections = sections_of(core, self._rings)
+            for name in self.stage.Sections.vars:
+                setattr(struct, name, self.array(getattr(sections, name)))
+        return struct
 
     def _pace(self, shots: Shots, traced: bool) -> Any:
         resolution, pace, each = self.resolution, self.stage.Pace(), self.each

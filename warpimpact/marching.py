@@ -42,6 +42,7 @@ class March:
     """One scene on one device, ready to march; see `simulate` for the arguments.
 
     Args:
+        bending: follow the bending moment.
         traced: keep the history of every shot.
     """
 
@@ -55,14 +56,16 @@ class March:
         device: Any,
         *,
         threads: int | None = None,
+        bending: bool = False,
         traced: bool = False,
     ) -> None:
         self.core, self.plate, self.shots, self.device = core, plate, shots, device
         self.threads = threads or cores()
-        self.inputs = Inputs(core, plate, interaction, numerics, shots, device, traced=traced)
+        self.inputs = Inputs(core, plate, interaction, numerics, shots, device, traced=traced, bending=bending)
         self.variant, self.stage = self.inputs.variant, self.inputs.stage
         shape = (len(shots) * self.inputs.pace.rows, TRACE_COLUMNS)
         self.history = wp.empty(shape, dtype=self.variant.real, device=device)
+        self.bending = wp.empty(len(shots) if bending else 0, dtype=self.stage.Bending, device=device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -132,7 +135,20 @@ class March:
             device=self.device,
         )
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
-        return {"status": contact.status.numpy().astype(np.int8)} | values
+        status = contact.status.numpy().astype(np.int8)
+        return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
+
+    def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
+        """Largest bending moment and stress of every shot, and where; no place without any."""
+        found = self.bending.numpy()
+        columns = {
+            "largest_bending_moment": found["moment"],
+            "bending_section": np.where(found["moment"] > 0.0, found["moment_station"], np.nan),
+            "bending_stress": found["stress"],
+            "bending_stress_section": np.where(found["stress"] > 0.0, found["stress_station"], np.nan),
+        }
+        failed = status >= Status.UNFINISHED
+        return {name: np.where(failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of arrays, each of the shape that has its number of dimensions."""
@@ -160,7 +176,9 @@ class March:
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        return self._field_count() * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4)
+        per_ring = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        rings = self.inputs.surface.rings * per_ring
+        return self._field_count() * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
 
     def _field_count(self) -> int:
         return 2 if self.variant.nodal else 3 if self.variant.degrades else 0
@@ -191,7 +209,10 @@ class March:
             setattr(touches, name, empty(patches))
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
-        touches.ring_area = empty(slots * self.inputs.surface.rings)
+        rings = slots * self.inputs.surface.rings
+        touches.ring_area = empty(rings)
+        if self.variant.bends:
+            touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
         return scratch, touches
 
     def _launch(
@@ -214,6 +235,7 @@ class March:
                 order,
                 inputs.surface,
                 inputs.body,
+                inputs.sections,
                 inputs.plate,
                 inputs.law,
                 inputs.shots,
@@ -221,7 +243,7 @@ class March:
                 inputs.pace,
                 *scratch,
             ],
-            outputs=[outcomes, self.history],
+            outputs=[outcomes, self.bending, self.history],
             device=self.device,
         )
         return count

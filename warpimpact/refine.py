@@ -57,6 +57,7 @@ def simulate_to_tolerance(
     interaction: Interaction | None = None,
     standoffs: Sequence[float] = (),
     standoff_point: str = "centre_of_mass",
+    bending: bool = False,
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -86,6 +87,7 @@ def simulate_to_tolerance(
             numerics=level(index, numerics),
             standoffs=standoffs,
             standoff_point=standoff_point,
+            bending=bending,
             device=device,
             threads=threads,
             progress=lambda *_: show(len(shots) - len(pending)),  # nothing new, but a chance to end the computation

@@ -93,6 +93,14 @@ SOLID_VARIABLES = {
 """What the solid plate of equal areal density makes of the first shots; of the first one alone where no two differ but
 in where they hit. Only of a perforated plate, where `output.solid_reference` asks for it."""
 
+BENDING_VARIABLES = {
+    "largest_bending_moment": Variable(("hit",), "N m", "largest bending moment in the rigid core"),
+    "bending_section": Variable(("hit",), "m", "distance of its section from the nose"),
+    "bending_stress": Variable(("hit",), "Pa", "largest nominal bending stress in the rigid core"),
+    "bending_stress_section": Variable(("hit",), "m", "distance of its section from the nose"),
+}
+"""Only of a campaign with output.bending."""
+
 ESTIMATE_VARIABLES = {
     "residual_velocity_error": Variable(("hit",), "m s-1", "estimated error of the residual velocity"),
     "tilt_error": Variable(("hit", "standoff"), "degree", "estimated error of the tilt"),
@@ -204,9 +212,12 @@ def to_dataset(
     coordinates = {"hit_y": shots.hit_y, "hit_z": shots.hit_z, "standoff": standoffs, "axis": ["x", "y", "z"]}
     values = {name: getattr(shots, name.removeprefix("impact_")) for name in SHOT_VARIABLES}
     values |= {name: shots.columns[name] for name in SCATTER_VARIABLES if name in shots.columns}
-    values |= {name: getattr(outcomes, name) for name in OUTCOME_VARIABLES}
+    values |= {
+        name: getattr(outcomes, name) for name in OUTCOME_VARIABLES | BENDING_VARIABLES if hasattr(outcomes, name)
+    }
     values |= {"outline_y": vertices[:, 0], "outline_z": vertices[:, 1]}
-    variables = VARIABLES | {name: variable for name, variable in SCATTER_VARIABLES.items() if name in values}
+    optional = SCATTER_VARIABLES | BENDING_VARIABLES
+    variables = VARIABLES | {name: variable for name, variable in optional.items() if name in values}
     if estimates is not None:
         variables = variables | ESTIMATE_VARIABLES
         values |= {name: getattr(estimates, name) for name in ESTIMATE_VARIABLES}
@@ -350,6 +361,11 @@ def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
 def shot_variables(dataset: xarray.Dataset) -> list[str]:
     """Names of the variables that say how the cores came and what they hit, but for where."""
     return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
+
+
+def outcome_variables(dataset: xarray.Dataset) -> list[str]:
+    """Names of the variables that say how the shots ended."""
+    return [*OUTCOME_VARIABLES, *(name for name in BENDING_VARIABLES if name in dataset)]
 
 
 def images(dataset: xarray.Dataset) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,23 @@ class Outcomes:
 
 
 @dataclass(frozen=True)
+class BentOutcomes(Outcomes):
+    """Outcomes with what bent the core most, as if it stayed rigid (kernels/bending.py); arrays of shape [shots].
+
+    Attributes:
+        largest_bending_moment: [N m], 0 for a core that touched nothing; at
+        bending_section: distance behind the nose tip [m].
+        bending_stress: largest nominal stress 4M/(πr³) [Pa] where the core is thick enough (bending.THINNEST); at
+        bending_stress_section: distance behind the nose tip [m].
+    """
+
+    largest_bending_moment: Array
+    bending_section: Array
+    bending_stress: Array
+    bending_stress_section: Array
+
+
+@dataclass(frozen=True)
 class Replay:
     """One shot with all that happened on the way: SI, float64.
 
@@ -75,6 +93,7 @@ def simulate(
     numerics: Numerics | Fidelity | None = None,
     standoffs: Sequence[float] = (),
     standoff_point: str = "centre_of_mass",
+    bending: bool = False,
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -84,17 +103,31 @@ def simulate(
     Args:
         standoffs: distances behind the rear face [m], shape [stand-offs]; at least the core's bounding radius.
         standoff_point: which point has to pass them: "centre_of_mass" or "nose".
+        bending: follow the bending moment, and return `BentOutcomes`.
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
         threads: of a CPU; None is one for every core that this process may use.
         progress: called with (shots done, shots) as they come; what it raises ends the computation.
 
     Raises:
         DeviceError: the device is absent.
+        ValueError: the core or the numerics have no bending moment.
     """
     march = March(
-        core, plate, interaction or Interaction(), numerics or Numerics(), shots, find_device(device), threads=threads
+        core,
+        plate,
+        interaction or Interaction(),
+        numerics or Numerics(),
+        shots,
+        find_device(device),
+        threads=threads,
+        bending=bending,
     )
-    return Outcomes(**march.report(march.march(progress), np.asarray(standoffs, dtype=float), standoff_point))
+    return _outcomes(march, march.march(progress), standoffs, standoff_point)
+
+
+def _outcomes(march: March, contact: Any, standoffs: Sequence[float], standoff_point: str) -> Outcomes:
+    report = march.report(contact, np.asarray(standoffs, dtype=float), standoff_point)
+    return BentOutcomes(**report) if march.variant.bends else Outcomes(**report)
 
 
 def trace(
@@ -119,6 +152,7 @@ def replay(
     numerics: Numerics | Fidelity | None = None,
     standoffs: Sequence[float] = (),
     standoff_point: str = "centre_of_mass",
+    bending: bool = False,
     snapshots: int = 6,
 ) -> Replay:
     """One shot again on the CPU, with its history; it ends with the bits of `simulate` on the same CPU.
@@ -127,14 +161,14 @@ def replay(
         shot: shots of length 1; the others as in `simulate`.
         snapshots: how often the plate is shown, evenly from the first touch to the end.
     """
-    march = _traced(core, plate, shot, interaction, numerics)
+    march = _traced(core, plate, shot, interaction, numerics, bending=bending)
     contact = march.march()
     (trace,) = march.traces(contact)
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     cell_y, cell_z = march.nodes()
     return Replay(
-        outcomes=Outcomes(**march.report(contact, np.asarray(standoffs, dtype=float), standoff_point)),
+        outcomes=_outcomes(march, contact, standoffs, standoff_point),
         history=History.from_trace(trace, march.body()),
         plate_time=steps * time_step,
         resistance_share=np.stack([march.plate_after(count, time_step) for count in steps]),
@@ -144,7 +178,21 @@ def replay(
 
 
 def _traced(
-    core: Core, plate: Plate, shots: Shots, interaction: Interaction | None, numerics: Numerics | Fidelity | None
+    core: Core,
+    plate: Plate,
+    shots: Shots,
+    interaction: Interaction | None,
+    numerics: Numerics | Fidelity | None,
+    *,
+    bending: bool = False,
 ) -> March:
-    device = find_device("cpu")
-    return March(core, plate, interaction or Interaction(), numerics or Numerics(), shots, device, traced=True)
+    return March(
+        core,
+        plate,
+        interaction or Interaction(),
+        numerics or Numerics(),
+        shots,
+        find_device("cpu"),
+        bending=bending,
+        traced=True,
+    )

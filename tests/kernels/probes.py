@@ -99,6 +99,6 @@ def poisoned_touches(struct: Any, slots: int, surface: Any, device: str) -> Any:
     """The Touches of some slots, as the memory comes."""
     touches = struct()
     for name, variable in struct.vars.items():
-        patches = 1 if name == "ring_area" else surface.around
+        patches = 1 if name in ("ring_area", "sums") else surface.around
         setattr(touches, name, poisoned(slots * surface.rings * patches, variable.type.dtype, device))
     return touches

@@ -12,7 +12,7 @@ import xarray
 from warpimpact import results
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Shots
-from warpimpact.simulate import Outcomes
+from warpimpact.simulate import BentOutcomes, Outcomes
 
 CONTRACT = {
     "hit_y": (("hit",), "m"),
@@ -208,3 +208,5 @@ def test_every_field_of_shots_and_outcomes_has_a_variable():
     shot_names = {name.removeprefix("impact_") for name in results.SHOT_VARIABLES} | {"hit_y", "hit_z"}
     assert {field.name for field in dataclasses.fields(Shots)} == shot_names | results.SCATTER_VARIABLES.keys()
     assert {field.name for field in dataclasses.fields(Outcomes)} == set(results.OUTCOME_VARIABLES)
+    bent = {field.name for field in dataclasses.fields(BentOutcomes)}
+    assert bent == set(results.OUTCOME_VARIABLES | results.BENDING_VARIABLES)

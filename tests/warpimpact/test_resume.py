@@ -99,6 +99,31 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.nc", "timed.nc"]
 
 
+def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, output = tmp_path / "long.toml", tmp_path / "a.nc"
+    path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 100000"), encoding="utf-8")
+    command = ["run", str(path), "-o", str(output), "--device", "cpu"]
+    with subprocess.Popen(
+        [*WARPIMPACT, *command], env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.DEVNULL
+    ) as first:
+        try:
+            limit = time.monotonic() + 60.0
+            while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
+                assert first.poll() is None
+                assert time.monotonic() < limit
+                time.sleep(0.05)
+            for manner in ("--resume", "--overwrite"):
+                assert main([*command, manner]) == 2
+                sentence = f"warpimpact: error: {output}: another run is at work on it; wait for its end or name"
+                assert capsys.readouterr().err.startswith(sentence)
+            assert first.poll() is None
+        finally:
+            first.kill()
+    assert (tmp_path / "a.nc.parts" / "lock").exists()  # a killed process cleans nothing up, but holds nothing
+    assert main(["run", str(path), "-o", str(output), "--device", "cpu", "--count", "300", "--overwrite"]) == 0
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.nc", "long.toml"]
+
+
 def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: SameBits
 ) -> None:

@@ -23,6 +23,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import failed, shot_variables
 
 _QUANTILES = (0.05, 0.5, 0.95)
+_SHOWN = {"Pa": ("GPa", 1e-9)}
+"""Units of rows that are not those of the Dataset, and the factors to them."""
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
@@ -60,8 +62,10 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
     """Means and quantiles of the cores that passed the plate, with intervals."""
-    yield f"{'passed the plate':<36}{'':>10}   95 % interval"
-    for mean in main_measures(dataset["standoff"].values.tolist()):
+    yield f"{'passed the plate':<41}{'':>10}   95 % interval"
+    means = main_measures(dataset["standoff"].values.tolist())
+    bending = (name for name in ("largest_bending_moment", "bending_stress") if name in dataset)
+    for mean in (*means, *(Measure.parse(f"mean({name})") for name in bending)):
         name = mean.text.removeprefix("mean(").removesuffix(")")
         quantiles = [Measure.parse(f"quantile({name}, {share})") for share in _QUANTILES]
         for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
@@ -74,11 +78,13 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _row(measure: Measure, estimate: Estimate) -> str:
     name, what = "", f"{measure.share:.0%} below"
+    unit, factor = _SHOWN.get(measure.units, (UNITS[measure.units].strip(), 1.0))
     if measure.kind == "mean":
         at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-        name, what = f"{measure.variable.replace('_', ' ')}{at}, {UNITS[measure.units].strip()}", "mean"
-    row = f"{name:<24}{what:<12}{estimate.value:>10.2f}   {estimate.low:.2f} to {estimate.high:.2f}"
-    return f"{row:<72}spread {estimate.spread:.2f}" if measure.kind == "mean" else row
+        name, what = f"{measure.variable.replace('_', ' ')}{at}, {unit}", "mean"
+    value, low, high = (factor * number for number in (estimate.value, estimate.low, estimate.high))
+    row = f"{name:<29}{what:<12}{value:>10.2f}   {low:.2f} to {high:.2f}"
+    return f"{row:<77}spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row
 
 
 def failures(dataset: xarray.Dataset) -> Iterator[str]:

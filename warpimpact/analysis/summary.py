@@ -71,7 +71,7 @@ def estimated(
     """Measures of a result with their intervals; of an open file only a slice is in memory at a time."""
     dealt = {"replicates": int(dataset.attrs.get("replicates", 1)), "images": images(dataset)}
     tallies = [Tally(measure, **dealt, confidence=confidence) for measure in measures]
-    for part in slices(dataset[["status", *MEASURED]]):
+    for part in slices(dataset[["status", *(name for name in MEASURED if name in dataset)]]):
         for tally in tallies:
             tally.add(part)
     return {tally.measure: tally.estimate() for tally in tallies}
@@ -109,7 +109,7 @@ def summary_text(dataset: xarray.Dataset) -> str:
     return "\n".join([*rows, *stop_lines(dataset)])
 
 
-UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "1": ""}
+UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "N m": " N m", "Pa": " Pa", "m": " m", "1": ""}
 """Units as people write them."""
 
 

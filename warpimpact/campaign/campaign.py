@@ -11,6 +11,8 @@ import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
 from pydantic_core import ErrorDetails
 
+from ..bending import check_bending
+from ..results import BENDING_VARIABLES
 from ..scene import AnyCore, Hits, Impact, Interaction, Numerics, Plate, Sampler, Scatter, Symmetry, symmetries_used
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
@@ -29,12 +31,14 @@ class Output(Model):
     Attributes:
         standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
         standoff_point: the point of the core that passes them.
+        bending: whether the largest bending moment and stress of each core are reported.
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
         solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1)] = (0.05, 0.13)
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
+    bending: Annotated[bool, Field(strict=True)] = False
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
 
@@ -147,6 +151,8 @@ class Campaign(Model):
             )
         if self.replicates == 1 and self.hits.sampling == "sobol":
             raise ValueError("got hits.replicates = 1 beside stop, but an interval of a sobol sampling needs some")
+        if self.stop.measure.variable in BENDING_VARIABLES and not self.output.bending:
+            raise ValueError(f'got stop.quantity = "{self.stop.quantity}", but that needs output.bending = true')
         at = self.stop.measure.standoff
         if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
             standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)
@@ -156,6 +162,12 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _images_share_their_shot(self) -> Self:
         check_scatter(self.hits, self.scatter)
+        return self
+
+    @model_validator(mode="after")
+    def _core_has_a_bending_moment(self) -> Self:
+        if self.output.bending:
+            check_bending(self.core, self.numerics)
         return self
 
     @model_validator(mode="after")

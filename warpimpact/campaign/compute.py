@@ -55,6 +55,7 @@ def compute(
         "numerics": campaign.numerics,
         "standoffs": campaign.output.standoffs,
         "standoff_point": campaign.output.standoff_point,
+        "bending": campaign.output.bending,
         "device": device,
         "threads": threads,
     }

@@ -15,17 +15,27 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from warpimpact.campaign.intervals import Dealt, Estimate
 from warpimpact.kernels.status import Status
-from warpimpact.results import OUTCOME_VARIABLES, failed, passed
+from warpimpact.results import BENDING_VARIABLES, OUTCOME_VARIABLES, failed, passed
 from warpimpact.scene.model import Model
-from warpimpact.scene.units import Angle, Energy, Length, Number, Speed, Time, quantity, quoted
+from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 
 Array = NDArray[np.float64]
 
-_KINDS: dict[str, Any] = {"m s-1": Speed, "degree": Angle, "J": Energy, "s": Time, "1": Number}
+_KINDS: dict[str, Any] = {
+    "m s-1": Speed,
+    "degree": Angle,
+    "J": Energy,
+    "s": Time,
+    "N m": Moment,
+    "Pa": Stress,
+    "m": Length,
+    "1": Number,
+}
 """Types of the quantities that have these units in the Dataset."""
+_VARIABLES = OUTCOME_VARIABLES | BENDING_VARIABLES
 MEASURED = tuple(
     name
-    for name, variable in OUTCOME_VARIABLES.items()
+    for name, variable in _VARIABLES.items()
     if name != "status" and variable.dims in {("hit",), ("hit", "standoff")}
 )
 STATUSES = {status.name.lower(): status for status in Status if not status.failed}
@@ -84,7 +94,7 @@ class Measure:
             raise ValueError(f'got "{name}", but it must be one of {", ".join(allowed)}')
         if kind == "share":
             return cls(text, kind, name)
-        variable = OUTCOME_VARIABLES[name]
+        variable = _VARIABLES[name]
         has_standoff = "standoff" in variable.dims
         if has_standoff != (parts["standoff"] is not None):
             raise ValueError(
@@ -109,7 +119,7 @@ class Measure:
     @property
     def units(self) -> str:
         """Those of the Dataset; "1" for a probability."""
-        return "1" if self.is_binary else OUTCOME_VARIABLES[self.variable].units
+        return "1" if self.is_binary else _VARIABLES[self.variable].units
 
     def in_units(self, value: object) -> float:
         """SI value of what a person wrote for a difference of this measure."""

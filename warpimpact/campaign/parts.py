@@ -2,20 +2,21 @@
 
 Beside RESULT.nc the folder RESULT.nc.parts holds a manifest, which says what is being computed, and the shards, each
 the result of a fixed range of shots. A file is written under another name, flushed and renamed, so that whatever has
-its name is whole; a process that is killed loses what it was computing and no more.
+its name is whole; a process that is killed loses what it was computing and no more. A lock in the folder keeps a
+second run away; the system lets go of it when a process ends, however it ends.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import xarray
+from filelock import FileLock, Timeout
 
 from warpimpact import results
 from warpimpact.campaign.campaign import Campaign
@@ -23,6 +24,7 @@ from warpimpact.results import OutputError
 
 _MANIFEST = "manifest.json"
 _SHARDS = "hits_*.nc"
+_LOCK = "lock"
 FEWEST, MOST, SHARDS = 2**10, 2**16, 256
 """Shots per shard, and how many shards are aimed at between these. A shard costs some 40 ms beside its computing."""
 
@@ -69,8 +71,40 @@ def _brief(value: Any) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
+def folder_of(output: Path) -> Path:
+    """Where the shards of a result file are."""
+    return output.with_name(f"{output.name}.parts")
+
+
+@contextmanager
+def claimed(output: Path) -> Iterator[None]:
+    """Keep other runs away from a result file and its shards, whose folder is there meanwhile.
+
+    Raises:
+        OutputError: another run is at it, or the folder cannot be written into.
+    """
+    folder = folder_of(output)
+    lock = FileLock(folder / _LOCK, timeout=0)
+    try:
+        folder.mkdir(exist_ok=True)
+        lock.acquire()
+    except Timeout:
+        raise OutputError(f"{output}: another run is at work on it; wait for its end or name another file") from None
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
+    try:
+        yield
+    finally:
+        try:
+            (folder / _LOCK).unlink(missing_ok=True)
+            with suppress(OSError):  # it holds what can be resumed
+                folder.rmdir()
+        finally:
+            lock.release()
+
+
 class Parts:
-    """The shards of one run on the disk.
+    """The shards of one run on the disk, in a folder that is `claimed`.
 
     Attributes:
         output: the result file.
@@ -80,7 +114,7 @@ class Parts:
 
     def __init__(self, output: Path, content: Mapping[str, Any], total: int) -> None:
         self.output, self.content, self.total = output, content, total
-        self.folder = output.with_name(f"{output.name}.parts")
+        self.folder = folder_of(output)
         self.extent: int = content["extent"]
         self.saved: set[int] = set()
 
@@ -161,10 +195,6 @@ class Parts:
     def _start_anew(self, *, overwrite: bool) -> None:
         try:
             self.discard()
-            self.folder.mkdir()
-        except OSError as error:
-            raise OutputError(f"{self.folder}: cannot be written into ({error.strerror})") from None
-        try:
             with results.aside(self.folder / _MANIFEST) as file:
                 file.write_text(json.dumps({**self.content, "replaces": overwrite}, indent=1), encoding="utf-8")
         except OutputError:
@@ -208,9 +238,7 @@ class Parts:
         self.discard()
 
     def discard(self) -> None:
-        """Remove the folder: first its manifest, without which the rest means nothing."""
+        """Empty the folder: first of its manifest, without which the rest means nothing."""
         (self.folder / _MANIFEST).unlink(missing_ok=True)
         for path in (*self._shards(), *self.folder.glob(".*.part")):
             path.unlink()
-        with suppress(FileNotFoundError):
-            os.rmdir(self.folder)

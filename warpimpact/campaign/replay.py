@@ -14,7 +14,7 @@ from warpimpact import simulate
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.discretisation import Fidelity
 from warpimpact.refine import level
-from warpimpact.results import OUTCOME_VARIABLES, ResultError, history_dataset, shot_variables, to_dataset
+from warpimpact.results import ResultError, history_dataset, outcome_variables, shot_variables, to_dataset
 from warpimpact.scene import Numerics
 from warpimpact.unfold import image_of
 
@@ -62,6 +62,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         numerics=_numerics(campaign, result, hit),
         standoffs=list(campaign.output.standoffs),
         standoff_point=campaign.output.standoff_point,
+        bending=campaign.output.bending,
     )
     home, away = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
@@ -108,7 +109,7 @@ def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) ->
 
 
 def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
-    if _same(end, stored, tuple(OUTCOME_VARIABLES)):
+    if _same(end, stored, tuple(outcome_variables(end))):
         return "bit-identical"
     close = all(
         np.allclose(end[name], stored[name], rtol=0.0, atol=tolerance, equal_nan=True)

@@ -16,7 +16,7 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.estimates import Measure, Tally, looks
 from warpimpact.campaign.intervals import Estimate
-from warpimpact.campaign.parts import Parts, extent, manifest
+from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import OutputError, failed, images
 from warpimpact.scene import Shots
@@ -104,11 +104,12 @@ def run_to_file(
         overwrite: replace an existing file, and begin anew in place of a run that has not ended.
 
     Raises:
-        OutputError: something cannot be written, must not be overwritten or is no part of this campaign.
+        OutputError: something cannot be written, must not be overwritten or is no part of this campaign, or another
+            run is at work on it.
         DeviceError: the device is absent.
         Interrupted: by the keyboard; what is saved can be resumed.
     """
-    with team or local_team(campaign, device) as members:
+    with claimed(output), team or local_team(campaign, device) as members:
         parts = Parts(output, manifest(campaign, members.made_by), len(campaign.sampler()))
         if not parts.begin(resume=resume, overwrite=overwrite):
             return
@@ -125,7 +126,7 @@ def run_to_file(
 
 
 def _kept(parts: Parts) -> str:
-    """What a run that breaks off leaves behind; the folder goes if that is nothing."""
+    """What a run that breaks off leaves behind; the folder is emptied if that is nothing."""
     kept = parts.kept()
     if not kept:
         parts.discard()

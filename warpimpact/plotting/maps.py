@@ -21,7 +21,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
-from warpimpact.results import OUTCOME_VARIABLES, SHOT_VARIABLES, passed, status_codes
+from warpimpact.results import BENDING_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES, passed, status_codes
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 MAPPED = tuple(
     name
-    for name, variable in (SHOT_VARIABLES | OUTCOME_VARIABLES).items()
+    for name, variable in (SHOT_VARIABLES | OUTCOME_VARIABLES | BENDING_VARIABLES).items()
     if name != "status" and variable.dims in {("hit",), ("hit", "standoff")}
 )
 
@@ -56,6 +56,9 @@ _SHOWN_UNITS = {
     "degree": ("°", 1.0),
     "J": (" J", 1.0),
     "s": (" µs", 1e6),
+    "N m": (" N m", 1.0),
+    "Pa": (" GPa", 1e-9),
+    "m": (" mm", 1e3),
 }
 # Okabe and Ito's colours, which stay apart in every kind of colour blindness.
 _STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00")

@@ -1,0 +1,120 @@
+"""Bending of a core that is still counted as rigid: external against inertial loads (D'Alembert's principle).
+
+The part of the core ahead of a section bears the contact loads on it and the inertia of its slices; what they do not
+balance is the bending moment in the section. Loads come ring by ring, so the moment is known behind every ring: a
+running sum from the nose, which ends at zero at the base, where nothing follows.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import contact, core_surface, rigid_body
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the bending for one variant."""
+    real, vec3 = variant.real, variant.vec3
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    surfaces, motion, contacts = core_surface.build(variant), rigid_body.build(variant), contact.build(variant)
+    Surface, Pose, Ring = surfaces.Surface, surfaces.Pose, surfaces.Ring
+    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
+    Touches, Footprint, Sums = contacts.Touches, contacts.Footprint, contacts.Sums
+
+    @wp.struct
+    class Sections:
+        """The sections behind the rings, arrays of shape [rings]: place behind the nose and ahead of the centre of mass
+        [m], and stress per bending moment, 4/(π r³) [1/m³], 0 where it is not asked for.
+
+        With ξ the place of a slice ahead of the centre of mass, x that of the section, and per mass of the core, of all
+        slices ahead of the section: first = ∫ (ξ − x) dm [m], second = ∫ (ξ − x) ξ dm [m²] and rotary = ∫ r²/4 dm [m²].
+        """
+
+        station: wp.array(dtype=real)
+        ahead: wp.array(dtype=real)
+        stress: wp.array(dtype=real)
+        first: wp.array(dtype=real)
+        second: wp.array(dtype=real)
+        rotary: wp.array(dtype=real)
+
+    @wp.struct
+    class Bending:
+        """The largest bending moment [N m] and nominal stress [Pa] so far, and where behind the nose [m]."""
+
+        moment: real
+        moment_station: real
+        stress: real
+        stress_station: real
+
+    @wp.func
+    def mean_force(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
+        """Force on a ring [N], mean over the step, if the velocities change by (dv, dw) more than foreseen."""
+        return sums.force - half * (contacts.damping_vv(ring, sums) * dv + contacts.damping_vw(ring, sums) * dw)
+
+    @wp.func
+    def mean_moment(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
+        """Its moment about the centre of mass [N m]."""
+        coupled = wp.transpose(contacts.damping_vw(ring, sums)) * dv
+        return sums.moment - half * (coupled + contacts.damping_ww(ring, sums) * dw)
+
+    @wp.func
+    def across(vector: vec3):
+        """The axis × the vector, along the body axes."""
+        return vec3(zero, -vector[2], vector[1])
+
+    @wp.func
+    def bent(
+        before: Bending,
+        surface: Surface,
+        sections: Sections,
+        body: Body,
+        touches: Touches,
+        slot: wp.int32,
+        found: Footprint,
+        pose: Pose,
+        state: State,
+        load: Load,
+        foreseen: Change,
+        dt: real,
+    ):
+        """The largest of before and of one step, whose load changes the velocities in `state`; the loads on the rings
+        are those at half of the change that was foreseen.
+
+        A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ and turns by
+        α − ω_x J ω per rotary inertia, J ω = axis × ω: the second terms are those of spin (Euler's equations for a
+        disc, whose axial moment of inertia is twice the transverse one).
+        """
+        worst = before
+        dv, dw = motion.velocity_change(body, load, dt)
+        share = motion.restraint_of(body, state, dv, dw)
+        gyration = (pose.omega[0] * (body.inertia_axial / body.inertia_transverse - one)) * across(pose.omega)
+        spun = pose.omega[0] * across(pose.omega)
+        turning = (share / dt) * dw + gyration
+        push = across((share / dt) * dv)
+        force, moment = vec3(), vec3()
+        for index in range(surface.rings):
+            here = slot * surface.rings + index
+            if index >= found.first_ring and index <= found.last_ring and touches.ring_area[here] > zero:
+                ring = surfaces.ring_at(surface, pose, index)
+                sums = touches.sums[here]
+                force += share * mean_force(ring, sums, dv - foreseen.velocity, dw - foreseen.omega)
+                moment += share * mean_moment(ring, sums, dv - foreseen.velocity, dw - foreseen.omega)
+            inertial = body.mass * (
+                sections.first[index] * push
+                + sections.second[index] * (turning + spun)
+                + sections.rotary[index] * (turning - spun)
+            )
+            inner = moment - sections.ahead[index] * across(force) - inertial
+            size = wp.sqrt(inner[1] * inner[1] + inner[2] * inner[2])
+            if size > worst.moment:
+                worst.moment = size
+                worst.moment_station = sections.station[index]
+            if size * sections.stress[index] > worst.stress:
+                worst.stress = size * sections.stress[index]
+                worst.stress_station = sections.station[index]
+        return worst
+
+    return SimpleNamespace(Sections=Sections, Bending=Bending, bent=bent)

@@ -1,0 +1,122 @@
+"""The bending moment of a rigid rod struck across its axis, against the closed form."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warpimpact.bending import sections_of
+from warpimpact.discretisation import rings_of
+from warpimpact.kernels import bending, contact, core_surface, rigid_body
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import ProfileCore
+
+from .probes import poisoned_touches, surface_of
+
+VARIANT = Variant(double=True, bends=True)
+BENDS, MOTION, SURFACES = bending.build(VARIANT), rigid_body.build(VARIANT), core_surface.build(VARIANT)
+CONTACTS = contact.build(VARIANT)
+LENGTH, RADIUS, MASS, RINGS = 0.1, 0.1e-3, 4e-3, 201
+FORCE = 1000.0
+ROD = ProfileCore(s=(0.0, LENGTH), r=(RADIUS, RADIUS), mass=MASS)
+Body, Load, State, Change = MOTION.Body, MOTION.Load, MOTION.State, MOTION.Change
+Surface, Pose = SURFACES.Surface, SURFACES.Pose
+Footprint, Touches = CONTACTS.Footprint, CONTACTS.Touches
+Sections, Bending = BENDS.Sections, BENDS.Bending
+bent = BENDS.bent
+
+
+@wp.kernel(enable_backward=False)
+def bend(
+    surface: Surface,
+    sections: Sections,
+    body: Body,
+    touches: Touches,
+    struck: wp.int32,
+    force: wp.float64,
+    omega: wp.vec3d,
+    found: wp.array(dtype=Bending),
+):
+    """One step under a force across the axis, along the body's y, on one ring."""
+    load = Load()
+    load.force = wp.vec3d(wp.float64(0.0), force, wp.float64(0.0))
+    load.moment = wp.vec3d(wp.float64(0.0), wp.float64(0.0), surface.station[struck] * force)
+    load.touching = True
+    touches.ring_area[struck] = wp.float64(1.0)
+    sums = touches.sums[struck]
+    sums.force = load.force
+    sums.moment = load.moment
+    touches.sums[struck] = sums
+    state = State()
+    state.attitude = wp.quatd(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(1.0))
+    state.velocity = wp.vec3d(wp.float64(0.0), wp.float64(-1.0e3), wp.float64(0.0))  # the force slows it down
+    pose = Pose()
+    pose.omega = omega
+    footprint = Footprint()
+    footprint.first_ring = struck
+    footprint.last_ring = struck
+    found[0] = bent(
+        Bending(), surface, sections, body, touches, 0, footprint, pose, state, load, Change(), wp.float64(1.0e-9)
+    )
+
+
+def struck_at(share: float, device: str, omega: Any = (0.0, 0.0, 0.0), **sections: Any) -> tuple[Any, float]:
+    """What bends the rod, struck at about a share of its length behind the nose; and where exactly [m]."""
+    rings = rings_of(ROD, RINGS, 8)
+    surface = surface_of(Surface, ROD, RINGS, 8, device)
+    behind = 0.5 * LENGTH - rings.station
+    ring = int(np.argmin(np.abs(behind - share * LENGTH) + (rings.area_radial == 0.0)))  # no disc
+    struct = Sections()
+    values = vars(sections_of(ROD, rings)) | sections
+    for name, column in values.items():
+        setattr(struct, name, wp.array(column, dtype=wp.float64, device=device))
+    body, properties = Body(), ROD.mass_properties
+    body.mass, body.inertia_axial = properties.mass, properties.inertia_axial
+    body.inertia_transverse = properties.inertia_transverse
+    touches = poisoned_touches(Touches, 1, surface, device)
+    touches.sums.zero_()
+    touches.ring_area.zero_()
+    found = wp.zeros(1, dtype=Bending, device=device)
+    wp.launch(
+        bend, 1, inputs=[surface, struct, body, touches, ring, FORCE, wp.vec3d(*omega)], outputs=[found], device=device
+    )
+    return found.numpy()[0], float(behind[ring])
+
+
+def moment_of(s: Any, at: float) -> Any:
+    """Bending moment [N m] at s behind the nose of a thin uniform rod struck at `at`: with ξ = L/2 − s,
+
+    M = P (s − at)₊ − P/L ∫₀ˢ (s − s') (1 + 12 ξ(at) ξ(s')/L²) ds'.
+    """
+    lever = 12.0 * (0.5 * LENGTH - at) / LENGTH**2
+    inertia = s**2 / 2 + lever * (0.5 * LENGTH * s**2 / 2 - s**3 / 6)
+    return FORCE * (np.maximum(s - at, 0.0) - inertia / LENGTH)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.35, 0.5, 0.9])
+def test_a_thin_rod_struck_across_bends_as_in_the_closed_form(share: float, device: str) -> None:
+    found, at = struck_at(share, device)
+    s = sections_of(ROD, rings_of(ROD, RINGS, 8)).station
+    expected = np.abs(moment_of(s, at))
+    assert found["moment"] == pytest.approx(expected.max(), rel=1e-4)  # it is not infinitely thin
+    assert np.abs(moment_of(found["moment_station"], at)) == pytest.approx(expected.max(), rel=1e-4)
+    assert found["stress"] == pytest.approx(4.0 * found["moment"] / (np.pi * RADIUS**3), rel=1e-12)
+    assert found["stress_station"] == found["moment_station"]
+
+
+def test_textbook_values(device: str) -> None:
+    end, _ = struck_at(0.0, device)
+    assert end["moment"] == pytest.approx(4.0 / 27.0 * FORCE * LENGTH, rel=0.02)
+    assert end["moment_station"] == pytest.approx(LENGTH / 3.0, abs=LENGTH / RINGS)
+    middle, _ = struck_at(0.5, device)
+    assert middle["moment"] == pytest.approx(FORCE * LENGTH / 8.0, rel=0.02)
+
+
+@pytest.mark.parametrize("omega", [(0.0, 0.0, 0.0), (2e4, 300.0, -500.0)], ids=["still", "spinning"])
+def test_nothing_is_left_behind_the_base(omega: Any, device: str) -> None:
+    last = np.zeros(len(rings_of(ROD, RINGS, 8).station))
+    last[-1] = 1.0  # [1/m³]: the "stress" of the last section is its moment
+    found, _ = struck_at(0.2, device, omega, stress=last)
+    assert found["moment"] > 1.0
+    assert found["stress"] < 1e-9 * found["moment"]
