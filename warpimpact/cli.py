@@ -101,11 +101,12 @@ def _add_inspect(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def _add_plot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     parser = commands.add_parser(
         "plot",
-        help="draw the maps of a result",
-        description="Draw the maps of a result as PNG files.",
+        help="draw the maps of a result, or of several side by side",
+        description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
+        "against tilt, and how sure a map is. Of several results, maps side by side in the same colours.",
         epilog="example: warpimpact plot slotted.nc -o maps",
     )
-    parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
     parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="existing folder (default: the result's)")
     parser.set_defaults(command=_plot)
 
@@ -129,6 +130,9 @@ def _add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         type=Path,
         metavar="FOLDER",
         help="where the files are that the campaign names, such as a hit list (default: the result's folder)",
+    )
+    parser.add_argument(
+        "--animation", type=Path, metavar="HIT.gif", help="film of the hit too; HIT.mp4 where there is FFmpeg"
     )
     parser.add_argument("--overwrite", action="store_true", help="replace an existing history")
     parser.set_defaults(command=_replay)
@@ -310,14 +314,24 @@ def _inspect(arguments: argparse.Namespace) -> None:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
-    from . import results
-    from .plotting import save_maps
+    from .plotting import save_beside, save_maps
 
-    dataset = results.read(arguments.result)
-    folder = arguments.output or arguments.result.parent
+    datasets = _read_named(arguments.results)
+    folder = arguments.output or arguments.results[0].parent
     _check_folder(folder)
-    for path in save_maps(dataset, folder, arguments.result.stem):
+    ((stem, dataset), *others) = datasets.items()
+    for path in save_beside(datasets, folder) if others else save_maps(dataset, folder, stem):
         print(path)
+
+
+def _read_named(paths: Sequence[Path]) -> "dict[str, xarray.Dataset]":
+    """Results by the names of their files."""
+    from . import results
+
+    datasets = {path.stem: results.read(path) for path in paths}
+    if len(datasets) < len(paths):
+        raise results.ResultError(f"{paths[0]}: got several results of one name, but names tell them apart")
+    return datasets
 
 
 def _replay(arguments: argparse.Namespace) -> None:
@@ -325,11 +339,15 @@ def _replay(arguments: argparse.Namespace) -> None:
     from .analysis.hit import hit_text
     from .campaign.campaign import CampaignError
     from .campaign.replay import replay
+    from .plotting.animation import save_animation, writer_for
     from .plotting.trajectory import save_figures
 
-    result, path = results.read(arguments.result), arguments.result
+    result, path, film = results.read(arguments.result), arguments.result, arguments.animation
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
     _check_output(output, overwrite=arguments.overwrite)
+    if film:
+        writer_for(film)
+        _check_output(film, overwrite=arguments.overwrite)
     try:
         history = replay(result, arguments.hit, folder=arguments.campaign_folder or path.parent)
     except CampaignError as error:
@@ -338,6 +356,9 @@ def _replay(arguments: argparse.Namespace) -> None:
     print(hit_text(history))
     for written in (output, *save_figures(history, output.parent, output.stem)):
         print(written)
+    if film:
+        save_animation(history, film)
+        print(film)
 
 
 def _study(arguments: argparse.Namespace) -> None:

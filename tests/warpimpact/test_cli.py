@@ -2,11 +2,14 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import xarray
 
+from warpimpact import results
 from warpimpact.cli import main
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
@@ -122,3 +125,17 @@ def test_what_is_no_result_is_not_plotted(folder: Path, capsys: pytest.CaptureFi
     Path("a.nc").write_text("no netCDF")
     assert _refusal(["plot", "a.nc"], capsys).startswith("a.nc: cannot be read as a netCDF file")
     assert [path.name for path in folder.iterdir()] == ["a.nc"]
+
+
+def test_results_of_one_name_are_not_drawn_beside_each_other(
+    folder: Path, capsys: pytest.CaptureFixture[str], make_result: Callable[..., xarray.Dataset]
+) -> None:
+    Path("b").mkdir()
+    for path in ("a.nc", "b/a.nc", "c.nc"):
+        results.write(make_result(100), Path(path))
+    assert (
+        _refusal(["plot", "a.nc", "b/a.nc"], capsys)
+        == "a.nc: got several results of one name, but names tell them apart"
+    )
+    assert main(["plot", "a.nc", "c.nc"]) == 0
+    assert "a_c_tilt.png\n" in capsys.readouterr().out

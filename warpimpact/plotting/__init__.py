@@ -1,6 +1,18 @@
 """Figures: a Dataset goes in, a matplotlib Figure comes out."""
 
-from warpimpact.plotting.maps import hit_map, overview, save_maps, status_map
+from warpimpact.plotting.distribution import dispersion, marginals, uncertainty
+from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
 from warpimpact.plotting.study import study_figure
 
-__all__ = ["hit_map", "overview", "save_maps", "status_map", "study_figure"]
+__all__ = [
+    "dispersion",
+    "hit_map",
+    "hit_maps",
+    "marginals",
+    "overview",
+    "save_beside",
+    "save_maps",
+    "status_map",
+    "study_figure",
+    "uncertainty",
+]
