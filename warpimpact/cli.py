@@ -55,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_inspect(commands)
     _add_plot(commands)
     _add_replay(commands)
+    _add_export(commands)
     _add_study(commands)
     _add_validate(commands)
     return parser
@@ -136,6 +137,28 @@ def _add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     )
     parser.add_argument("--overwrite", action="store_true", help="replace an existing history")
     parser.set_defaults(command=_replay)
+
+
+def _add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "export",
+        help="write a result as CSV, or a replayed hit for ParaView",
+        description="Write a result as CSV with one row per hit, or the history of a hit as a folder of VTK files: "
+        "open core.pvd and plate.pvd of it in ParaView. VTK needs: pip install 'warpimpact[vtk]'",
+        epilog="example: warpimpact export slotted.nc -o slotted.csv",
+    )
+    parser.add_argument(
+        "file", type=Path, metavar="RESULT.nc|HIT.nc", help="written by warpimpact run or warpimpact replay"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="RESULT.csv|FOLDER",
+        help="CSV file, or new folder for VTK (default: the file's name, beside it, with .csv or _vtk)",
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing CSV file")
+    parser.set_defaults(command=_export)
 
 
 def _add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -359,6 +382,28 @@ def _replay(arguments: argparse.Namespace) -> None:
     if film:
         save_animation(history, film)
         print(film)
+
+
+def _export(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .export.paraview import write_vtk
+    from .export.table import write_csv
+
+    path, output = arguments.file, arguments.output
+    with results.opened_either(path) as dataset:
+        if results.is_history(dataset):
+            output = output or path.with_name(f"{path.stem}_vtk")
+            _check_folder(output.parent)
+            if output.exists():
+                raise results.OutputError(f"{output}: exists already; name a new folder")
+            written = write_vtk(dataset.load(), output)
+        else:
+            output = output or path.with_suffix(".csv")
+            _check_output(output, overwrite=arguments.overwrite)
+            write_csv(dataset, output)
+            written = [output]
+    for file in written:
+        print(file)
 
 
 def _study(arguments: argparse.Namespace) -> None:
