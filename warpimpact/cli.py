@@ -5,8 +5,8 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_plot(commands)
     _add_replay(commands)
     _add_export(commands)
+    _add_report(commands)
     _add_study(commands)
     _add_validate(commands)
     return parser
@@ -161,6 +162,33 @@ def _add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     parser.set_defaults(command=_export)
 
 
+def _add_report(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "report",
+        help="write a report as one HTML file",
+        description="Write a report of one or several results as one HTML file that works offline: what was asked, the "
+        "plates, maps to point at, trajectories to click, numbers with intervals, limits of the model.",
+        epilog="example: warpimpact report slotted.nc -o slotted.html",
+    )
+    parser.add_argument("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="REPORT.html", help="report (default: the first result's name, beside it)"
+    )
+    parser.add_argument(
+        "--trajectories",
+        type=_not_negative,
+        default=32,
+        metavar="N",
+        help="hits of each result to replay: the worst, and others spread evenly (default: 32)",
+    )
+    parser.add_argument("--study", type=Path, metavar="STUDY.nc", help="accuracy, as warpimpact study measured it")
+    parser.add_argument(
+        "--campaign-folder", type=Path, metavar="FOLDER", help="where the files are that campaigns name, as in replay"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing report")
+    parser.set_defaults(command=_report)
+
+
 def _add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     parser = commands.add_parser(
         "study",
@@ -184,6 +212,12 @@ def _add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def _positive(text: str) -> int:
     if (number := int(text)) < 1:
         raise argparse.ArgumentTypeError(f"got {number}, but it must be at least 1")
+    return number
+
+
+def _not_negative(text: str) -> int:
+    if (number := int(text)) < 0:
+        raise argparse.ArgumentTypeError(f"got {number}, but it must not be negative")
     return number
 
 
@@ -337,9 +371,11 @@ def _inspect(arguments: argparse.Namespace) -> None:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
+    from . import results
     from .plotting import save_beside, save_maps
 
-    datasets = _read_named(arguments.results)
+    datasets = {path.stem: results.read(path) for path in arguments.results}
+    _check_names(datasets, arguments.results)
     folder = arguments.output or arguments.results[0].parent
     _check_folder(folder)
     ((stem, dataset), *others) = datasets.items()
@@ -347,14 +383,11 @@ def _plot(arguments: argparse.Namespace) -> None:
         print(path)
 
 
-def _read_named(paths: Sequence[Path]) -> "dict[str, xarray.Dataset]":
-    """Results by the names of their files."""
-    from . import results
+def _check_names(datasets: "Mapping[str, xarray.Dataset]", paths: Sequence[Path]) -> None:
+    from .results import ResultError
 
-    datasets = {path.stem: results.read(path) for path in paths}
     if len(datasets) < len(paths):
-        raise results.ResultError(f"{paths[0]}: got several results of one name, but names tell them apart")
-    return datasets
+        raise ResultError(f"{paths[0]}: got several results of one name, but names tell them apart")
 
 
 def _replay(arguments: argparse.Namespace) -> None:
@@ -404,6 +437,35 @@ def _export(arguments: argparse.Namespace) -> None:
             written = [output]
     for file in written:
         print(file)
+
+
+def _report(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .campaign.campaign import CampaignError
+    from .report.report import write_report
+
+    paths = arguments.results
+    output = arguments.output or paths[0].with_suffix(".html")
+    _check_output(output, overwrite=arguments.overwrite)
+    with ExitStack() as stack:
+        datasets = {path.stem: stack.enter_context(results.opened(path)) for path in paths}
+        _check_names(datasets, paths)
+        study = results.read_study(arguments.study) if arguments.study else None
+        progress = stack.enter_context(_progress())
+        try:
+            write_report(
+                datasets,
+                output,
+                folders={path.stem: arguments.campaign_folder or path.parent for path in paths},
+                trajectories=arguments.trajectories,
+                study=study,
+                progress=progress,
+            )
+        except CampaignError as error:
+            raise CampaignError(
+                f"{error}; --campaign-folder tells where the campaign's files are, --trajectories 0 needs none"
+            ) from None
+    print(output)
 
 
 def _study(arguments: argparse.Namespace) -> None:

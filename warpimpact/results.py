@@ -445,17 +445,34 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
     Raises:
         ResultError: The file is missing, is not netCDF, or is neither.
     """
-    try:
-        dataset = xarray.open_dataset(path, engine="netcdf4")
-    except (OSError, RuntimeError) as error:
-        raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error
-    with dataset:
+    with _netcdf(path) as dataset:
         missing = (COORDINATES.keys() | VARIABLES.keys()) - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
         yield dataset
 
 
+def read_study(path: Path) -> xarray.Dataset:
+    """Read a study of speed and accuracy into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not a study.
+    """
+    with _netcdf(path) as dataset:
+        missing = (STUDY_COORDINATES.keys() | STUDY_VARIABLES.keys()) - dataset.variables.keys()
+        if missing:
+            raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
+        return dataset.load()
+
+
 def is_history(dataset: xarray.Dataset) -> bool:
     """Whether a Dataset is the history of one hit, not a map of hits."""
     return "hit" not in dataset.sizes
+
+
+def _netcdf(path: Path) -> xarray.Dataset:
+    """An open netCDF file."""
+    try:
+        return xarray.open_dataset(path, engine="netcdf4")
+    except (OSError, RuntimeError) as error:
+        raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error

@@ -112,11 +112,11 @@ def words(name: str) -> str:
 
 def shots_text(dataset: xarray.Dataset) -> str:
     """How many hits there are, at what velocity and obliquity."""
-    velocity, obliquity = (_range_text(dataset[name]) for name in ("impact_velocity", "obliquity"))
+    velocity, obliquity = (range_text(dataset[name]) for name in ("impact_velocity", "obliquity"))
     return f"{dataset.sizes['hit']} hits, {velocity}, obliquity {obliquity}"
 
 
-def _range_text(array: xarray.DataArray) -> str:
+def range_text(array: xarray.DataArray) -> str:
     """The value that all hits share, or the range of the values, with its unit."""
     unit, factor = _SHOWN_UNITS[array.attrs["units"]]
     lowest, highest = f"{array.values.min() * factor:.4g}", f"{array.values.max() * factor:.4g}"

@@ -47,8 +47,7 @@ class Pose(NamedTuple):
 
 def passage(dataset: xarray.Dataset) -> Figure:
     """The core at instants spread evenly over its way through the plate (the paper's figs. 7 and 9)."""
-    steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
-    poses = {f"{float(dataset['time'][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
+    poses = poses_in_plate(dataset)
     figure, views = two_views(dataset, poses.values(), "passage through the plate", room=5.0)
     colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
     for view, axes in views.items():
@@ -63,9 +62,7 @@ def passage(dataset: xarray.Dataset) -> Figure:
 
 def flight(dataset: xarray.Dataset) -> Figure:
     """The core on impact and at the stand-offs behind the plate, if it gets there (the paper's figs. 8 and 10)."""
-    poses = {"impact": pose_at_step(dataset, 0)}
-    if passed(dataset):
-        poses |= {f"{float(d) * _MM:g} mm": _pose_at(dataset, float(d)) for d in dataset["standoff"]}
+    poses = {"impact": pose_at_step(dataset, 0), **poses_behind(dataset)}
     figure, views = two_views(dataset, poses.values(), "on impact and behind the plate", room=15.0)
     for view, axes in views.items():
         for label, pose in poses.items():
@@ -168,6 +165,18 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
         paths.append(folder / f"{stem}_{draw.__name__}.png")
         draw(dataset).savefig(paths[-1], dpi=150)
     return paths
+
+
+def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
+    """The core at instants spread evenly over its way through the plate, by their times."""
+    steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
+    return {f"{float(dataset['time'][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
+
+
+def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
+    """The core at the stand-offs, by their distances; none of a core that does not pass the plate."""
+    standoffs = dataset["standoff"].values.tolist() if passed(dataset) else []
+    return {f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
 
 
 def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
