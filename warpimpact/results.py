@@ -81,6 +81,17 @@ OUTCOME_VARIABLES = {
     "total_yaw": Variable(("hit", "standoff"), "degree", "angle between core axis and residual velocity"),
 }
 
+SOLID_VARIABLES = {
+    f"solid_{name}": Variable(
+        tuple("solid_hit" if dim == "hit" else dim for dim in OUTCOME_VARIABLES[name].dims),
+        OUTCOME_VARIABLES[name].units,
+        f"{OUTCOME_VARIABLES[name].long_name}, solid plate of equal areal density",
+    )
+    for name in ("status", "residual_velocity", "tilt")
+}
+"""What the solid plate of equal areal density makes of the first shots; of the first one alone where no two differ but
+in where they hit. Only of a perforated plate, where `output.solid_reference` asks for it."""
+
 ESTIMATE_VARIABLES = {
     "residual_velocity_error": Variable(("hit",), "m s-1", "estimated error of the residual velocity"),
     "tilt_error": Variable(("hit", "standoff"), "degree", "estimated error of the tilt"),
@@ -214,6 +225,36 @@ def _with_flags(dataset: xarray.Dataset) -> xarray.Dataset:
         "flag_meanings": " ".join(status.name.lower() for status in Status),
     }
     return dataset
+
+
+def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
+    """What the solid plate of equal areal density makes of the first shots, to stand beside the Dataset of all.
+
+    Args:
+        outcomes: SI and radians.
+    """
+    return xarray.Dataset(
+        {
+            name: _described(variable, getattr(outcomes, name.removeprefix("solid_")))
+            for name, variable in SOLID_VARIABLES.items()
+        }
+    )
+
+
+def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
+    """Shots and outcomes of the solid plate under the names of the hits' own, along "hit"; None if there are none.
+
+    A plate that is solid is its own reference.
+    """
+    if dataset.attrs.get("open_area") == 0.0:
+        return dataset
+    if not SOLID_VARIABLES.keys() <= dataset.variables.keys():
+        return None
+    solid = dataset[list(SOLID_VARIABLES)].isel(solid_hit=slice(dataset.sizes["hit"])).load()
+    solid = solid.rename({name: name.removeprefix("solid_") for name in SOLID_VARIABLES} | {"solid_hit": "hit"})
+    shots = [name for name in (*SHOT_VARIABLES, *SCATTER_VARIABLES) if name in dataset]
+    first = dataset[shots].isel(hit=slice(solid.sizes["hit"]))
+    return solid.merge(first.load())
 
 
 def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, str | int | float]) -> xarray.Dataset:

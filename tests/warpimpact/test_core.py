@@ -133,3 +133,23 @@ def test_a_bad_profile_is_refused(tmp_path: Path, table: str, complaint: str) ->
 def test_a_core_shorter_than_its_nose_is_refused() -> None:
     with pytest.raises(ValidationError, match=r"at least as long as its nose, 0\.0102318 m"):
         OgiveCore(diameter="6.17 mm", crh=3, length="10 mm", mass="5 g")
+
+
+def test_presented_area_is_the_union_of_the_sections_seen_from_the_side() -> None:
+    """Every section is seen as an ellipse; the paper's core has no hollow."""
+    core = PolynomialCore(**PAPER, mass="4 g")
+    s = np.linspace(0.0, core.length, 4001)
+    across = np.linspace(-4e-3, 30e-3, 2001)
+    for degrees in (10.0, 45.0, 80.0):
+        angle = np.radians(degrees)
+        chord = core.radius(s) ** 2 - ((across[:, None] - s * np.sin(angle)) / np.cos(angle)) ** 2
+        union = 2.0 * np.trapezoid(np.sqrt(np.maximum(chord.max(axis=1), 0.0)), across)
+        assert core.presented_area(np.array(angle)) == pytest.approx(union, rel=1e-3)
+    ends = core.presented_area(np.array([0.0, np.pi, np.pi / 2]))
+    broadside = 2.0 * np.trapezoid(core.radius(s), s)
+    assert ends == pytest.approx([np.pi * core.max_radius**2, np.pi * core.max_radius**2, broadside], rel=2e-4)
+
+
+def test_presented_area_fills_hollows() -> None:
+    waisted = ProfileCore(s=[0.0, 0.01, 0.02], r=[0.003, 0.001, 0.003], mass="4 g")
+    assert waisted.presented_area(np.array(np.pi / 2)) == pytest.approx(0.006 * 0.02)

@@ -14,6 +14,7 @@ from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.summary import estimated
 from warpimpact.campaign import compute as computing
 from warpimpact.campaign import parts
+from warpimpact.campaign.campaign import Output
 from warpimpact.campaign.estimates import Measure, Stop, Tally
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, run_to_file
@@ -38,7 +39,7 @@ ROUNDING = {"m s-1": 1e-10, "degree": 1e-10, "rad s-1": 1e-8, "J": 1e-9, "s": 1e
 def campaign(pattern: Any = SLOTS, impact: Impact = STRAIGHT, count: int = 32, **changes: Any) -> Campaign:
     plate = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05, degradation=0.8, pattern=pattern)
     usual: dict[str, Any] = {"title": "a test", "core": CORE, "plate": plate, "impact": impact}
-    usual |= {"numerics": Numerics(fidelity="draft", precision="double")}
+    usual |= {"numerics": Numerics(fidelity="draft", precision="double"), "output": Output(solid_reference=False)}
     return Campaign(**usual | {"hits": Hits(count=count, seed=2, irreducible=True)} | changes)
 
 

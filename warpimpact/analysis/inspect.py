@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import xarray
 
+from warpimpact.analysis.effectiveness import effectiveness_text
 from warpimpact.analysis.summary import UNITS, estimated, main_measures, slices, stop_lines, symmetry_text
-from warpimpact.campaign.estimates import STATUSES, Estimate, Measure
+from warpimpact.campaign.estimates import STATUSES, Measure
+from warpimpact.campaign.intervals import Estimate
 from warpimpact.kernels.status import Status
 from warpimpact.results import SCATTER_VARIABLES, SHOT_VARIABLES, failed
 
@@ -22,7 +24,8 @@ _SAMPLINGS = {
 
 def inspect_text(dataset: xarray.Dataset) -> str:
     """All that a person may ask of a hit map, as text; of an open file only a part is in memory at a time."""
-    return "\n".join([*_origin(dataset), "", *_statuses(dataset), "", *_numbers(dataset), "", *failures(dataset)])
+    tables = [_origin(dataset), _statuses(dataset), _numbers(dataset), [effectiveness_text(dataset)], failures(dataset)]
+    return "\n\n".join("\n".join(table) for table in tables)
 
 
 def _origin(dataset: xarray.Dataset) -> Iterator[str]:

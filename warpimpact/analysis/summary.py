@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 
-from warpimpact.campaign.estimates import MEASURED, Estimate, Measure, Tally
+from warpimpact.campaign.estimates import MEASURED, Measure, Tally
+from warpimpact.campaign.intervals import Estimate
 from warpimpact.results import images, status_codes
 
 SLICE = 2**18

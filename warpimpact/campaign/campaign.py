@@ -30,11 +30,13 @@ class Output(Model):
         standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
         standoff_point: the point of the core that passes them.
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
+        solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1)] = (0.05, 0.13)
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
+    solid_reference: Annotated[bool, Field(strict=True)] = True
 
     @field_validator("standoffs")
     @classmethod

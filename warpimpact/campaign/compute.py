@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -14,10 +16,10 @@ import xarray
 import warpimpact
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.discretisation import resolve
-from warpimpact.refine import LADDER, simulate_to_tolerance
-from warpimpact.results import to_dataset
-from warpimpact.scene import Shots, Symmetry
-from warpimpact.simulate import Progress, find_device, simulate
+from warpimpact.refine import LADDER, Estimates, simulate_to_tolerance
+from warpimpact.results import solid_dataset, to_dataset
+from warpimpact.scene import Plate, Shots, Symmetry
+from warpimpact.simulate import Outcomes, Progress, find_device, simulate
 from warpimpact.unfold import unfolded, unfolded_estimates
 
 
@@ -25,6 +27,7 @@ def compute(
     campaign: Campaign,
     shots: Shots,
     *,
+    solid: Shots | None = None,
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -33,6 +36,7 @@ def compute(
 
     Args:
         shots: whole groups of images, as the campaign's sampler gives them.
+        solid: shots at the solid plate of equal areal density, too; None are none.
         device, threads, progress: as in `simulate`.
 
     Returns:
@@ -51,16 +55,13 @@ def compute(
         "standoff_point": campaign.output.standoff_point,
         "device": device,
         "threads": threads,
-        "progress": progress and (lambda done, total: progress(done * len(group), total * len(group))),
     }
+    follow = progress and (lambda done, total: progress(done * len(group), total * len(group)))
     begin = time.perf_counter()
-    if campaign.numerics.tolerance is None:
-        outcomes, estimates = simulate(campaign.core, campaign.plate, computed, **how), None
-    else:
-        outcomes, estimates = simulate_to_tolerance(campaign.core, campaign.plate, computed, **how)
+    outcomes, estimates = _outcomes(campaign, campaign.plate, computed, **how, progress=follow)
     elapsed = time.perf_counter() - begin
     period, chosen = campaign.plate.sampled_cell, find_device(device)
-    return to_dataset(
+    dataset = to_dataset(
         shots,
         unfolded(outcomes, group),
         standoffs=np.array(campaign.output.standoffs),
@@ -79,6 +80,8 @@ def compute(
             "standoff_point": campaign.output.standoff_point,
             "open_area": campaign.plate.open_area,
             "areal_density": campaign.plate.areal_density,
+            "core": campaign.core.model_dump_json(),
+            "impact": _impact(campaign),
             "numerics": _numerics(campaign),
             "failed_share": campaign.output.failed_share,
             "compute_time": elapsed,
@@ -87,6 +90,27 @@ def compute(
         | ({} if campaign.hits.count is None else {"count": campaign.hits.count})
         | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {}),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
+    )
+    if solid is None:
+        return dataset
+    thinner = campaign.plate.solid
+    if solid.thickness is not None:
+        solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
+    return dataset.merge(solid_dataset(_outcomes(campaign, thinner, solid, **how)[0]))
+
+
+def _outcomes(campaign: Campaign, plate: Plate, shots: Shots, **how: Any) -> tuple[Outcomes, Estimates | None]:
+    """Outcomes on a plate, with estimates of their errors where the campaign has a tolerance."""
+    if campaign.numerics.tolerance is None:
+        return simulate(campaign.core, plate, shots, **how), None
+    return simulate_to_tolerance(campaign.core, plate, shots, **how)
+
+
+def _impact(campaign: Campaign) -> str:
+    """How the core arrives, as JSON: of each quantity its value or its distribution."""
+    scatter = campaign.scatter.given
+    return json.dumps(
+        {name: scatter[name].model_dump() if name in scatter else value for name, value in campaign.impact}
     )
 
 

@@ -1,16 +1,10 @@
-"""Numbers of a campaign with their confidence intervals: means, quantiles and probabilities.
-
-Of independent shots the intervals are Student's for a mean, Wilson's for a probability and that of the order
-statistics for a quantile. Points of a Sobol sampling are not independent; there the shots are dealt out to
-independent scramblings, and Student's interval over the answers of these replicates holds (A. B. Owen, Monte Carlo
-theory, methods and examples, chapter 17).
-"""
+"""Numbers of a campaign that a person can ask for, means, quantiles and probabilities, and when to stop for one."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
@@ -19,6 +13,7 @@ import xarray
 from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
+from warpimpact.campaign.intervals import Dealt, Estimate
 from warpimpact.kernels.status import Status
 from warpimpact.results import OUTCOME_VARIABLES, failed, passed
 from warpimpact.scene.model import Model
@@ -179,161 +174,26 @@ class Stop(Model):
         return Measure.parse(self.quantity)
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """A measure's value and its interval, in the units of the Dataset; NaN where there is none.
-
-    Attributes:
-        count: shots that it counts.
-        spread: standard deviation over these shots.
-    """
-
-    value: float
-    low: float
-    high: float
-    count: int
-    spread: float
-
-    @property
-    def half_width(self) -> float:
-        """Half of the interval's length."""
-        return 0.5 * (self.high - self.low)
-
-
 class Tally:
     """Gathers a measure over shots, in the order of their numbers.
 
     Means and probabilities take a few numbers whatever the count; a quantile keeps one number per shot.
 
     Args:
-        replicates: independent scramblings that the shots are dealt out to in turn; 1 if they are independent.
-        images: how many shots in a row are images of each other, which tell as much as one of them.
+        dealt: `replicates`, `images` and `confidence` as in `Dealt`.
     """
 
-    def __init__(self, measure: Measure, *, replicates: int = 1, images: int = 1, confidence: float = 0.95) -> None:
-        self.measure, self.confidence, self._images = measure, confidence, images
-        self._replicates = [_Sample(keeps=measure.kind == "quantile") for _ in range(replicates)]
-        self._shots = 0
+    def __init__(self, measure: Measure, **dealt: Any) -> None:
+        kind = "share" if measure.is_binary else measure.kind
+        self.measure, self._dealt = measure, Dealt(kind, share=measure.share, **dealt)
 
     def add(self, dataset: xarray.Dataset) -> None:
         """Take in the shots that follow."""
-        values, replicates = self.measure.values(dataset), len(self._replicates)
-        dealt_to = (self._shots + np.arange(len(values))) // self._images % replicates
-        for replicate, sample in enumerate(self._replicates):
-            mine = values[dealt_to == replicate]
-            sample.add(mine[~np.isnan(mine)])
-        self._shots += len(values)
+        self._dealt.add(self.measure.values(dataset))
 
     def estimate(self) -> Estimate:
         """What the shots so far say."""
-        pooled = _Sample.pooled(self._replicates)
-        if pooled.count == 0:
-            return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
-        value = pooled.quantile(self.measure.share) if self.measure.kind == "quantile" else pooled.mean
-        interval = self._of_replicates(pooled, value) or self._independent(pooled)
-        return Estimate(value, *interval, pooled.count, pooled.deviation)
-
-    def _of_replicates(self, pooled: _Sample, value: float) -> tuple[float, float] | None:
-        """Interval from the spread of the replicates, None where there is none to tell from.
-
-        That of a quantile is Woodruff's: the replicates say how certain the share below it is (R. S. Woodruff, Journal
-        of the American Statistical Association 47 (1952) 635). Their own quantiles would be biased.
-        """
-        replicates = [sample for sample in self._replicates if sample.count]
-        if len(replicates) < 2:
-            return None
-        quantile = self.measure.kind == "quantile"
-        answers = [float((one.values <= value).mean()) if quantile else one.mean for one in replicates]
-        half = _student(self.confidence, len(answers)) * float(np.std(answers, ddof=1))
-        # Replicates that all say the same of something that happens or not (never, mostly) tell nothing.
-        if half == 0.0 and (quantile or self.measure.is_binary):
-            return None
-        if not quantile:
-            return value - half, value + half
-        ends = (self.measure.share - half, self.measure.share + half)
-        low, high = (pooled.quantile(end) if 0.0 < end < 1.0 else math.nan for end in ends)
-        return low, high
-
-    def _independent(self, sample: _Sample) -> tuple[float, float]:
-        """Interval as of independent shots; images of each other count as one."""
-        from scipy import stats  # a second to import
-
-        count = math.ceil(sample.count / self._images)
-        if self.measure.kind == "quantile":
-            tail = 0.5 * (1.0 - self.confidence)
-            ends = stats.binom.ppf([tail, 1.0 - tail], count, self.measure.share).astype(int)
-            ordered = np.sort(sample.values)[:: self._images]
-            low, high = ends[0] - 1, ends[1]
-            return (
-                float(ordered[low]) if low >= 0 else math.nan,
-                float(ordered[high]) if high < count else math.nan,
-            )
-        if self.measure.is_binary:
-            successes = round(sample.mean * count)
-            interval = stats.binomtest(successes, count).proportion_ci(self.confidence, method="wilson")
-            return float(interval.low), float(interval.high)
-        if count < 2:
-            return math.nan, math.nan
-        unbiased = sample.deviation * math.sqrt(count / (count - 1))
-        half = _student(self.confidence, count) * unbiased
-        return sample.mean - half, sample.mean + half
-
-
-def _student(confidence: float, count: int) -> float:
-    """Half width of the interval of a mean of `count` numbers, in their standard deviations."""
-    from scipy import stats
-
-    return float(stats.t.isf(0.5 * (1.0 - confidence), count - 1)) / math.sqrt(count)
-
-
-class _Sample:
-    """Count, mean and sum of squared deviations of numbers, and if it keeps them the numbers themselves."""
-
-    def __init__(self, *, keeps: bool) -> None:
-        self.count, self.mean, self._squares = 0, 0.0, 0.0
-        self._kept: list[Array] | None = [] if keeps else None
-
-    @classmethod
-    def pooled(cls, samples: Sequence[_Sample]) -> _Sample:
-        """All numbers of some samples."""
-        if len(samples) == 1:
-            return samples[0]
-        whole = cls(keeps=samples[0]._kept is not None)
-        for sample in samples:
-            whole._merge(sample.count, sample.mean, sample._squares)
-            if whole._kept is not None:
-                whole._kept.append(sample.values)
-        return whole
-
-    def add(self, values: Array) -> None:
-        """Take in numbers; none is NaN."""
-        if len(values):
-            mean = float(values.mean())
-            self._merge(len(values), mean, float(np.square(values - mean).sum()))
-            if self._kept is not None:
-                self._kept.append(values)
-
-    def _merge(self, count: int, mean: float, squares: float) -> None:
-        """T. F. Chan, G. H. Golub, R. J. LeVeque, The American Statistician 37 (1983) 242."""
-        if count:
-            total, apart = self.count + count, mean - self.mean
-            self._squares += squares + apart * apart * self.count * count / total
-            self.mean += apart * count / total
-            self.count = total
-
-    @property
-    def deviation(self) -> float:
-        """Standard deviation of the numbers themselves (ddof = 0)."""
-        return math.sqrt(self._squares / self.count) if self.count else math.nan
-
-    @property
-    def values(self) -> Array:
-        """The numbers, if it keeps them."""
-        return np.concatenate(self._kept) if self._kept else np.empty(0)
-
-    def quantile(self, share: float) -> float:
-        """Value below which this share of the numbers lies."""
-        return float(np.quantile(self.values, share, method="hazen"))
+        return self._dealt.estimate()
 
 
 def looks(sampling: str, shards: int) -> Iterator[int]:

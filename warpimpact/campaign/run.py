@@ -10,16 +10,21 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.estimates import Estimate, Measure, Tally, looks
+from warpimpact.campaign.estimates import Measure, Tally, looks
+from warpimpact.campaign.intervals import Estimate
 from warpimpact.campaign.parts import Parts, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import OutputError, failed, images
+from warpimpact.scene import Shots
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""
+_MOST_SOLID = 2**12
+"""Shots at most at the solid plate of equal areal density."""
 
 
 @dataclass(frozen=True)
@@ -181,7 +186,8 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
             width = team.width()
             while len(waiting) < width and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
-                waiting[team.submit(shots)] = task
+                solid = _solid_shots(campaign, shots[: store.extent]) if task.start == 0 else None
+                waiting[team.submit(shots, solid)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
             for future in finished:
                 task = waiting.pop(future)
@@ -194,6 +200,17 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
             future.cancel()
     follow(watch.standing(0))
     return watch.end
+
+
+def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
+    """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
+    differ but in where they hit."""
+    plate = campaign.plate
+    if not campaign.output.solid_reference or plate.solid == plate:
+        return None
+    conditions = [values for name, values in shots.columns.items() if name not in ("hit_y", "hit_z")]
+    alike = plate.size is None and not any(np.ptp(values) for values in conditions)
+    return shots[: 1 if alike else _MOST_SOLID]
 
 
 def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
@@ -212,10 +229,13 @@ def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
 
 
 def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[int, xarray.Dataset]]:
-    """The shards of a task, each with its share of the time and of what was computed."""
+    """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
+    the solid reference."""
     hits = dataset.sizes["hit"]
     for place, index in enumerate(task):
         shard = dataset.isel(hit=slice(place * size, (place + 1) * size))
+        if index:
+            shard = shard.drop_dims("solid_hit", errors="ignore")
         time = dataset.attrs["compute_time"] * shard.sizes["hit"] / hits
         yield index, shard.assign_attrs(compute_time=time, **_computed(dataset, shard.sizes["hit"]))
 

@@ -32,14 +32,15 @@ class Team:
     """Computes shots in the background.
 
     Attributes:
-        submit: hands over shots; their Dataset comes in the future.
+        submit: hands over shots, and those of them that the solid reference takes, too; their Dataset comes in the
+            future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
         made_by: versions and kind of device, which decide the bits.
         underway: how many shots of unfinished tasks are done.
     """
 
-    submit: Callable[[Shots], Future[xarray.Dataset]]
+    submit: Callable[[Shots, Shots | None], Future[xarray.Dataset]]
     width: Callable[[], int]
     task: int
     made_by: dict[str, str]
@@ -61,7 +62,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     for chosen in devices:
         idle.put(str(chosen))
 
-    def work(shots: Shots) -> xarray.Dataset:
+    def work(shots: Shots, solid: Shots | None) -> xarray.Dataset:
         name, thread = idle.get(), threading.get_ident()
 
         def progress(finished: int, total: int) -> None:
@@ -70,7 +71,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
             done[thread] = finished
 
         try:
-            return compute(campaign, shots, device=name, progress=progress)
+            return compute(campaign, shots, solid=solid, device=name, progress=progress)
         finally:
             done[thread] = 0
             idle.put(name)
@@ -78,7 +79,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
     try:
         yield Team(
-            submit=lambda shots: pool.submit(work, shots),
+            submit=lambda shots, solid: pool.submit(work, shots, solid),
             width=lambda: 2 * len(devices),
             task=_task_size(kind),
             made_by=kind,
@@ -131,7 +132,7 @@ def cluster_team(
         executor = client.get_executor(pure=False)
         try:
             yield Team(
-                submit=lambda shots: executor.submit(_compute_alike, campaign, shots, device, threads, kind),
+                submit=lambda *shots: executor.submit(_compute_alike, campaign, *shots, device, threads, kind),
                 width=lambda: 2 * max(1, sum(client.nthreads().values())),
                 task=_task_size(kind),
                 made_by=kind,
@@ -152,7 +153,12 @@ def _ignoring_interrupts(plugin: Any) -> Any:
 
 
 def _compute_alike(
-    campaign: Campaign, shots: Shots, device: str, threads: int | None, kind: dict[str, str]
+    campaign: Campaign,
+    shots: Shots,
+    solid: Shots | None,
+    device: str,
+    threads: int | None,
+    kind: dict[str, str],
 ) -> xarray.Dataset:
     """Compute shots on a worker that gives the same bits as the others."""
     own = made_by(device)
@@ -161,7 +167,7 @@ def _compute_alike(
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    return compute(campaign, shots, device=device, threads=threads)
+    return compute(campaign, shots, solid=solid, device=device, threads=threads)
 
 
 def _devices(names: str) -> list[Any]:

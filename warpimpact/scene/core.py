@@ -16,6 +16,7 @@ from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLen
 # Gauss–Legendre on 32 nodes is exact to degree 63: r⁴ of any polynomial core up to degree 15.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
 _OUTLINE_STATIONS = 1001  # per smooth stretch of the profile
+_SILHOUETTE_STATIONS = 101  # likewise; chords lose 1e-4 of the area
 
 
 class MassProperties(NamedTuple):
@@ -109,6 +110,32 @@ class Core(Model, ABC):
         """Largest distance of a surface point from the centre of mass [m]."""
         s = np.concatenate([np.linspace(a, b, _OUTLINE_STATIONS) for a, b in self._stretches()])
         return float(np.hypot(s - self.mass_properties.centre_of_mass, self.radius(s)).max())
+
+    def presented_area(self, inclination: Array) -> Array:
+        """Area of the silhouette in the line of sight that the axis is inclined to [m²].
+
+        That of a convex body is half of ∮ |n·d| dS (Cauchy). Between stations the body is a frustum, whose normal makes
+        one angle with the axis; a hollow in the profile counts as filled, as far as a line across it reaches.
+
+        Args:
+            inclination: between axis and line of sight [rad]; nose or base first is the same.
+
+        Returns:
+            Of the same shape.
+        """
+        from scipy.spatial import ConvexHull  # half a second to import
+
+        s = np.concatenate([np.linspace(a, b, _SILHOUETTE_STATIONS) for a, b in self._stretches()])
+        outline = np.column_stack([[0.0, *s, self.length], [0.0, *self.radius(s), 0.0]])
+        outline = outline[ConvexHull(outline).vertices]
+        along, outwards = (np.roll(outline, -1, axis=0) - outline).T
+        area = np.pi * (np.roll(outline[:, 1], -1) + outline[:, 1])  # of a frustum, per length of its line
+        of_axial = np.abs(outwards * np.cos(inclination)[..., None])
+        of_radial = np.abs(along * np.sin(inclination)[..., None])
+        ratio = np.divide(of_axial, of_radial, out=np.ones_like(of_radial), where=of_radial > of_axial)
+        # Mean of |a + b cos φ| around the axis, and a where it has one sign.
+        mean = of_axial * (1.0 - 2.0 / np.pi * np.arccos(ratio)) + of_radial * 2.0 / np.pi * np.sqrt(1.0 - ratio**2)
+        return np.asarray(0.5 * (area * mean).sum(axis=-1))
 
     def _stretches(self) -> list[tuple[float, float]]:
         return list(pairwise((0.0, *self.breaks, self.length)))

@@ -1,6 +1,6 @@
 """Plate: a thickness of resisting material with holes (MODEL §3, §4)."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field
@@ -57,6 +57,11 @@ class Plate(Model):
         """Extent (y, z) of the cell that hits are spread over [m]: the unit cell, or a plate smaller than it."""
         cell_y, cell_z = self.pattern.period
         return (cell_y, cell_z) if self.size is None else (min(cell_y, self.size[0]), min(cell_z, self.size[1]))
+
+    @property
+    def solid(self) -> Self:
+        """The plate without holes of the same areal density, of the same material."""
+        return self.model_copy(update={"thickness": self.thickness * (1.0 - self.open_area), "pattern": NoPattern()})
 
     @property
     def areal_density(self) -> float:

@@ -1,0 +1,200 @@
+"""Effectiveness against values computed by hand, and intervals that hold as often as they say."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import ConeCore
+from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiveness_text, worst_tenth
+from warpimpact.analysis.inspect import inspect_text
+from warpimpact.campaign.intervals import estimate_of
+from warpimpact.kernels.status import Status
+from warpimpact.results import ResultError
+
+TRIALS = 150
+LEAST = 134  # 95 % of 150 trials: 142.5 ± 2.7, three standard deviations below
+CYLINDER = ConeCore(diameter="6 mm", length="20 mm", cone_length="1 nm", mass="4 g")
+
+
+def result_of(
+    velocity: np.ndarray, tilt: np.ndarray | float = 0.0, status: np.ndarray | int = Status.PERFORATED, **told: object
+) -> xarray.Dataset:
+    """Shots of 1000 m/s with these residual velocities [m/s], tilts at 130 mm [degree] and ends."""
+    hits = len(velocity)
+    variables = {
+        "status": np.full(hits, status, dtype=np.int8),
+        "impact_velocity": np.full(hits, 1000.0),
+        "residual_velocity": velocity,
+    }
+    dataset = xarray.Dataset({name: ("hit", values) for name, values in variables.items()}, {"standoff": [0.05, 0.13]})
+    tilts = np.stack([np.zeros(hits), np.broadcast_to(tilt, hits)], axis=1)
+    return dataset.assign(tilt=(("hit", "standoff"), tilts)).assign_attrs(core=CYLINDER.model_dump_json(), **told)
+
+
+def with_solid(dataset: xarray.Dataset, velocity: np.ndarray) -> xarray.Dataset:
+    """The same with these residual velocities of the solid plate [m/s]."""
+    shots = len(velocity)
+    return dataset.assign(
+        solid_status=("solid_hit", np.zeros(shots, dtype=np.int8)),
+        solid_residual_velocity=("solid_hit", velocity),
+        solid_tilt=(("solid_hit", "standoff"), np.zeros((shots, 2))),
+    )
+
+
+def named(dataset: xarray.Dataset, **options: float) -> dict[str, Measure]:
+    return {measure.name: measure for measure in effectiveness(dataset, **options)}
+
+
+ENDS = [Status.PERFORATED, Status.MISSED, Status.ARRESTED, Status.RICOCHETED, Status.UNFINISHED, Status.PERFORATED]
+MIXED = result_of(
+    np.array([800.0, 1000.0, 0.0, 500.0, np.nan, 600.0]),
+    np.array([20.0, 90.0, np.nan, np.nan, np.nan, 170.0]),
+    np.array(ENDS),
+)
+
+
+def test_what_counts_where() -> None:
+    measures = named(MIXED)
+    assert measures["residual_energy_fraction"].value == pytest.approx((0.64 + 1.0 + 0.0 + 0.0 + 0.36) / 5)
+    assert measures["residual_energy_fraction_worst_point"].value == pytest.approx(1.0)
+    assert measures["residual_energy_fraction_worst_point"].hit == 1
+    assert measures["stopped_share"].value == pytest.approx(2 / 5)
+    assert measures["tilted_share"].value == pytest.approx(3 / 5)  # broadside and stopped; not 20°, nor base first
+    assert named(MIXED, angle=math.radians(5.0))["tilted_share"].value == pytest.approx(5 / 5)
+    assert named(MIXED, standoff=0.05)["tilted_share"].value == pytest.approx(2 / 5)
+
+
+def test_energy_per_area_is_that_of_a_cylinder_and_symmetric_about_broadside() -> None:
+    def density(tilt: float) -> float:
+        return named(result_of(np.array([700.0]), tilt))["residual_energy_density"].value
+
+    energy, end, side = 0.5 * 0.004 * 700.0**2, math.pi * 3.0**2, 6.0 * 20.0  # [J], [mm²]
+    assert density(0.0) == pytest.approx(energy / end, rel=1e-5)
+    assert density(90.0) == pytest.approx(energy / side, rel=1e-5)
+    slope = math.radians(35.0)
+    assert density(35.0) == pytest.approx(energy / (end * math.cos(slope) + side * math.sin(slope)), rel=1e-4)
+    assert density(145.0) == density(35.0)
+    heavier = result_of(np.array([700.0])).assign(mass=("hit", [0.008]))
+    assert named(heavier)["residual_energy_density"].value == pytest.approx(2 * energy / end, rel=1e-5)
+
+
+def test_the_worst_tenth_is_the_mean_of_the_worst_tenth() -> None:
+    for count in (10, 400, 1000):
+        values = np.random.default_rng(count).random(count)
+        assert worst_tenth(values).mean() == pytest.approx(np.sort(values)[-count // 10 :].mean(), rel=1e-12)
+    quarter = np.arange(25.0)  # a tenth of 25 is two and a half
+    assert worst_tenth(quarter).mean() == pytest.approx((24 + 23 + 22 / 2) / 2.5)
+    assert np.isnan(worst_tenth(np.array([1.0, np.nan]))).tolist() == [False, True]
+
+
+def test_numbers_without_a_valid_interval_have_none() -> None:
+    few, many = (named(result_of(np.linspace(500.0, 900.0, count))) for count in (399, 400))
+    name = "residual_energy_fraction_worst_tenth"
+    assert math.isnan(few[name].low)
+    assert many[name].low < many[name].value < many[name].high
+    assert math.isnan(many["residual_energy_fraction_worst_point"].low)
+    images = result_of(np.linspace(500.0, 900.0, 400), symmetries="(y, z), (-y, z)")
+    assert math.isnan(named(images)[name].low)
+
+
+def test_failed_computations_alone_tell_nothing() -> None:
+    failed = result_of(np.full(3, np.nan), status=Status.UNFINISHED)
+    assert all(math.isnan(measure.value) and measure.hit is None for measure in effectiveness(failed))
+    assert "nan" not in effectiveness_text(failed)
+
+
+TAILS: dict[str, tuple[Callable[[np.random.Generator, int], np.ndarray], float]] = {
+    "uniform": (lambda numbers, count: numbers.random(count), 0.95),
+    "exponential": (lambda numbers, count: numbers.exponential(size=count), 1.0 + math.log(10.0)),
+}
+
+
+@pytest.mark.parametrize("name", TAILS)
+def test_intervals_of_the_worst_tenth_hold_as_often_as_they_say(name: str) -> None:
+    draw, truth = TAILS[name]
+    held, numbers = 0, np.random.default_rng(11)
+    for _ in range(TRIALS):
+        estimate = estimate_of("mean", worst_tenth(draw(numbers, 1000)))
+        held += estimate.low <= truth <= estimate.high
+    assert held >= LEAST
+
+
+def test_intervals_of_the_worst_tenth_of_replicates_hold_and_are_narrower() -> None:
+    from scipy.stats.qmc import Sobol
+
+    held, widths = 0, []
+    for seed in range(TRIALS):
+        points = [Sobol(2, rng=np.random.default_rng([seed, replicate])).random(64) for replicate in range(16)]
+        sums = np.stack(points).sum(axis=2).T.reshape(-1)  # shot k belongs to replicate k mod 16
+        estimate = estimate_of("mean", worst_tenth(sums), replicates=16)
+        # Of the triangular distribution on 0 to 2: the mean above 2 − √0.2 is 2 − ⅔ √0.2.
+        held += estimate.low <= 2.0 - 2.0 / 3.0 * math.sqrt(0.2) <= estimate.high
+        widths.append(estimate.half_width)
+    assert held >= LEAST
+    assert np.median(widths) < 0.8 * estimate_of("mean", worst_tenth(sums)).half_width
+
+
+@pytest.mark.parametrize("count", [400, 1600])
+def test_intervals_of_the_ratio_hold_as_often_as_they_say(count: int) -> None:
+    """Velocities that the impact scatters, on both plates alike; the solid plate has only the first 400 shots."""
+    held, numbers, widths = 0, np.random.default_rng(5), []
+    for _ in range(TRIALS):
+        common = numbers.uniform(0.5, 1.0, count)
+        fraction = 0.8 * common + numbers.uniform(0.0, 0.2, count)
+        dataset = with_solid(result_of(1000.0 * np.sqrt(fraction)), 1000.0 * np.sqrt(common[:400]))
+        measure = named(dataset)["residual_energy_fraction"]
+        held += measure.ratio_low <= (0.8 * 0.75 + 0.1) / 0.75 <= measure.ratio_high
+        widths.append((measure.ratio_high - measure.ratio_low) / (measure.high - measure.low) * measure.solid)
+    assert held >= LEAST
+    if count == 400:
+        assert np.median(widths) < 0.6  # what moves both plates alike is no error of the ratio
+
+
+def test_one_shot_at_the_solid_plate_serves_all() -> None:
+    dataset = with_solid(result_of(np.linspace(500.0, 900.0, 1000)), np.array([800.0]))
+    measures = named(dataset)
+    mean, worst = measures["residual_energy_fraction"], measures["residual_energy_fraction_worst_point"]
+    assert (mean.solid, mean.ratio) == (pytest.approx(0.64), pytest.approx(mean.value / 0.64))
+    assert (mean.ratio_low, mean.ratio_high) == (pytest.approx(mean.low / 0.64), pytest.approx(mean.high / 0.64))
+    assert worst.ratio == pytest.approx(0.81 / 0.64)
+    assert math.isnan(measures["tilted_share"].ratio)  # the solid plate tilts none
+    assert measures["tilted_share"].solid == 0.0
+
+
+def test_a_solid_plate_is_its_own_reference() -> None:
+    dataset = result_of(
+        np.linspace(500.0, 900.0, 1000), np.linspace(0.0, 60.0, 1000), open_area=0.0, areal_density=31.4
+    )
+    for measure in effectiveness(dataset):
+        if measure.solid > 0.0:
+            assert measure.ratio == pytest.approx(1.0)
+            if measure.hit is None:
+                assert (measure.ratio_low, measure.ratio_high) == (pytest.approx(1.0), pytest.approx(1.0))
+
+
+def test_a_stand_off_that_is_not_there_is_refused() -> None:
+    with pytest.raises(ResultError, match=r"^standoff: got 100 mm, but the result has 50 mm, 130 mm$"):
+        effectiveness(MIXED, standoff=0.1)
+
+
+def test_every_measure_is_defined_and_cited() -> None:
+    for measure in effectiveness(MIXED):
+        assert measure.definition.endswith(".")
+        assert measure.source
+
+
+def test_the_table_says_what_a_result_carries(make_result) -> None:
+    by_hand = make_result(8)
+    text = inspect_text(by_hand)
+    assert "residual energy fraction, mean" in text
+    assert "solid plate" not in text  # no reference
+    assert "proxy" not in text  # no core
+    told = effectiveness_text(with_solid(MIXED, np.array([800.0])).assign_attrs(open_area=0.25, areal_density=23.55))
+    head, first, *_ = told.splitlines()
+    assert head.startswith("effectiveness, 23.55 kg/m², 25.0% open ")
+    assert "solid plate   ratio to it" in head
+    assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "0.4000"]
+    assert " 0.6400   0.6250" in first

@@ -1,0 +1,263 @@
+"""How well a plate protects, as numbers that are defined, cited, and certain to a stated degree.
+
+Every number but the worst point is a mean, over hits that cover the cell evenly, of something that each shot says; so
+all have the intervals of campaign/intervals.py. The mean of the worst tenth of the area is one, too: Rockafellar and
+Uryasev write it as the smallest mean of q + (x − q)₊ / 0.1 over q, where q is the quantile of 0.9. At a minimum an
+error of q does nothing to first order, so the interval is that of this mean at the q of the sample. A ratio to the
+solid plate is linearised likewise (the delta method).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from warpimpact.analysis.effects import Effect, effects
+from warpimpact.campaign.intervals import Estimate, estimate_of
+from warpimpact.results import images, solid_reference
+
+Array = NDArray[np.float64]
+
+ANGLE = math.radians(30.0)
+"""Inclination beyond which a core counts as tilted, unless said otherwise [rad]."""
+WORST = 0.1
+"""Share of the area that is the worst tenth."""
+FEWEST_WORST = 40
+"""Hits, images of each other counted once, that the worst tenth must have for an interval that holds as it says."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number of how well a plate protects; NaN where something does not exist.
+
+    Attributes:
+        name, label, units, definition, source, higher_is_better: as of `Effect`, and of what is made of it.
+        value: the number.
+        low, high: its confidence interval; none of a worst point, as what lies between the hits may be worse.
+        solid: the same of the solid plate of equal areal density.
+        ratio, ratio_low, ratio_high: the value as a multiple of that.
+        hit: which hit is the worst point; None of anything else.
+    """
+
+    name: str
+    label: str
+    value: float
+    low: float
+    high: float
+    units: str
+    definition: str
+    source: str
+    higher_is_better: bool
+    solid: float
+    ratio: float
+    ratio_low: float
+    ratio_high: float
+    hit: int | None = None
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A measure, and what it is the mean of.
+
+    Attributes:
+        kind: that of the numbers, "mean" or "share" as in `intervals.Dealt`.
+        numbers: what each shot says, NaN where it does not count, shape [hits]; None of a worst point.
+    """
+
+    measure: Measure
+    kind: str
+    numbers: Array | None
+
+
+class _Statistic(NamedTuple):
+    """What is made of an effect: the endings of its name, label, definition and source."""
+
+    name: str
+    label: str
+    definition: str
+    source: str
+
+
+_SHARE = _Statistic("", "", "", "")
+_MEAN = _Statistic("", ", mean", " Mean over the area.", "")
+_WORST_TENTH = _Statistic(
+    "_worst_tenth",
+    ", worst tenth",
+    " Mean over the worst tenth of the area.",
+    "; R. T. Rockafellar, S. Uryasev, Journal of Risk 2 (2000) 21",
+)
+_WORST_POINT = _Statistic("_worst_point", ", worst point", " The worst of the hits, an observed extreme.", "")
+
+
+def effectiveness(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None) -> list[Measure]:
+    """How well the plate of a result protects.
+
+    Args:
+        dataset: a hit map; of an open file a slice is in memory at a time, and one number per hit.
+        angle: inclination beyond which a core counts as tilted [rad].
+        standoff: distance behind the rear face where tilt counts [m]; the largest of the result if None.
+
+    Raises:
+        ResultError: the result has no such stand-off.
+    """
+    return [evidence.measure for evidence in gather(dataset, angle=angle, standoff=standoff)]
+
+
+def gather(
+    dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None, confidence: float = 0.95
+) -> Iterator[Evidence]:
+    """The measures of `effectiveness` one after the other, each with the numbers that it is made of."""
+    dealt = dealing(dataset) | {"confidence": confidence}
+    reference = solid_reference(dataset)
+    for effect in effects(dataset, angle=angle, standoff=standoff):
+        values, solid = effect.over(dataset), None if reference is None else effect.over(reference)
+        if effect.kind == "share":
+            yield _averaged(effect, _SHARE, values, solid, dealt)
+        else:
+            yield _averaged(effect, _MEAN, values, solid, dealt)
+            worst = None if solid is None else worst_tenth(solid)
+            yield _averaged(effect, _WORST_TENTH, worst_tenth(values), worst, dealt)
+            yield _worst_point(effect, values, solid)
+
+
+def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
+    """How the shots of a result were dealt out, for `intervals.Dealt`."""
+    return {"replicates": int(dataset.attrs.get("replicates", 1)), "images": images(dataset)}
+
+
+def worst_tenth(values: Array) -> Array:
+    """Numbers whose mean is that of the largest tenth of the values; NaN stays NaN."""
+    known = values[~np.isnan(values)]
+    if not len(known):
+        return values
+    start = float(np.quantile(known, 1.0 - WORST, method="inverted_cdf"))
+    return start + np.maximum(values - start, 0.0) / WORST
+
+
+def _averaged(
+    effect: Effect, statistic: _Statistic, numbers: Array, solid: Array | None, dealt: dict[str, Any]
+) -> Evidence:
+    """The measure that is the mean of some numbers."""
+    estimate = estimate_of(effect.kind, numbers, **dealt)
+    if statistic is _WORST_TENTH and estimate.count * WORST < FEWEST_WORST * dealt["images"]:
+        estimate = _without_interval(estimate.value)
+    against = _Against.of(effect.kind, estimate, numbers, solid, dealt)
+    return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers)
+
+
+def _worst_point(effect: Effect, values: Array, solid: Array | None) -> Evidence:
+    """The measure that is the largest value."""
+    known = ~np.isnan(values)
+    hit = int(np.argmax(np.where(known, values, -math.inf))) if known.any() else None
+    estimate = _without_interval(math.nan if hit is None else float(values[hit]))
+    largest = None if solid is None else np.atleast_1d(np.fmax.reduce(solid))
+    against = _Against.of(effect.kind, estimate, values, largest, {})
+    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None)
+
+
+def _without_interval(value: float) -> Estimate:
+    return Estimate(value, math.nan, math.nan, 1, math.nan)
+
+
+class _Against(NamedTuple):
+    """The solid plate's number, the ratio to it and the interval of the ratio."""
+
+    solid: float = math.nan
+    ratio: float = math.nan
+    ratio_low: float = math.nan
+    ratio_high: float = math.nan
+
+    @classmethod
+    def of(cls, kind: str, estimate: Estimate, numbers: Array, solid: Array | None, dealt: dict[str, Any]) -> _Against:
+        """Against the mean of the solid plate's numbers, those of the first shots or one for all."""
+        known = np.empty(0) if solid is None else solid[~np.isnan(solid)]
+        if solid is None or not len(known):
+            return cls()
+        if (mean := float(known.mean())) <= 0.0:
+            return cls(mean)
+        ratio, low, high = (number / mean for number in (estimate.value, estimate.low, estimate.high))
+        if np.ptp(known) > 0.0 and not math.isnan(low):
+            linear = estimate_of("mean", _ratio_numbers(numbers, solid, ratio), **dealt)
+            low, high = linear.low, linear.high
+        return cls(mean, ratio, low, high)
+
+
+def _ratio_numbers(numbers: Array, solid: Array, ratio: float) -> Array:
+    """Numbers of the shots whose mean is the ratio of two means, and tells its error to first order.
+
+    Shot k of the solid plate is that of the perforated one. Where there are fewer, each stands for several.
+    """
+    mean, weight = np.nanmean(solid), np.isfinite(numbers).sum() / np.isfinite(solid).sum()
+    linear = numbers / mean
+    linear[: len(solid)] -= np.nan_to_num(ratio * weight * (solid / mean - 1.0))
+    return linear
+
+
+def _measure(
+    effect: Effect, statistic: _Statistic, estimate: Estimate, against: _Against, hit: int | None = None
+) -> Measure:
+    return Measure(
+        name=effect.name + statistic.name,
+        label=effect.label + statistic.label,
+        value=estimate.value,
+        low=estimate.low,
+        high=estimate.high,
+        units=effect.units,
+        definition=effect.definition + statistic.definition,
+        source=effect.source + statistic.source,
+        higher_is_better=effect.higher_is_better,
+        **against._asdict(),
+        hit=hit,
+    )
+
+
+SHOWN_UNITS = {"1": "", "J mm-2": " [J/mm²]"}
+"""Units behind a label."""
+
+
+def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None) -> str:
+    """The measures of `effectiveness` as a table, beside those of the solid plate of equal areal density."""
+    measures = effectiveness(dataset, angle=angle, standoff=standoff)
+    labels = [measure.label + SHOWN_UNITS[measure.units] for measure in measures]
+    width = max(map(len, labels))
+    title = f"effectiveness{plate_text(dataset)}"
+    head = f"{title:<{width}}{'':>10}   {'95 % interval':<18}"
+    with_solid = any(not math.isnan(measure.solid) for measure in measures)
+    rows = [head + f"{'solid plate':>12}   ratio to it" if with_solid else head.rstrip()]
+    for label, measure in zip(labels, measures, strict=True):
+        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
+        rows.append((row + _against_text(measure) if with_solid else row).rstrip())
+    return "\n".join(rows)
+
+
+def plate_text(dataset: xarray.Dataset) -> str:
+    """Areal density and open area, where a result carries them."""
+    told = dataset.attrs
+    if "areal_density" not in told:
+        return ""
+    return f", {told['areal_density']:.4g} kg/m², {told['open_area']:.1%} open"
+
+
+def _second(measure: Measure) -> str:
+    return f"at hit {measure.hit}" if measure.hit is not None else interval_text(measure.low, measure.high)
+
+
+def number_text(number: float) -> str:
+    """With four digits; a dash for what does not exist."""
+    return "-" if math.isnan(number) else f"{number:#.4g}"
+
+
+def interval_text(low: float, high: float) -> str:
+    """Of a confidence interval; a dash where there is none."""
+    return "-" if math.isnan(low) else f"{number_text(low)} to {number_text(high)}"
+
+
+def _against_text(measure: Measure) -> str:
+    interval = "" if math.isnan(measure.ratio_low) else f"  {interval_text(measure.ratio_low, measure.ratio_high)}"
+    return f"{number_text(measure.solid):>12}   {number_text(measure.ratio)}{interval}"

@@ -1,0 +1,200 @@
+"""Confidence intervals of what shots say: means, shares, quantiles and differences of shares.
+
+Of independent shots the intervals are Student's for a mean, Wilson's for a share, that of the order statistics for a
+quantile, and Agresti and Min's for a difference of shares among the same shots (Statistics in Medicine 24 (2005) 729).
+Points of a Sobol sampling are not independent; there the shots are dealt out to independent scramblings, and Student's
+interval over the answers of these replicates holds (A. B. Owen, Monte Carlo theory, methods and examples, chapter 17).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its interval, NaN where there is none.
+
+    Attributes:
+        count: shots that it counts.
+        spread: standard deviation over these shots.
+    """
+
+    value: float
+    low: float
+    high: float
+    count: int
+    spread: float
+
+    @property
+    def half_width(self) -> float:
+        """Half of the interval's length."""
+        return 0.5 * (self.high - self.low)
+
+
+def estimate_of(kind: str, values: Array, **dealt: Any) -> Estimate:
+    """What numbers of all shots say, NaN where one does not count; the arguments are those of `Dealt`."""
+    gathered = Dealt(kind, **dealt)
+    gathered.add(values)
+    return gathered.estimate()
+
+
+class Dealt:
+    """Numbers of shots, in the order of the shots, dealt out to the replicates of the sampling.
+
+    Args:
+        kind: "mean", "quantile", "share" (of numbers 0 or 1) or "difference" (of two shares, numbers −1, 0 or 1).
+        share: of a quantile.
+        replicates: independent scramblings that the shots are dealt out to in turn; 1 if they are independent.
+        images: how many shots in a row are images of each other, which tell as much as one of them.
+        confidence: of the interval.
+    """
+
+    def __init__(
+        self, kind: str, *, share: float = 0.5, replicates: int = 1, images: int = 1, confidence: float = 0.95
+    ) -> None:
+        self._kind, self._share, self._images, self._confidence = kind, share, images, confidence
+        self._replicates = [_Sample(keeps=kind == "quantile") for _ in range(replicates)]
+        self._shots = 0
+
+    def add(self, values: Array) -> None:
+        """Take in the numbers of the shots that follow, NaN where one does not count; shape [shots]."""
+        replicates = len(self._replicates)
+        dealt_to = (self._shots + np.arange(len(values))) // self._images % replicates
+        for replicate, sample in enumerate(self._replicates):
+            mine = values[dealt_to == replicate]
+            sample.add(mine[~np.isnan(mine)])
+        self._shots += len(values)
+
+    def estimate(self) -> Estimate:
+        """What the shots so far say."""
+        pooled = _Sample.pooled(self._replicates)
+        if pooled.count == 0:
+            return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
+        value = pooled.quantile(self._share) if self._kind == "quantile" else pooled.mean
+        interval = self._of_replicates(pooled, value) or self._independent(pooled)
+        return Estimate(value, *interval, pooled.count, pooled.deviation)
+
+    def _of_replicates(self, pooled: _Sample, value: float) -> tuple[float, float] | None:
+        """Interval from the spread of the replicates, None where there is none to tell from.
+
+        That of a quantile is Woodruff's: the replicates say how certain the share below it is (R. S. Woodruff, Journal
+        of the American Statistical Association 47 (1952) 635). Their own quantiles would be biased.
+        """
+        replicates = [sample for sample in self._replicates if sample.count]
+        if len(replicates) < 2:
+            return None
+        quantile = self._kind == "quantile"
+        answers = [float((one.values <= value).mean()) if quantile else one.mean for one in replicates]
+        half = _student(self._confidence, len(answers)) * float(np.std(answers, ddof=1))
+        # Replicates that all say the same of something that happens or not (never, mostly) tell nothing.
+        if half == 0.0 and self._kind != "mean":
+            return None
+        if not quantile:
+            return value - half, value + half
+        ends = (self._share - half, self._share + half)
+        low, high = (pooled.quantile(end) if 0.0 < end < 1.0 else math.nan for end in ends)
+        return low, high
+
+    def _independent(self, sample: _Sample) -> tuple[float, float]:
+        """Interval as of independent shots; images of each other count as one."""
+        from scipy import stats  # a second to import
+
+        count = math.ceil(sample.count / self._images)
+        if self._kind == "quantile":
+            tail = 0.5 * (1.0 - self._confidence)
+            ends = stats.binom.ppf([tail, 1.0 - tail], count, self._share).astype(int)
+            ordered = np.sort(sample.values)[:: self._images]
+            low, high = ends[0] - 1, ends[1]
+            return (
+                float(ordered[low]) if low >= 0 else math.nan,
+                float(ordered[high]) if high < count else math.nan,
+            )
+        if self._kind == "share":
+            successes = round(sample.mean * count)
+            interval = stats.binomtest(successes, count).proportion_ci(self._confidence, method="wilson")
+            return float(interval.low), float(interval.high)
+        if self._kind == "difference":
+            return _matched(sample, count, self._confidence)
+        if count < 2:
+            return math.nan, math.nan
+        unbiased = sample.deviation * math.sqrt(count / (count - 1))
+        half = _student(self._confidence, count) * unbiased
+        return sample.mean - half, sample.mean + half
+
+
+def _student(confidence: float, count: int) -> float:
+    """Half width of the interval of a mean of `count` numbers, in their standard deviations."""
+    from scipy import stats
+
+    return float(stats.t.isf(0.5 * (1.0 - confidence), count - 1)) / math.sqrt(count)
+
+
+def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, float]:
+    """Agresti and Min's interval: half a shot more in each of the four cells of what the two may say."""
+    from scipy import stats
+
+    difference = sample.mean * count
+    discordant = (sample.deviation**2 + sample.mean**2) * count
+    padded = count + 2
+    error = math.sqrt(discordant + 1.0 - difference**2 / padded) / padded
+    half = float(stats.norm.isf(0.5 * (1.0 - confidence))) * error
+    return max(-1.0, difference / padded - half), min(1.0, difference / padded + half)
+
+
+class _Sample:
+    """Count, mean and sum of squared deviations of numbers, and if it keeps them the numbers themselves."""
+
+    def __init__(self, *, keeps: bool) -> None:
+        self.count, self.mean, self._squares = 0, 0.0, 0.0
+        self._kept: list[Array] | None = [] if keeps else None
+
+    @classmethod
+    def pooled(cls, samples: Sequence[_Sample]) -> _Sample:
+        """All numbers of some samples."""
+        if len(samples) == 1:
+            return samples[0]
+        whole = cls(keeps=samples[0]._kept is not None)
+        for sample in samples:
+            whole._merge(sample.count, sample.mean, sample._squares)
+            if whole._kept is not None:
+                whole._kept.append(sample.values)
+        return whole
+
+    def add(self, values: Array) -> None:
+        """Take in numbers; none is NaN."""
+        if len(values):
+            mean = float(values.mean())
+            self._merge(len(values), mean, float(np.square(values - mean).sum()))
+            if self._kept is not None:
+                self._kept.append(values)
+
+    def _merge(self, count: int, mean: float, squares: float) -> None:
+        """T. F. Chan, G. H. Golub, R. J. LeVeque, The American Statistician 37 (1983) 242."""
+        if count:
+            total, apart = self.count + count, mean - self.mean
+            self._squares += squares + apart * apart * self.count * count / total
+            self.mean += apart * count / total
+            self.count = total
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the numbers themselves (ddof = 0)."""
+        return math.sqrt(self._squares / self.count) if self.count else math.nan
+
+    @property
+    def values(self) -> Array:
+        """The numbers, if it keeps them."""
+        return np.concatenate(self._kept) if self._kept else np.empty(0)
+
+    def quantile(self, share: float) -> float:
+        """Value below which this share of the numbers lies."""
+        return float(np.quantile(self.values, share, method="hazen"))
