@@ -1,5 +1,6 @@
 """The report: its choice of hits, what it says and escapes, and how it works in a real browser."""
 
+import html
 import json
 import re
 import shutil
@@ -11,6 +12,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, results
+from warpimpact.analysis.effectiveness import effectiveness, number_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
@@ -52,11 +54,23 @@ def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
         np.testing.assert_allclose(shown["columns"]["tilt at 130 mm"], dataset["tilt"][:, 1], rtol=1e-4)
         assert np.shape(shown["nearest"]) == (160, 160)
         assert len(shown["trajectories"]) == TRAJECTORIES
-        assert shown["worst"] == dataset["residual_velocity"].values.argmax()
-        history = shown["trajectories"][str(shown["worst"])]
+        fastest = dataset["residual_velocity"].values.argmax()
+        assert str(fastest) in shown["trajectories"]
+        assert str(shown["first"]) in shown["trajectories"]
+        history = shown["trajectories"][str(fastest)]
         assert [len(history[part]) for part in ("inside", "behind")] == [5, 2]
-        y, tilt = history["behind"][1]["y"], dataset["tilt"][shown["worst"], 1]
+        y, tilt = history["behind"][1]["y"], dataset["tilt"][fastest, 1]
         assert np.ptp(y[0]) == pytest.approx(27.86 * np.cos(np.radians(tilt)), abs=3.0)
+
+
+def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
+    text = html.unescape(re.sub(r"<[^>]*>", " ", (folder / "a.html").read_text()))
+    for name in ("narrow", "<b>wide"):
+        for measure in effectiveness(results.read(folder / f"{name}.nc")):
+            numbers = (measure.value, measure.solid, measure.ratio)
+            row = r"\s+.*\s+".join(re.escape(number_text(number)) for number in numbers)
+            assert re.search(rf"{re.escape(measure.label)}.*\s+{row}", text)
+            assert measure.definition in text
 
 
 def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
@@ -92,6 +106,7 @@ def test_thinning_keeps_parts_of_no_sampling_out() -> None:
     assert kept.sizes["hit"] == 200
     assert np.bincount(kept["y"].astype(int)).min() > 20
     assert len(hits.thinned(grid, 1000)) == 1000
+    assert {3, 999} <= set(hits.thinned(grid, 10, keep=[3, 999]).tolist())
 
 
 def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: ResultMaker) -> None:
@@ -104,6 +119,7 @@ def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: Re
     offset -= dataset.attrs["plate_period"] * np.round(offset / dataset.attrs["plate_period"])
     assert np.linalg.norm(offset, axis=-1).min(axis=1).max() < 4e-3  # of a cell of 16 mm x 8 mm
     assert len(hits.worst_and_spread(dataset.isel(hit=slice(5)), 16)) == 5
+    assert hits.worst_and_spread(dataset, 16, first=[7, 509])[:5] == [7, 509, 511, 507, 505]
 
 
 @pytest.mark.parametrize("status", [Status.ARRESTED, Status.MISSED])

@@ -32,23 +32,23 @@ _OUTLINE_POINTS = 60
 _MM = 1e3
 
 
-def thinned(dataset: xarray.Dataset, most: int) -> NDArray[np.intp]:
-    """Indices of the hits that a page holds: all of them, or a random choice of `most`.
+def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> NDArray[np.intp]:
+    """Indices of the hits that a page holds: all of them, or a random choice of `most`, and those to `keep`.
 
     By chance, as every so manieth hit of a grid or of a Sobol sampling leaves out parts of the cell.
     """
     count = dataset.sizes["hit"]
     if count <= most:
         return np.arange(count)
-    return np.sort(np.random.default_rng(0).choice(count, most, replace=False))
+    return np.union1d(np.random.default_rng(0).choice(count, most, replace=False), np.array(keep, dtype=int))
 
 
-def worst_and_spread(dataset: xarray.Dataset, count: int) -> list[int]:
-    """Which hits get a trajectory: the worst, those with the largest residual velocity, then again and again the hit
-    that is farthest from all chosen so far, across the cell's edges."""
+def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
+    """Which hits get a trajectory: those that are to come first, those with the largest residual velocity, then again
+    and again the hit that is farthest from all chosen so far, across the cell's edges."""
     velocity = shown(dataset, "residual_velocity").values
-    worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")
-    chosen = [int(hit) for hit in worst[: round(WORST_SHARE * count)]]
+    worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")[: round(WORST_SHARE * count)]
+    chosen = list(dict.fromkeys([*first, *worst.tolist()]))[:count]
     points, period = hit_points(dataset), np.asarray(dataset.attrs["plate_period"])
     distance = np.full(len(points), np.inf)
 

@@ -190,7 +190,7 @@
     result.replayed = Object.keys(result.trajectories).map((hit) => order.get(hit));
   });
   for (const result of data.results) {
-    const first = result.replayed.length ? result.worst : null;
+    const first = result.first;
     const drawn = first === null ? drawMap(result, picker.value) : choose(result, result.number.indexOf(first));
     drawn.then((place) => place.on("plotly_click", ({ points }) => {
       const point = points.find(({ curveNumber }) => curveNumber === 0);

@@ -21,6 +21,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
+from warpimpact.analysis.effectiveness import SHOWN_UNITS, effectiveness, interval_text, number_text
 from warpimpact.analysis.study import study_text
 from warpimpact.analysis.summary import UNITS, estimated, main_measures
 from warpimpact.campaign.estimates import STATUSES, Measure
@@ -66,22 +67,31 @@ def write_report(
         OutputError: the file cannot be written.
         ResultError, CampaignError: a hit cannot be replayed.
     """
-    kept = [thinned(dataset, MOST_HITS // len(datasets)) for dataset in datasets.values()]
+    measures = [effectiveness(dataset) for dataset in datasets.values()]
+    worst = [list(dict.fromkeys(one.hit for one in some if one.hit is not None)) for some in measures]
+    most = MOST_HITS // len(datasets)
+    kept = [thinned(dataset, most, keep=hits) for dataset, hits in zip(datasets.values(), worst, strict=True)]
     few = [dataset.isel(hit=hits).load() for dataset, hits in zip(datasets.values(), kept, strict=True)]
     data = page_data(few, kept)
-    done = 0
-    for (name, dataset), some, hits, result in zip(datasets.items(), few, kept, data["results"], strict=True):
-        chosen = hits[worst_and_spread(some, trajectories)].tolist() if trajectories else []
-        result |= {"worst": chosen[0] if chosen else None, "trajectories": {}}
-        for hit in chosen:
+    chosen = [
+        hits[worst_and_spread(some, trajectories, first=np.searchsorted(hits, first).tolist())].tolist()
+        for some, hits, first in zip(few, kept, worst, strict=True)
+    ]
+    done, total = 0, sum(map(len, chosen))
+    for (name, dataset), wanted, result in zip(datasets.items(), chosen, data["results"], strict=True):
+        result |= {"first": wanted[0] if wanted else None, "trajectories": {}}
+        for hit in wanted:
             result["trajectories"][hit] = trajectory_data(replay(dataset, hit, folder=folders[name]))
             done += 1
             if progress:
-                progress(done, len(chosen) * len(datasets))
+                progress(done, total)
     environment = Environment(
         loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    results = [_told(name, dataset, len(hits)) for (name, dataset), hits in zip(datasets.items(), kept, strict=True)]
+    results = [
+        _told(name, dataset, len(hits)) | {"measures": some}
+        for (name, dataset), hits, some in zip(datasets.items(), kept, measures, strict=True)
+    ]
     page = environment.get_template("page.html").render(
         data=data,
         plotly=Markup(get_plotlyjs()),
@@ -89,6 +99,7 @@ def write_report(
         pixels_per_mm=_PLATE_WIDTH / max(result["plate"]["y"] for result in results),
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
+        texts={"number": number_text, "interval": interval_text, "units": SHOWN_UNITS},
         study=study_text(study) if study is not None else "",
     )
     with aside(path) as file:
