@@ -18,6 +18,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
 from scipy.spatial import ConvexHull
 
+from warpimpact.plotting.pressure import pressure
 from warpimpact.results import passed
 
 if TYPE_CHECKING:
@@ -161,7 +162,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
 def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     """Write the figures of a history as PNG files ``<stem>_<figure>.png`` and return their paths."""
     paths = []
-    for draw in (passage, flight, largest_load, course, plate):
+    for draw in (passage, flight, largest_load, pressure, course, plate):
         paths.append(folder / f"{stem}_{draw.__name__}.png")
         draw(dataset).savefig(paths[-1], dpi=150)
     return paths
