@@ -1,11 +1,12 @@
 """The warpimpact command."""
 
 import argparse
+import math
 import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_run(commands)
     _add_inspect(commands)
     _add_plot(commands)
+    _add_compare(commands)
     _add_replay(commands)
     _add_export(commands)
     _add_report(commands)
@@ -111,6 +113,47 @@ def _add_plot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     parser.add_argument("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
     parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="existing folder (default: the result's)")
     parser.set_defaults(command=_plot)
+
+
+def _add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "compare",
+        help="tell which of several plates protects better",
+        description="Compare plates that were hit by the same shots: rankings, differences with their intervals, and a "
+        "figure. A campaign with several plates is run first, each plate into NAME.nc beside the figure; a plate "
+        "whose result is there already is not run again.",
+        epilog="example: warpimpact compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
+    )
+    parser.add_argument(
+        "files",
+        type=Path,
+        nargs="+",
+        metavar="RESULT.nc",
+        help="two or more results of warpimpact run, or one campaign with several [[plate]] tables",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FIGURE.png",
+        help="figure, PNG, PDF or SVG (default: comparison.png here, or the campaign's name)",
+    )
+    parser.add_argument(
+        "--angle",
+        default="30 deg",
+        metavar="ANGLE",
+        help='inclination beyond which a core counts as tilted (default: "%(default)s")',
+    )
+    parser.add_argument(
+        "--standoff",
+        metavar="LENGTH",
+        help='where tilt counts, such as "130 mm" (default: the largest of the results)',
+    )
+    _add_device(parser)
+    parser.add_argument("--count", type=int, metavar="N", help="number of hits, in place of the campaign's")
+    parser.add_argument("--resume", action="store_true", help="continue a campaign that was broken off")
+    parser.add_argument("--overwrite", action="store_true", help="compute the plates of a campaign anew")
+    parser.set_defaults(command=_compare)
 
 
 def _add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -374,20 +417,92 @@ def _plot(arguments: argparse.Namespace) -> None:
     from . import results
     from .plotting import save_beside, save_maps
 
-    datasets = {path.stem: results.read(path) for path in arguments.results}
-    _check_names(datasets, arguments.results)
+    datasets = {name: results.read(path) for name, path in _named(arguments.results).items()}
     folder = arguments.output or arguments.results[0].parent
     _check_folder(folder)
-    ((stem, dataset), *others) = datasets.items()
-    for path in save_beside(datasets, folder) if others else save_maps(dataset, folder, stem):
+    stem = "_".join(path.stem for path in arguments.results)
+    dataset, *others = datasets.values()
+    for path in save_beside(datasets, folder, stem) if others else save_maps(dataset, folder, stem):
         print(path)
 
 
-def _check_names(datasets: "Mapping[str, xarray.Dataset]", paths: Sequence[Path]) -> None:
+def _compare(arguments: argparse.Namespace) -> int:
+    from . import results
+    from .analysis.comparison import compare, comparison_text
+    from .plotting import comparison_figure
+
+    is_campaign = arguments.files[0].suffix == ".toml"
+    default = arguments.files[0].stem if is_campaign else "comparison"
+    figure = arguments.output or Path(f"{default}.png")
+    if figure.suffix not in (".png", ".pdf", ".svg"):
+        raise results.OutputError(f"{figure}: must end with .png, .pdf or .svg")
+    _check_place(figure)
+    angle, standoff = _quantities(arguments)
+    paths = _plates_run(arguments, figure.parent) if is_campaign else _named(arguments.files)
+    if len(paths) < 2:
+        raise results.ResultError(
+            f"{arguments.files[0]}: is one result, but two or more, or one campaign, are needed to compare"
+        )
+    with ExitStack() as stack:
+        datasets = [stack.enter_context(results.opened(path)) for path in paths.values()]
+        comparison = compare(datasets, list(paths), angle=angle, standoff=standoff)
+        code = max(_failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
+    print(comparison_text(comparison))
+    comparison_figure(comparison).savefig(figure, dpi=150)
+    print(figure)
+    return code
+
+
+def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
+    """Angle [rad] and stand-off [m] that a person wrote."""
+    from .results import ResultError
+    from .scene.units import Angle, Length, quantity
+
+    try:
+        angle = quantity(Angle)(arguments.angle)
+        standoff = None if arguments.standoff is None else quantity(Length)(arguments.standoff)
+    except ValueError as error:
+        raise ResultError(f"--angle, --standoff: {error}") from None
+    if not 0.0 <= angle < math.pi / 2:
+        raise ResultError(f'--angle: got "{arguments.angle}", but it must be at least 0 and less than 90 deg')
+    return angle, standoff
+
+
+def _named(paths: Sequence[Path]) -> dict[str, Path]:
+    """Results under names that tell them apart."""
     from .results import ResultError
 
-    if len(datasets) < len(paths):
-        raise ResultError(f"{paths[0]}: got several results of one name, but names tell them apart")
+    if len(set(paths)) < len(paths):
+        raise ResultError("the same result is given twice")
+    stems = [path.stem for path in paths]
+    return dict(zip(stems if len(set(stems)) == len(stems) else map(str, paths), paths, strict=True))
+
+
+def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
+    """The results of a campaign's plates by their names, computed where they are not there."""
+    from .campaign.campaign import CampaignError
+    from .campaign.plates import read_plates
+    from .campaign.run import run_to_file
+
+    if len(arguments.files) > 1:
+        raise CampaignError(f"{arguments.files[0]}: is a campaign, which is compared on its own")
+    campaigns = read_plates(arguments.files[0], count=arguments.count)
+    paths = {name: folder / f"{name}.nc" for name in campaigns}
+    for name, campaign in campaigns.items():
+        print(f"plate {name}", file=sys.stderr)
+        try:
+            with _terminated_as_interrupted(), _standing() as progress:
+                run_to_file(
+                    campaign,
+                    paths[name],
+                    device=arguments.device,
+                    resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
+                    overwrite=arguments.overwrite,
+                    progress=progress,
+                )
+        except MemoryError as error:
+            raise CampaignError(f"{arguments.files[0]}: {error}") from None
+    return paths
 
 
 def _replay(arguments: argparse.Namespace) -> None:
@@ -447,16 +562,16 @@ def _report(arguments: argparse.Namespace) -> None:
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
     _check_output(output, overwrite=arguments.overwrite)
+    named = _named(paths)
     with ExitStack() as stack:
-        datasets = {path.stem: stack.enter_context(results.opened(path)) for path in paths}
-        _check_names(datasets, paths)
+        datasets = {name: stack.enter_context(results.opened(path)) for name, path in named.items()}
         study = results.read_study(arguments.study) if arguments.study else None
         progress = stack.enter_context(_progress())
         try:
             write_report(
                 datasets,
                 output,
-                folders={path.stem: arguments.campaign_folder or path.parent for path in paths},
+                folders={name: arguments.campaign_folder or path.parent for name, path in named.items()},
                 trajectories=arguments.trajectories,
                 study=study,
                 progress=progress,

@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import results
+from warpimpact import ConeCore, results
 from warpimpact.campaign import parts
 from warpimpact.kernels.status import Status
+from warpimpact.results import SHOT_VARIABLES
 from warpimpact.scene import Shots
 
 STANDOFFS = np.array([0.05, 0.13])
@@ -84,6 +85,44 @@ def make_result() -> ResultMaker:
         )
 
     return make
+
+
+CYLINDER = ConeCore(diameter="6 mm", length="20 mm", cone_length="1 nm", mass="4 g")
+
+
+def plate_result(
+    velocity: np.ndarray, tilt: np.ndarray | float = 0.0, status: np.ndarray | int = Status.PERFORATED, **told: object
+) -> xarray.Dataset:
+    """What measures and comparisons take of a result: cylinders of 1000 m/s with these residual velocities [m/s], tilts
+    at 130 mm [degree] and ends."""
+    hits = len(velocity)
+    columns = {name: np.zeros(hits) for name in SHOT_VARIABLES} | {
+        "status": np.full(hits, status, dtype=np.int8),
+        "impact_velocity": np.full(hits, 1000.0),
+        "residual_velocity": velocity,
+    }
+    tilts = np.stack([np.zeros(hits), np.broadcast_to(tilt, hits)], axis=1)
+    places = np.linspace(-0.5, 0.5, hits)
+    return xarray.Dataset(
+        {name: ("hit", values) for name, values in columns.items()} | {"tilt": (("hit", "standoff"), tilts)},
+        {"standoff": STANDOFFS, "hit_y": ("hit", places * PERIOD[0]), "hit_z": ("hit", places * PERIOD[1])},
+        {
+            "core": CYLINDER.model_dump_json(),
+            "impact": '{"velocity": 1000.0}',
+            "standoff_point": "nose",
+            "plate_period": PERIOD,
+            "areal_density": 23.55,
+            "open_area": 0.25,
+            "numerics": "draft fidelity, consistent scheme, time_step 1e-06 s",
+        }
+        | told,
+    )
+
+
+@pytest.fixture(scope="session")
+def make_plate_result() -> ResultMaker:
+    """The function above."""
+    return plate_result
 
 
 def _assert_same_bits(one: Path, other: Path) -> None:

@@ -22,7 +22,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"]])
+@pytest.mark.parametrize("command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"]])
 def test_help_shows_how(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main([*command, "--help"])
@@ -127,15 +127,14 @@ def test_what_is_no_result_is_not_plotted(folder: Path, capsys: pytest.CaptureFi
     assert [path.name for path in folder.iterdir()] == ["a.nc"]
 
 
-def test_results_of_one_name_are_not_drawn_beside_each_other(
+def test_results_are_drawn_beside_each_other(
     folder: Path, capsys: pytest.CaptureFixture[str], make_result: Callable[..., xarray.Dataset]
 ) -> None:
     Path("b").mkdir()
-    for path in ("a.nc", "b/a.nc", "c.nc"):
+    for path in ("a.nc", "b/a.nc"):
         results.write(make_result(100), Path(path))
-    assert (
-        _refusal(["plot", "a.nc", "b/a.nc"], capsys)
-        == "a.nc: got several results of one name, but names tell them apart"
-    )
-    assert main(["plot", "a.nc", "c.nc"]) == 0
-    assert "a_c_tilt.png\n" in capsys.readouterr().out
+    assert main(["plot", "a.nc", "b/a.nc"]) == 0
+    assert capsys.readouterr().out.split() == [
+        f"a_a_{name}.png" for name in ("residual_velocity", "deflection", "tilt")
+    ]
+    assert _refusal(["plot", "a.nc", "a.nc"], capsys) == "the same result is given twice"

@@ -304,7 +304,5 @@ def test_maps_beside_each_other_have_one_scale_of_colour_and_of_length(make_resu
     figure.draw_without_rendering()
     lengths = [np.diff(axes.transData.transform([(0, 0), (1, 0)])[:, 0]).item() for axes in maps_]
     assert lengths[0] == pytest.approx(lengths[1])
-    paths = save_beside({"wide": wide, "small": small}, tmp_path)
-    assert [path.name for path in paths] == [
-        f"wide_small_{name}.png" for name in ("residual_velocity", "deflection", "tilt")
-    ]
+    paths = save_beside({"wide": wide, "small": small}, tmp_path, "both")
+    assert [path.name for path in paths] == [f"both_{name}.png" for name in ("residual_velocity", "deflection", "tilt")]

@@ -12,6 +12,7 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, results
+from warpimpact.analysis.comparison import compare, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness, number_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.run import run
@@ -73,10 +74,23 @@ def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
             assert measure.definition in text
 
 
+def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_path: Path) -> None:
+    text = html.unescape((folder / "a.html").read_text())
+    names = ["narrow", "<b>wide"]
+    with results.opened(folder / "narrow.nc") as narrow, results.opened(folder / "<b>wide.nc") as wide:
+        assert comparison_text(compare([narrow, wide], names)) in text
+    assert text.count('<img src="data:image/png;base64,') == 1
+    results.write(make_result(100), tmp_path / "other.nc")
+    page = tmp_path / "a.html"
+    command = ["report", str(folder / "narrow.nc"), str(tmp_path / "other.nc"), "-o", str(page), "--trajectories", "0"]
+    assert main(command) == 0
+    assert "<pre>other: " in page.read_text()
+
+
 def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
     text = (folder / "a.html").read_text()
     own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert not re.search(r'(src|href)="', own)
+    assert not re.search(r'(src|href)="(?!data:)', own)
     assert "default-src 'none'" in own
     assert "&lt;b&gt;wide" in own
     assert "<b>" not in own
@@ -143,7 +157,7 @@ def test_what_is_missing_is_told_and_nothing_written(
     for command, sentence in (
         (["-o", page, "--study", result], 'not a study of warpimpact, it has no variable "'),
         (["-o", str(folder / "a.html")], "a.html: exists already"),
-        ([result, "-o", page], "several results of one name"),
+        ([result, "-o", page], "the same result is given twice"),
         (["-o", page], "hits.csv; --campaign-folder tells where the campaign's files are, --trajectories 0 needs none"),
     ):
         assert main(["report", result, *command]) == 2

@@ -8,18 +8,21 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.effectiveness import effectiveness_text
-from warpimpact.analysis.summary import UNITS, estimated, main_measures, slices, stop_lines, symmetry_text
+from warpimpact.analysis.summary import (
+    UNITS,
+    estimated,
+    main_measures,
+    sampling_note,
+    slices,
+    stop_lines,
+    symmetry_text,
+)
 from warpimpact.campaign.estimates import STATUSES, Measure
 from warpimpact.campaign.intervals import Estimate
 from warpimpact.kernels.status import Status
 from warpimpact.results import SCATTER_VARIABLES, SHOT_VARIABLES, failed
 
 _QUANTILES = (0.05, 0.5, 0.95)
-_SAMPLINGS = {
-    "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates gives valid ones.",
-    "grid": "Intervals are those of independent shots, which the hits of a grid are not.",
-    "list": "Intervals are those of independent shots, which the hits of a list may not be.",
-}
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
@@ -64,7 +67,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
         for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
             if estimate.count:
                 yield _row(measure, estimate)
-    if int(dataset.attrs.get("replicates", 1)) == 1 and (note := _SAMPLINGS.get(dataset.attrs.get("sampling", ""))):
+    if note := sampling_note(dataset):
         yield note
     yield from stop_lines(dataset)
 

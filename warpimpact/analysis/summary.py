@@ -83,6 +83,19 @@ def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
         yield dataset.isel(hit=slice(first, first + SLICE)).load()
 
 
+_SAMPLINGS = {
+    "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates gives valid ones.",
+    "grid": "Intervals are those of independent shots, which the hits of a grid are not.",
+    "list": "Intervals are those of independent shots, which the hits of a list may not be.",
+}
+
+
+def sampling_note(dataset: xarray.Dataset) -> str:
+    """What there is to say of the intervals of a result because of its sampling, if anything."""
+    told = dataset.attrs
+    return _SAMPLINGS.get(told.get("sampling", ""), "") if told.get("replicates", 1) == 1 else ""
+
+
 def summary_text(dataset: xarray.Dataset) -> str:
     """The summary as a short table; statuses that did not occur are left out."""
     result = summary(dataset)

@@ -79,7 +79,7 @@ class Campaign(Model):
             CampaignError: the file is missing, is no TOML, or asks for something that cannot be.
         """
         path = Path(path)
-        return cls.from_text(_read(path), name=str(path), folder=path.parent, count=count)
+        return cls.from_text(read_text(path), name=str(path), folder=path.parent, count=count)
 
     @classmethod
     def from_text(cls, text: str, *, name: str, folder: Path, count: int | None = None) -> Self:
@@ -94,10 +94,12 @@ class Campaign(Model):
         Raises:
             CampaignError: the text is no TOML, or asks for something that cannot be.
         """
-        try:
-            data = json.loads(text) if text.startswith("{") else tomllib.loads(text)
-        except ValueError as error:
-            raise CampaignError(f"{name}: is not valid TOML: {error}") from None
+        data = parsed(text, name)
+        if isinstance(plates := data.get("plate"), list):
+            raise CampaignError(
+                f"{name}: plate: got {len(plates)} plates, but this takes one; warpimpact compare {name} runs them all "
+                "and compares them"
+            )
         if count is not None:
             _override_count(data, count)
         data = _with_scatter_apart(data, name)
@@ -220,7 +222,25 @@ def _with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
     return data | {"scatter": scatter} if scatter else data
 
 
-def _read(path: Path) -> str:
+def parsed(text: str, name: str) -> dict[str, Any]:
+    """The tables of a campaign, TOML or JSON, not yet validated.
+
+    Raises:
+        CampaignError: the text, which errors call `name`, is neither.
+    """
+    try:
+        data: dict[str, Any] = json.loads(text) if text.startswith("{") else tomllib.loads(text)
+    except ValueError as error:
+        raise CampaignError(f"{name}: is not valid TOML: {error}") from None
+    return data
+
+
+def read_text(path: Path) -> str:
+    """The text of a campaign file.
+
+    Raises:
+        CampaignError: it is missing or cannot be read.
+    """
     try:
         return path.read_text(encoding="utf-8")
     except FileNotFoundError:

@@ -19,6 +19,7 @@ from warpimpact.discretisation import resolve
 from warpimpact.refine import LADDER, Estimates, simulate_to_tolerance
 from warpimpact.results import solid_dataset, to_dataset
 from warpimpact.scene import Plate, Shots, Symmetry
+from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.simulate import Outcomes, Progress, find_device, simulate
 from warpimpact.unfold import unfolded, unfolded_estimates
 
@@ -107,10 +108,10 @@ def _outcomes(campaign: Campaign, plate: Plate, shots: Shots, **how: Any) -> tup
 
 
 def _impact(campaign: Campaign) -> str:
-    """How the core arrives, as JSON: of each quantity its value or its distribution."""
-    scatter = campaign.scatter.given
+    """How the core arrives, as JSON: of each quantity its value or its distribution, that of its mass included."""
+    scatter = {name: given.model_dump() for name, given in campaign.scatter.given.items()}
     return json.dumps(
-        {name: scatter[name].model_dump() if name in scatter else value for name, value in campaign.impact}
+        dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
     )
 
 

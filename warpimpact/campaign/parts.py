@@ -47,15 +47,21 @@ def fingerprint(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def difference(begun: Any, now: Any, place: str = "") -> str | None:
+def difference(begun: Any, now: Any) -> str | None:
     """The first difference between two manifests as a phrase, None if there is none."""
-    if isinstance(begun, dict) and isinstance(now, dict):
-        for name in sorted(begun.keys() | now.keys()):
-            found = difference(begun.get(name), now.get(name), f"{place}.{name}".removeprefix("campaign.").strip("."))
-            if found:
+    found = first_difference(begun, now)
+    return found and "{} was {} and is {}".format(*found)
+
+
+def first_difference(one: Any, other: Any, place: str = "") -> tuple[str, str, str] | None:
+    """Where two nested dictionaries differ first, and what is there in each; None if they do not."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        for name in sorted(one.keys() | other.keys()):
+            inner = f"{place}.{name}".removeprefix("campaign.").strip(".")
+            if found := first_difference(one.get(name), other.get(name), inner):
                 return found
         return None
-    return None if begun == now else f"{place} was {_brief(begun)} and is {_brief(now)}"
+    return None if one == other else (place, _brief(one), _brief(other))
 
 
 def _brief(value: Any) -> str:

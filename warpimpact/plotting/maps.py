@@ -84,10 +84,10 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     return _saved(figures, folder, stem)
 
 
-def save_beside(datasets: Mapping[str, xarray.Dataset], folder: Path) -> list[Path]:
-    """Write maps of several results side by side as PNG files ``<names>_<map>.png`` and return their paths."""
+def save_beside(datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str) -> list[Path]:
+    """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths."""
     figures = {variable: hit_maps(datasets, variable) for variable in ("residual_velocity", "deflection", "tilt")}
-    return _saved(figures, folder, "_".join(datasets))
+    return _saved(figures, folder, stem)
 
 
 def _saved(figures: Mapping[str, Figure], folder: Path, stem: str) -> list[Path]:

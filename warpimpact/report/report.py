@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import json
 import tomllib
+from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -21,14 +23,16 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
+from warpimpact.analysis.comparison import compare, comparison_text
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, effectiveness, interval_text, number_text
 from warpimpact.analysis.study import study_text
 from warpimpact.analysis.summary import UNITS, estimated, main_measures
 from warpimpact.campaign.estimates import STATUSES, Measure
 from warpimpact.campaign.replay import replay
 from warpimpact.plotting.cell import range_text, words
+from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.results import aside
+from warpimpact.results import ResultError, aside
 
 Progress = Callable[[int, int], None]
 _MM = 1e3
@@ -99,6 +103,7 @@ def write_report(
         pixels_per_mm=_PLATE_WIDTH / max(result["plate"]["y"] for result in results),
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
+        comparison=_compared(datasets) if len(datasets) > 1 else None,
         texts={"number": number_text, "interval": interval_text, "units": SHOWN_UNITS},
         study=study_text(study) if study is not None else "",
     )
@@ -123,6 +128,17 @@ def _told(name: str, dataset: xarray.Dataset, shown: int) -> dict[str, Any]:
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
         "speed": float(f"{attributes.get('hits_per_second', 0.0):.2g}"),
     }
+
+
+def _compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, str]:
+    """The comparison of the plates as text and as a picture; or why there is none."""
+    try:
+        comparison = compare(list(datasets.values()), list(datasets))
+    except ResultError as error:
+        return {"text": str(error), "picture": ""}
+    picture = BytesIO()
+    comparison_figure(comparison).savefig(picture, dpi=100)
+    return {"text": comparison_text(comparison), "picture": b64encode(picture.getvalue()).decode()}
 
 
 _PROVENANCE = (

@@ -1,0 +1,58 @@
+"""A campaign file with several plates, each of which is a campaign of its own."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from ..scene.units import quoted
+from .campaign import Campaign, CampaignError, parsed, read_text
+
+_NAME = re.compile(r"\w[\w .+-]*")
+"""Names of plates: those of their result files, too."""
+
+
+def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Campaign]:
+    """Read a campaign file with an array of tables `[[plate]]`, each with a `name`; all else is shared.
+
+    Args:
+        path: the TOML file.
+        count: number of hits, in place of the file's.
+
+    Returns:
+        Name of each plate → its campaign, in the order of the file.
+
+    Raises:
+        CampaignError: the file is missing, is no TOML, has one plate only, or asks for something that cannot be.
+    """
+    path = Path(path)
+    shared = parsed(read_text(path), str(path))
+    plates = shared.pop("plate", None)
+    if not isinstance(plates, list) or len(plates) < 2:
+        raise CampaignError(f"{path}: plate: must be two tables [[plate]] or more, each with a name, to be compared")
+    campaigns: dict[str, Campaign] = {}
+    for place, plate in enumerate(plates):
+        name = _name(plate, f"{path}: plate[{place}].name")
+        if name in campaigns:
+            raise CampaignError(f'{path}: plate[{place}].name: got "{name}" again, but each plate needs its own')
+        rest = {key: value for key, value in plate.items() if key != "name"}
+        title = {"title": f"{shared['title']}: {name}"} if isinstance(shared.get("title"), str) else {}
+        campaigns[name] = Campaign.from_text(
+            json.dumps(shared | title | {"plate": rest}, indent=1, ensure_ascii=False, default=str),
+            name=f'{path}, plate "{name}"',
+            folder=path.parent,
+            count=count,
+        )
+    return campaigns
+
+
+def _name(plate: Any, place: str) -> str:
+    if not isinstance(plate, dict) or "name" not in plate:
+        raise CampaignError(f"{place}: is missing, but must be given")
+    name = plate["name"]
+    if not isinstance(name, str) or not _NAME.fullmatch(name):
+        raise CampaignError(
+            f"{place}: got {quoted(name)}, but a name begins with a letter or digit and has only letters, digits, "
+            "blanks and any of _ . + - in it"
+        )
+    return name

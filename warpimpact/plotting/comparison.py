@@ -1,0 +1,145 @@
+"""Plates side by side: every measure with its interval, and the differences of plates beside it."""
+
+from __future__ import annotations
+
+import math
+from itertools import groupby
+from typing import TYPE_CHECKING
+
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from warpimpact.analysis.effectiveness import SHOWN_UNITS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from warpimpact.analysis.comparison import Comparison
+    from warpimpact.analysis.effectiveness import Measure
+
+# Okabe and Ito's colours, which stay apart in every kind of colour blindness; a marker for who sees none.
+_STYLES = {  # by the ending of a measure's name; the last is how far off its line it is drawn
+    "": ("mean, or share", "o", "#0072B2", -0.12),
+    "tenth": ("worst tenth", "s", "#D55E00", 0.12),
+    "point": ("worst hit", "x", "#000000", 0.12),
+}
+_GREY = "0.55"
+_ROW, _MARGIN = 0.42, 0.75
+"""Height of a line and of what surrounds the lines of a panel [inch]."""
+
+
+def comparison_figure(comparison: Comparison) -> Figure:
+    """Measures of every plate on the left, differences between plates on the right, with their intervals.
+
+    Differences whose interval holds 0, so that the plates cannot be told apart, have hollow markers.
+
+    Args:
+        comparison: the result of `analysis.comparison.compare`.
+    """
+    effects = [list(some) for _, some in groupby(comparison.plates[0].measures, key=_effect)]
+    pairs = {(pair.one, pair.other) for pair in comparison.differences}
+    heights = [
+        _MARGIN + _ROW * max(len(comparison.plates), len(pairs)) * (1.5 if len(measures) > 1 else 1.0)
+        for measures in effects
+    ]
+    figure = Figure(figsize=(12.0, sum(heights) + 1.1), layout=ConstrainedLayoutEngine(h_pad=0.12))
+    panels = figure.subplots(len(effects), 2, squeeze=False, height_ratios=heights)
+    for measures, (left, right) in zip(effects, panels, strict=True):
+        _draw_plates(left, comparison, measures)
+        _draw_differences(right, comparison, measures)
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    legend = dict(zip(labels, handles, strict=True))  # each once
+    figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
+    how = "compared as independent" if comparison.independent else "the same at every plate"
+    figure.suptitle(f"{comparison.hits} hits, {how}; 95 % intervals; hollow: cannot be told apart", fontsize="medium")
+    return figure
+
+
+def _effect(measure: Measure) -> str:
+    return measure.name.partition("_worst_")[0]
+
+
+def _statistic(measure: Measure) -> str:
+    return measure.name.partition("_worst_")[2]
+
+
+def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Measure]) -> None:
+    """Measures of one effect, one line per plate."""
+    plates = comparison.plates
+    for line, plate in enumerate(plates):
+        for told in (told for told in plate.measures if _effect(told) == _effect(measures[0])):
+            label, marker, colour, offset = _STYLES[_statistic(told)]
+            _draw_interval(axes, line + offset, told.value, told.low, told.high, marker, colour, label=label)
+            if told.name == measures[0].name and not math.isnan(told.solid):
+                axes.plot(
+                    told.solid,
+                    line + offset,
+                    "D",
+                    color=_GREY,
+                    fillstyle="none",
+                    markersize=10.0,
+                    label="solid plate of equal weight",
+                )
+    _furnish(axes, [f"{plate.name}\n{plate.areal_density:.1f} kg/m²" for plate in plates])
+    axes.set_title(_title(measures[0]), fontsize="medium", loc="left")
+
+
+def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Measure]) -> None:
+    """Differences of one effect, one line per pair of plates."""
+    names = {measure.name: measure for measure in measures}
+    lines: dict[tuple[str, str], int] = {}
+    for pair in comparison.differences:
+        if pair.measure in names:
+            line = lines.setdefault((pair.one, pair.other), len(lines))
+            _, marker, colour, offset = _STYLES[_statistic(names[pair.measure])]
+            hollow = not pair.told_apart
+            _draw_interval(axes, line + offset, pair.value, pair.low, pair.high, marker, colour, hollow=hollow)
+    axes.axvline(0.0, color=_GREY, linewidth=1.0)
+    _furnish(axes, [f"{one} − {other}" for one, other in lines])
+    better = "right" if measures[0].higher_is_better else "left"
+    axes.set_title(f"difference; {better} of 0 the first plate is better", fontsize="medium", loc="left")
+
+
+def _draw_interval(
+    axes: Axes,
+    line: float,
+    value: float,
+    low: float,
+    high: float,
+    marker: str,
+    colour: str,
+    *,
+    label: str | None = None,
+    hollow: bool = False,
+) -> None:
+    ends = None if math.isnan(low) else [[max(0.0, value - low)], [max(0.0, high - value)]]
+    axes.errorbar(
+        value,
+        line,
+        xerr=ends,
+        fmt=marker,
+        color=colour,
+        markerfacecolor="white" if hollow else colour,
+        markersize=6.5,
+        capsize=3.0,
+        label=label,
+        zorder=3,
+    )
+
+
+def _furnish(axes: Axes, lines: Sequence[str]) -> None:
+    axes.set_yticks(range(len(lines)), lines)
+    axes.set_ylim(len(lines) - 0.5, -0.5)
+    axes.grid(axis="x", color="0.9")
+    axes.margins(x=0.08)
+    axes.locator_params(axis="x", nbins=5)
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+    axes.tick_params(axis="y", length=0.0)
+
+
+def _title(measure: Measure) -> str:
+    better = "higher" if measure.higher_is_better else "lower"
+    return f"{measure.label.removesuffix(', mean')}{SHOWN_UNITS[measure.units]}; {better} is better"
