@@ -48,7 +48,8 @@ def hit_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: fl
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     for axes, (name, dataset), column in zip(panels, datasets.items(), columns, strict=True):
         _draw(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}"), scale)
-    _inscribe(figure, columns[0].title, "seen from behind the plates; colours and lengths to the same scale")
+    title, *_ = columns[0].title.splitlines()
+    _inscribe(figure, title, "seen from behind the plates; colours and lengths to the same scale")
     return figure
 
 

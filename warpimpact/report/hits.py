@@ -33,14 +33,17 @@ _MM = 1e3
 
 
 def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> NDArray[np.intp]:
-    """Indices of the hits that a page holds: all of them, or a random choice of `most`, and those to `keep`.
+    """Indices of the hits that a page holds: all of them, or `most` of them, those to `keep` and others
+    by chance.
 
-    By chance, as every so manieth hit of a grid or of a Sobol sampling leaves out parts of the cell.
+    Every so manieth hit of a grid or of a Sobol sampling would leave out parts of the cell.
     """
     count = dataset.sizes["hit"]
     if count <= most:
         return np.arange(count)
-    return np.union1d(np.random.default_rng(0).choice(count, most, replace=False), np.array(keep, dtype=int))
+    kept = np.array(keep, dtype=int)
+    others = np.setdiff1d(np.arange(count), kept)
+    return np.union1d(kept, np.random.default_rng(0).choice(others, most - len(kept), replace=False))
 
 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
@@ -58,7 +61,7 @@ def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int
 
     for hit in chosen:
         step_back(hit)
-    while len(chosen) < min(count, len(points)):
+    while len(chosen) < count and distance.max() > 0.0:
         chosen.append(int(distance.argmax()))
         step_back(chosen[-1])
     return chosen

@@ -121,7 +121,7 @@ def _told(name: str, dataset: xarray.Dataset, shown: int) -> dict[str, Any]:
         "shown": shown,
         "asked": _asked(dataset),
         "campaign": attributes.get("campaign", ""),
-        "tables": _tables(attributes.get("campaign", "")),
+        "tables": _tables(dataset),
         "statuses": list(_statuses(dataset)),
         "numbers": list(_numbers(dataset)),
         "plate": _plate(dataset),
@@ -171,21 +171,25 @@ def _asked(dataset: xarray.Dataset) -> str:
     return text
 
 
-def _tables(campaign: str) -> dict[str, dict[str, str]]:
-    """Tables of a campaign with its values as they were written, the one inside another as `plate.pattern`."""
+def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
+    """Tables of a campaign with its values as they were written, the one inside another as `plate.pattern`; the number
+    of hits may be that of the command line."""
+    campaign = dataset.attrs.get("campaign", "")
     values = json.loads(campaign) if campaign.startswith("{") else tomllib.loads(campaign)
+    tables = dict(_flat(values, ""))
+    if "count" in dataset.attrs and "count" in tables.get("hits", {}):
+        tables["hits"]["count"] = str(dataset.attrs["count"])
+    return tables
 
-    def flat(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, dict[str, str]]]:
-        plain = {
-            key: _plain(value) for key, value in table.items() if not isinstance(value, dict) and value is not None
-        }
-        if name and plain:
-            yield name, plain
-        for key, value in table.items():
-            if isinstance(value, dict):
-                yield from flat(value, f"{name}.{key}".strip("."))
 
-    return dict(flat(values, ""))
+def _flat(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, dict[str, str]]]:
+    """A table, and those inside it, by their dotted names."""
+    plain = {key: _plain(value) for key, value in table.items() if not isinstance(value, dict) and value is not None}
+    if name and plain:
+        yield name, plain
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{name}.{key}".strip("."))
 
 
 def _plain(value: object) -> str:
