@@ -1,6 +1,6 @@
 """The pictures of the README, from the campaigns of this folder: `make gallery`, or `python campaigns/gallery.py`.
 
-Each function of warpimpact.plotting takes a Dataset and returns a matplotlib Figure, as any script of yours may use them.
+Each function of warpimpact.plotting takes a Dataset and returns a matplotlib Figure: use them as this script does.
 """
 
 from io import BytesIO
