@@ -105,7 +105,7 @@ def write_report(
         version=warpimpact.__version__,
         comparison=_compared(datasets) if len(datasets) > 1 else None,
         texts={"number": number_text, "interval": interval_text, "units": SHOWN_UNITS},
-        study=study_text(study) if study is not None else "",
+        study=None if study is None else study.attrs | {"text": study_text(study)},
     )
     with aside(path) as file:
         file.write_text(page, encoding="utf-8")
