@@ -116,11 +116,12 @@ def test_thinning_keeps_parts_of_no_sampling_out() -> None:
     # Every fifth hit of a grid with rows of five lies on one line.
     y, z = np.meshgrid(np.arange(5.0), np.arange(200.0))
     grid = xarray.Dataset({"y": ("hit", y.ravel()), "z": ("hit", z.ravel())})
-    kept = grid.isel(hit=hits.thinned(grid, 200))
+    kept = hits.thinned(grid, 200)
     assert kept.sizes["hit"] == 200
+    assert (kept["y"] == grid["y"][kept["hit"].values]).all()
     assert np.bincount(kept["y"].astype(int)).min() > 20
-    assert len(hits.thinned(grid, 1000)) == 1000
-    assert {3, 999} <= set(hits.thinned(grid, 10, keep=[3, 999]).tolist())
+    assert hits.thinned(grid, 1000)["hit"].values.tolist() == list(range(1000))
+    assert {3, 999} <= set(hits.thinned(grid, 10, keep=[3, 999])["hit"].values.tolist())
 
 
 def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: ResultMaker) -> None:
@@ -134,6 +135,8 @@ def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: Re
     assert np.linalg.norm(offset, axis=-1).min(axis=1).max() < 4e-3  # of a cell of 16 mm x 8 mm
     assert len(hits.worst_and_spread(dataset.isel(hit=slice(5)), 16)) == 5
     assert hits.worst_and_spread(dataset, 16, first=[7, 509])[:5] == [7, 509, 511, 507, 505]
+    some = dataset.isel(hit=slice(7, None)).assign_coords(hit=np.arange(7, 512))
+    assert hits.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
 
 
 @pytest.mark.parametrize("status", [Status.ARRESTED, Status.MISSED])

@@ -32,26 +32,27 @@ _OUTLINE_POINTS = 60
 _MM = 1e3
 
 
-def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> NDArray[np.intp]:
-    """Indices of the hits that a page holds: all of them, or `most` of them, those to `keep` and others
-    by chance.
+def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
+    """The hits that a page holds, in memory, with their numbers as the coordinate "hit": all, or at most so many, those
+    to `keep` and others by chance.
 
     Every so manieth hit of a grid or of a Sobol sampling would leave out parts of the cell.
     """
-    count = dataset.sizes["hit"]
-    if count <= most:
-        return np.arange(count)
-    kept = np.array(keep, dtype=int)
-    others = np.setdiff1d(np.arange(count), kept)
-    return np.union1d(kept, np.random.default_rng(0).choice(others, most - len(kept), replace=False))
+    numbers = np.arange(dataset.sizes["hit"])
+    if len(numbers) > most:
+        others = np.setdiff1d(numbers, keep)
+        chosen = np.random.default_rng(0).choice(others, most - len(keep), replace=False)
+        numbers = np.union1d(chosen, np.array(keep, dtype=int))
+    return dataset.isel(hit=numbers).load().assign_coords(hit=numbers)
 
 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
-    """Which hits get a trajectory: those that are to come first, those with the largest residual velocity, then again
-    and again the hit that is farthest from all chosen so far, across the cell's edges."""
+    """Numbers of the hits that get a trajectory: those that are to come first, those with the largest residual
+    velocity, then again and again the hit that is farthest from all chosen so far, across the cell's edges."""
     velocity = shown(dataset, "residual_velocity").values
     worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")[: round(WORST_SHARE * count)]
-    chosen = list(dict.fromkeys([*first, *worst.tolist()]))[:count]
+    numbers = dataset["hit"].values
+    chosen = list(dict.fromkeys([*np.searchsorted(numbers, first).tolist(), *worst.tolist()]))[:count]
     points, period = hit_points(dataset), np.asarray(dataset.attrs["plate_period"])
     distance = np.full(len(points), np.inf)
 
@@ -64,28 +65,27 @@ def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int
     while len(chosen) < count and distance.max() > 0.0:
         chosen.append(int(distance.argmax()))
         step_back(chosen[-1])
-    return chosen
+    return [int(number) for number in numbers[chosen]]
 
 
-def page_data(datasets: Sequence[xarray.Dataset], kept: Sequence[NDArray[np.intp]]) -> dict[str, Any]:
+def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
     """What the maps of a page draw, as plain data: the variables, and each result's hits in their units.
 
     Args:
-        datasets: results, thinned.
-        kept: numbers that the hits have in their result.
+        datasets: results, each as `thinned` gives it.
     """
     columns = [_columns(dataset) for dataset in datasets]
-    shared = [key for key in columns[0] if all(key in others for others in columns[1:])]
+    shared = {key: column for key, column in columns[0].items() if all(key in others for others in columns)}
     return {
-        "variables": [{"key": key, "label": columns[0][key].label, "signed": columns[0][key].signed} for key in shared],
+        "variables": [{"key": key, "label": column.label, "signed": column.signed} for key, column in shared.items()],
         "main": [key for key in shared if key.startswith(tuple(map(words, _MAIN)))],
         "statuses": [
             {"code": status.value, "label": words(status.name.lower()), "colour": STATUS_COLOURS[status]}
             for status in Status
         ],
         "results": [
-            _map_data(dataset, {key: column[key].values for key in shared}, numbers)
-            for dataset, column, numbers in zip(datasets, columns, kept, strict=True)
+            _map_data(dataset, {key: column[key].values for key in shared})
+            for dataset, column in zip(datasets, columns, strict=True)
         ],
     }
 
@@ -103,14 +103,14 @@ def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
     return columns
 
 
-def _map_data(dataset: xarray.Dataset, columns: dict[str, Array], numbers: NDArray[np.intp]) -> dict[str, Any]:
+def _map_data(dataset: xarray.Dataset, columns: dict[str, Array]) -> dict[str, Any]:
     nearest = nearest_hits(dataset, _PIXELS)
     y, z = hit_points(dataset).T * _MM
     return {
         "period": _rounded(np.asarray(dataset.attrs["plate_period"]) * _MM),
         "limits": limits(dataset).tolist(),
         "outline": [_rounded(dataset[f"outline_{axis}"].values * _MM) for axis in "yz"],
-        "number": numbers.tolist(),
+        "number": dataset["hit"].values.tolist(),
         "y": _rounded(y),
         "z": _rounded(z),
         "status": dataset["status"].values.astype(int).tolist(),
