@@ -15,9 +15,11 @@ from warpimpact import Campaign, results
 from warpimpact.analysis.comparison import compare, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness, number_text
 from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
+from warpimpact.plotting.trajectory import poses_behind, poses_in_plate, silhouette
 from warpimpact.report import hits, report
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
@@ -62,6 +64,23 @@ def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
         assert [len(history[part]) for part in ("inside", "behind")] == [5, 2]
         y, tilt = history["behind"][1]["y"], dataset["tilt"][fastest, 1]
         assert np.ptp(y[0]) == pytest.approx(27.86 * np.cos(np.radians(tilt)), abs=3.0)
+
+
+def test_outlines_keep_the_shape_with_few_points(folder: Path) -> None:
+    history = replay(results.read(folder / "narrow.nc"), 3, folder=folder)
+    drawn = hits.trajectory_data(history)
+    for part, poses in (("inside", poses_in_plate(history)), ("behind", poses_behind(history))):
+        for core, pose in zip(drawn[part], poses.values(), strict=True):
+            for view in "yz":
+                whole, few = silhouette(history, pose, view) * 1e3, np.array(core[view]).T
+                assert len(few) < 150
+                np.testing.assert_allclose([few.min(0), few.max(0)], [whole.min(0), whole.max(0)], atol=0.02)
+                assert area(few) == pytest.approx(area(whole), rel=4e-3)
+
+
+def area(polygon: np.ndarray) -> float:
+    x, y = polygon.T
+    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
 
 
 def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
