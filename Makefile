@@ -2,11 +2,14 @@ VENV := .venv
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
 
-.PHONY: demo test clean
+.PHONY: demo gallery test clean
 
 demo: $(INSTALLED)
 	$(VENV)/bin/warpimpact run campaigns/slotted_plate.toml -o slotted.nc --overwrite
 	$(VENV)/bin/warpimpact plot slotted.nc
+
+gallery: $(INSTALLED)
+	$(VENV)/bin/python campaigns/gallery.py
 
 # The kernel and verification tests run once more in Warp's debug mode, which checks array bounds.
 test: $(INSTALLED)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .campaign.campaign import Campaign
     from .campaign.run import run
+    from .export.table import to_dataframe
     from .scene import (
         CirclePattern,
         ConeCore,
@@ -54,9 +55,10 @@ __all__ = [
     "__version__",
     "make_shots",
     "run",
+    "to_dataframe",
 ]
 
-_HOMES = {"Campaign": ".campaign.campaign", "run": ".campaign.run"}
+_HOMES = {"Campaign": ".campaign.campaign", "run": ".campaign.run", "to_dataframe": ".export.table"}
 
 
 def __getattr__(name: str) -> Any:

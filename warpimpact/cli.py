@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -57,6 +57,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_plot(commands)
     _add_compare(commands)
     _add_replay(commands)
+    _add_export(commands)
+    _add_report(commands)
     _add_study(commands)
     _add_validate(commands)
     return parser
@@ -103,11 +105,12 @@ def _add_inspect(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def _add_plot(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     parser = commands.add_parser(
         "plot",
-        help="draw the maps of a result",
-        description="Draw the maps of a result as PNG files.",
+        help="draw the maps of a result, or of several side by side",
+        description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
+        "against tilt, and how sure a map is. Of several results, maps side by side in the same colours.",
         epilog="example: warpimpact plot slotted.nc -o maps",
     )
-    parser.add_argument("result", type=Path, metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
     parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help="existing folder (default: the result's)")
     parser.set_defaults(command=_plot)
 
@@ -173,8 +176,60 @@ def _add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         metavar="FOLDER",
         help="where the files are that the campaign names, such as a hit list (default: the result's folder)",
     )
+    parser.add_argument(
+        "--animation", type=Path, metavar="HIT.gif", help="film of the hit too; HIT.mp4 where there is FFmpeg"
+    )
     parser.add_argument("--overwrite", action="store_true", help="replace an existing history")
     parser.set_defaults(command=_replay)
+
+
+def _add_export(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "export",
+        help="write a result as CSV, or a replayed hit for ParaView",
+        description="Write a result as CSV with one row per hit, or the history of a hit as a folder of VTK files: "
+        "open core.pvd and plate.pvd of it in ParaView. VTK needs: pip install 'warpimpact[vtk]'",
+        epilog="example: warpimpact export slotted.nc -o slotted.csv",
+    )
+    parser.add_argument(
+        "file", type=Path, metavar="RESULT.nc|HIT.nc", help="written by warpimpact run or warpimpact replay"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        metavar="RESULT.csv|FOLDER",
+        help="CSV file, or new folder for VTK (default: the file's name, beside it, with .csv or _vtk)",
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing CSV file")
+    parser.set_defaults(command=_export)
+
+
+def _add_report(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "report",
+        help="write a report as one HTML file",
+        description="Write a report of one or several results as one HTML file that works offline: what was asked, the "
+        "plates, maps to point at, trajectories to click, numbers with intervals, limits of the model.",
+        epilog="example: warpimpact report slotted.nc -o slotted.html",
+    )
+    parser.add_argument("results", type=Path, nargs="+", metavar="RESULT.nc", help="written by warpimpact run")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="REPORT.html", help="report (default: the first result's name, beside it)"
+    )
+    parser.add_argument(
+        "--trajectories",
+        type=_not_negative,
+        default=32,
+        metavar="N",
+        help="hits of each result to replay: the worst, and others spread evenly (default: 32)",
+    )
+    parser.add_argument("--study", type=Path, metavar="STUDY.nc", help="accuracy, as warpimpact study measured it")
+    parser.add_argument(
+        "--campaign-folder", type=Path, metavar="FOLDER", help="where the files are that campaigns name, as in replay"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing report")
+    parser.set_defaults(command=_report)
 
 
 def _add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -200,6 +255,12 @@ def _add_study(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 def _positive(text: str) -> int:
     if (number := int(text)) < 1:
         raise argparse.ArgumentTypeError(f"got {number}, but it must be at least 1")
+    return number
+
+
+def _not_negative(text: str) -> int:
+    if (number := int(text)) < 0:
+        raise argparse.ArgumentTypeError(f"got {number}, but it must not be negative")
     return number
 
 
@@ -354,18 +415,18 @@ def _inspect(arguments: argparse.Namespace) -> None:
 
 def _plot(arguments: argparse.Namespace) -> None:
     from . import results
-    from .plotting import save_maps
+    from .plotting import save_beside, save_maps
 
-    dataset = results.read(arguments.result)
-    folder = arguments.output or arguments.result.parent
+    datasets = {name: results.read(path) for name, path in _named(arguments.results).items()}
+    folder = arguments.output or arguments.results[0].parent
     _check_folder(folder)
-    for path in save_maps(dataset, folder, arguments.result.stem):
+    stem = "_".join(path.stem for path in arguments.results)
+    dataset, *others = datasets.values()
+    for path in save_beside(datasets, folder, stem) if others else save_maps(dataset, folder, stem):
         print(path)
 
 
 def _compare(arguments: argparse.Namespace) -> int:
-    from contextlib import ExitStack
-
     from . import results
     from .analysis.comparison import compare, comparison_text
     from .plotting import comparison_figure
@@ -378,6 +439,10 @@ def _compare(arguments: argparse.Namespace) -> int:
     _check_place(figure)
     angle, standoff = _quantities(arguments)
     paths = _plates_run(arguments, figure.parent) if is_campaign else _named(arguments.files)
+    if len(paths) < 2:
+        raise results.ResultError(
+            f"{arguments.files[0]}: is one result, but two or more, or one campaign, are needed to compare"
+        )
     with ExitStack() as stack:
         datasets = [stack.enter_context(results.opened(path)) for path in paths.values()]
         comparison = compare(datasets, list(paths), angle=angle, standoff=standoff)
@@ -407,8 +472,6 @@ def _named(paths: Sequence[Path]) -> dict[str, Path]:
     """Results under names that tell them apart."""
     from .results import ResultError
 
-    if len(paths) < 2:
-        raise ResultError(f"{paths[0]}: is one result, but two or more, or one campaign, are needed to compare")
     if len(set(paths)) < len(paths):
         raise ResultError("the same result is given twice")
     stems = [path.stem for path in paths]
@@ -447,11 +510,15 @@ def _replay(arguments: argparse.Namespace) -> None:
     from .analysis.hit import hit_text
     from .campaign.campaign import CampaignError
     from .campaign.replay import replay
+    from .plotting.animation import save_animation, writer_for
     from .plotting.trajectory import save_figures
 
-    result, path = results.read(arguments.result), arguments.result
+    result, path, film = results.read(arguments.result), arguments.result, arguments.animation
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
     _check_output(output, overwrite=arguments.overwrite)
+    if film:
+        writer_for(film)
+        _check_output(film, overwrite=arguments.overwrite)
     try:
         history = replay(result, arguments.hit, folder=arguments.campaign_folder or path.parent)
     except CampaignError as error:
@@ -460,6 +527,60 @@ def _replay(arguments: argparse.Namespace) -> None:
     print(hit_text(history))
     for written in (output, *save_figures(history, output.parent, output.stem)):
         print(written)
+    if film:
+        save_animation(history, film)
+        print(film)
+
+
+def _export(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .export.paraview import write_vtk
+    from .export.table import write_csv
+
+    path, output = arguments.file, arguments.output
+    with results.opened_either(path) as dataset:
+        if results.is_history(dataset):
+            output = output or path.with_name(f"{path.stem}_vtk")
+            _check_folder(output.parent)
+            if output.exists():
+                raise results.OutputError(f"{output}: exists already; name a new folder")
+            written = write_vtk(dataset.load(), output)
+        else:
+            output = output or path.with_suffix(".csv")
+            _check_output(output, overwrite=arguments.overwrite)
+            write_csv(dataset, output)
+            written = [output]
+    for file in written:
+        print(file)
+
+
+def _report(arguments: argparse.Namespace) -> None:
+    from . import results
+    from .campaign.campaign import CampaignError
+    from .report.report import write_report
+
+    paths = arguments.results
+    output = arguments.output or paths[0].with_suffix(".html")
+    _check_output(output, overwrite=arguments.overwrite)
+    named = _named(paths)
+    with ExitStack() as stack:
+        datasets = {name: stack.enter_context(results.opened(path)) for name, path in named.items()}
+        study = results.read_study(arguments.study) if arguments.study else None
+        progress = stack.enter_context(_progress())
+        try:
+            write_report(
+                datasets,
+                output,
+                folders={name: arguments.campaign_folder or path.parent for name, path in named.items()},
+                trajectories=arguments.trajectories,
+                study=study,
+                progress=progress,
+            )
+        except CampaignError as error:
+            raise CampaignError(
+                f"{error}; --campaign-folder tells where the campaign's files are, --trajectories 0 needs none"
+            ) from None
+    print(output)
 
 
 def _study(arguments: argparse.Namespace) -> None:

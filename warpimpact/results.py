@@ -495,18 +495,47 @@ def opened(path: Path) -> Iterator[xarray.Dataset]:
     Raises:
         ResultError: as in `read`.
     """
-    try:
-        dataset = xarray.open_dataset(path, engine="netcdf4")
-    except (OSError, RuntimeError) as error:
-        raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error
-    with dataset:
-        _check_is_result(dataset, path)
+    with opened_either(path) as dataset:
+        if is_history(dataset):
+            raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
         yield dataset
 
 
-def _check_is_result(dataset: xarray.Dataset, path: Path) -> None:
-    missing = (COORDINATES.keys() | VARIABLES.keys()) - dataset.variables.keys()
-    if missing:
-        raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
-    if "hit" not in dataset.sizes:
-        raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
+@contextmanager
+def opened_either(path: Path) -> Iterator[xarray.Dataset]:
+    """A result file, or the history of one of its hits, of which only what is used is read.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is neither.
+    """
+    with _netcdf(path) as dataset:
+        missing = (COORDINATES.keys() | VARIABLES.keys()) - dataset.variables.keys()
+        if missing:
+            raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
+        yield dataset
+
+
+def read_study(path: Path) -> xarray.Dataset:
+    """Read a study of speed and accuracy into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not a study.
+    """
+    with _netcdf(path) as dataset:
+        missing = (STUDY_COORDINATES.keys() | STUDY_VARIABLES.keys()) - dataset.variables.keys()
+        if missing:
+            raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
+        return dataset.load()
+
+
+def is_history(dataset: xarray.Dataset) -> bool:
+    """Whether a Dataset is the history of one hit, not a map of hits."""
+    return "hit" not in dataset.sizes
+
+
+def _netcdf(path: Path) -> xarray.Dataset:
+    """An open netCDF file."""
+    try:
+        return xarray.open_dataset(path, engine="netcdf4")
+    except (OSError, RuntimeError) as error:
+        raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error

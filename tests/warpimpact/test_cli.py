@@ -2,11 +2,14 @@
 
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import xarray
 
+from warpimpact import results
 from warpimpact.cli import main
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
@@ -122,3 +125,16 @@ def test_what_is_no_result_is_not_plotted(folder: Path, capsys: pytest.CaptureFi
     Path("a.nc").write_text("no netCDF")
     assert _refusal(["plot", "a.nc"], capsys).startswith("a.nc: cannot be read as a netCDF file")
     assert [path.name for path in folder.iterdir()] == ["a.nc"]
+
+
+def test_results_are_drawn_beside_each_other(
+    folder: Path, capsys: pytest.CaptureFixture[str], make_result: Callable[..., xarray.Dataset]
+) -> None:
+    Path("b").mkdir()
+    for path in ("a.nc", "b/a.nc"):
+        results.write(make_result(100), Path(path))
+    assert main(["plot", "a.nc", "b/a.nc"]) == 0
+    assert capsys.readouterr().out.split() == [
+        f"a_a_{name}.png" for name in ("residual_velocity", "deflection", "tilt")
+    ]
+    assert _refusal(["plot", "a.nc", "a.nc"], capsys) == "the same result is given twice"

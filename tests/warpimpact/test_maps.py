@@ -10,7 +10,7 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import hit_map, maps, overview, save_maps, status_map
+from warpimpact.plotting import cell, hit_map, hit_maps, overview, save_beside, save_maps, status_map
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
 GREY = (0.62, 0.62, 0.62)
@@ -224,7 +224,7 @@ def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered
 
 
 def test_every_status_has_its_own_colour():
-    assert len({to_rgb(colour) for colour in maps._STATUS_COLOURS}) == len(Status)
+    assert len({to_rgb(colour) for colour in cell.STATUS_COLOURS}) == len(Status)
 
 
 def test_overview_shows_four_aligned_maps(covered):
@@ -279,8 +279,30 @@ def test_save_maps_writes_one_png_per_map(covered, tmp_path):
         "plate_deflection.png",
         "plate_tilt_50mm.png",
         "plate_tilt_130mm.png",
+        "plate_marginals.png",
+        "plate_dispersion.png",
+        "plate_uncertainty.png",
     ]
     for path in paths:
         with Image.open(path) as image:
             assert image.format == "PNG"
             assert np.asarray(image.convert("L")).std() > 10.0
+
+
+def test_maps_beside_each_other_have_one_scale_of_colour_and_of_length(make_result, tmp_path):
+    wide, small = make_result(512), make_result(256)
+    small = small.assign(residual_velocity=small["residual_velocity"] - 300.0)
+    small.attrs["plate_period"] = wide.attrs["plate_period"] / 2
+    for axis in "yz":
+        small[f"hit_{axis}"] = small[f"hit_{axis}"] / 2
+    figure = hit_maps({"wide": wide, "small": small}, "residual_velocity")
+    maps_, bars = [axes for axes in figure.axes if axes.images], [axes for axes in figure.axes if not axes.images]
+    assert [axes.get_title().split("\n")[0] for axes in maps_] == ["wide", "small"]
+    norms = [axes.images[0].norm for axes in maps_]
+    assert [(norm.vmin, norm.vmax) for norm in norms] == [pytest.approx((410.0, 800.0))] * 2
+    assert [bar.get_ylim() for bar in bars] == [pytest.approx((410.0, 800.0))] * 2
+    figure.draw_without_rendering()
+    lengths = [np.diff(axes.transData.transform([(0, 0), (1, 0)])[:, 0]).item() for axes in maps_]
+    assert lengths[0] == pytest.approx(lengths[1])
+    paths = save_beside({"wide": wide, "small": small}, tmp_path, "both")
+    assert [path.name for path in paths] == [f"both_{name}.png" for name in ("residual_velocity", "deflection", "tilt")]

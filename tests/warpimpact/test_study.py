@@ -1,7 +1,9 @@
 """The study of speed and accuracy: its arithmetic on planted numbers, and a small one from end to end."""
 
+import html
 import io
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -235,6 +237,16 @@ def test_text_says_the_errors_fast_to_slow(small: xarray.Dataset) -> None:
     assert "left out" not in study_text(small)
     small = small.assign(settled=small["settled"] * 0)
     assert study_text(small).endswith("left out, as their status still depends on the numerics: 16 of 16 hits")
+
+
+def test_report_holds_the_study(
+    small: xarray.Dataset, make_result: Callable[..., xarray.Dataset], tmp_path: Path
+) -> None:
+    write(make_result(100), tmp_path / "a.nc")
+    write(small, tmp_path / "study.nc")
+    page = tmp_path / "a.html"
+    assert main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "study.nc"), "--trajectories", "0"]) == 0
+    assert study_text(small) in html.unescape(page.read_text())
 
 
 def test_figure_shows_front_fidelities_literal_scheme_and_floor(small: xarray.Dataset) -> None:

@@ -169,6 +169,7 @@ def test_figures_are_written(history: xarray.Dataset, tmp_path: Path) -> None:
         "a_passage.png",
         "a_flight.png",
         "a_largest_load.png",
+        "a_pressure.png",
         "a_course.png",
         "a_plate.png",
     ]

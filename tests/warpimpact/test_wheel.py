@@ -22,6 +22,8 @@ def test_a_wheel_computes_from_another_folder(tmp_path: Path) -> None:
     )
     (wheel,) = tmp_path.glob("*.whl")
     zipfile.ZipFile(wheel).extractall(site)
+    pages = {path.name for path in (site / "warpimpact" / "report").iterdir()}
+    assert {"page.html", "page.css", "page.js"} <= pages
     script = (
         "import warpimpact, warpimpact.kernels.march as march\n"
         "from warpimpact.cli import main\n"

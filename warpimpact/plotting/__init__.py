@@ -1,7 +1,20 @@
 """Figures: a Dataset goes in, a matplotlib Figure comes out."""
 
 from warpimpact.plotting.comparison import comparison_figure
-from warpimpact.plotting.maps import hit_map, overview, save_maps, status_map
+from warpimpact.plotting.distribution import dispersion, marginals, uncertainty
+from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
 from warpimpact.plotting.study import study_figure
 
-__all__ = ["comparison_figure", "hit_map", "overview", "save_maps", "status_map", "study_figure"]
+__all__ = [
+    "comparison_figure",
+    "dispersion",
+    "hit_map",
+    "hit_maps",
+    "marginals",
+    "overview",
+    "save_beside",
+    "save_maps",
+    "status_map",
+    "study_figure",
+    "uncertainty",
+]

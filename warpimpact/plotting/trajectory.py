@@ -18,6 +18,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
 from scipy.spatial import ConvexHull
 
+from warpimpact.plotting.pressure import pressure
 from warpimpact.results import passed
 
 if TYPE_CHECKING:
@@ -47,9 +48,8 @@ class Pose(NamedTuple):
 
 def passage(dataset: xarray.Dataset) -> Figure:
     """The core at instants spread evenly over its way through the plate (the paper's figs. 7 and 9)."""
-    steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
-    poses = {f"{float(dataset['time'][step]) * _US:.0f} µs": _pose(dataset, step) for step in steps}
-    figure, views = _views(dataset, poses.values(), "passage through the plate", room=5.0)
+    poses = poses_in_plate(dataset)
+    figure, views = two_views(dataset, poses.values(), "passage through the plate", room=5.0)
     colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
     for view, axes in views.items():
         for (label, pose), colour in zip(poses.items(), colours, strict=True):
@@ -63,10 +63,8 @@ def passage(dataset: xarray.Dataset) -> Figure:
 
 def flight(dataset: xarray.Dataset) -> Figure:
     """The core on impact and at the stand-offs behind the plate, if it gets there (the paper's figs. 8 and 10)."""
-    poses = {"impact": _pose(dataset, 0)}
-    if passed(dataset):
-        poses |= {f"{float(d) * _MM:g} mm": _pose_at(dataset, float(d)) for d in dataset["standoff"]}
-    figure, views = _views(dataset, poses.values(), "on impact and behind the plate", room=15.0)
+    poses = {"impact": pose_at_step(dataset, 0), **poses_behind(dataset)}
+    figure, views = two_views(dataset, poses.values(), "on impact and behind the plate", room=15.0)
     for view, axes in views.items():
         for label, pose in poses.items():
             outline = silhouette(dataset, pose, view) * _MM
@@ -85,9 +83,9 @@ def flight(dataset: xarray.Dataset) -> Figure:
 def largest_load(dataset: xarray.Dataset) -> Figure:
     """The core under the largest force, with force and moment as arrows (the paper's fig. 5b)."""
     step = int(np.linalg.norm(dataset["force"], axis=1).argmax())
-    pose = _pose(dataset, step)
+    pose = pose_at_step(dataset, step)
     what = f"under the largest force, at {float(dataset['time'][step]) * _US:.1f} µs"
-    figure, views = _views(dataset, [pose], what, room=_ARROW)
+    figure, views = two_views(dataset, [pose], what, room=_ARROW)
     for view, axes in views.items():
         axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor="0.55", edgecolor="black"))
         start = pose.position[[0, "xyz".index(view)]] * _MM
@@ -164,10 +162,22 @@ def plate(dataset: xarray.Dataset) -> Figure:
 def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     """Write the figures of a history as PNG files ``<stem>_<figure>.png`` and return their paths."""
     paths = []
-    for draw in (passage, flight, largest_load, course, plate):
+    for draw in (passage, flight, largest_load, pressure, course, plate):
         paths.append(folder / f"{stem}_{draw.__name__}.png")
         draw(dataset).savefig(paths[-1], dpi=150)
     return paths
+
+
+def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
+    """The core at instants spread evenly over its way through the plate, by their times."""
+    steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
+    return {f"{float(dataset['time'][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
+
+
+def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
+    """The core at the stand-offs, by their distances; none of a core that does not pass the plate."""
+    standoffs = dataset["standoff"].values.tolist() if passed(dataset) else []
+    return {f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
 
 
 def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
@@ -183,7 +193,7 @@ def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
     return outline
 
 
-def _pose(dataset: xarray.Dataset, step: int) -> Pose:
+def pose_at_step(dataset: xarray.Dataset, step: int) -> Pose:
     return Pose(dataset["plate_position"].values[step], dataset["core_axis"].values[step])
 
 
@@ -203,7 +213,9 @@ def _title(dataset: xarray.Dataset, what: str) -> str:
     return f"{dataset.attrs['title']}\nhit {dataset.attrs['hit']}: {what}"
 
 
-def _views(dataset: xarray.Dataset, poses: Iterable[Pose], what: str, *, room: float) -> tuple[Figure, dict[str, Axes]]:
+def two_views(
+    dataset: xarray.Dataset, poses: Iterable[Pose], what: str, *, room: float
+) -> tuple[Figure, dict[str, Axes]]:
     """A figure of two views to scale that hold the plate, all poses of the core and some room [mm] round them."""
     poses = list(poses)
     corners = {}

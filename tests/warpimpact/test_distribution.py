@@ -1,0 +1,100 @@
+"""Distributions of a map: quantiles where they belong, intervals that hold what they claim, and nothing invented."""
+
+import numpy as np
+import pytest
+
+from warpimpact.analysis.local import NEIGHBOURS, plane_fit
+from warpimpact.kernels.status import Status
+from warpimpact.plotting import dispersion, marginals, uncertainty
+
+MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
+
+
+def test_a_plane_is_found_exactly():
+    offsets = np.random.default_rng(1).normal(size=(5, NEIGHBOURS, 2)) * 1e-3
+    local = plane_fit(offsets, 700.0 + offsets @ [3e4, -2e4])
+    np.testing.assert_allclose(local.value, 700.0)
+    assert (local.half_width < 1e-9).all()
+
+
+@pytest.mark.parametrize("confidence", [0.5, 0.95])
+def test_intervals_hold_the_plane_as_often_as_they_say(confidence):
+    random, points = np.random.default_rng(2), 4000
+    offsets = random.uniform(-1.0, 1.0, (points, NEIGHBOURS, 2))
+    local = plane_fit(offsets, 5.0 + offsets @ [2.0, 1.0] + random.normal(0.0, 3.0, (points, NEIGHBOURS)), confidence)
+    share = np.mean(np.abs(local.value - 5.0) <= local.half_width)
+    assert share == pytest.approx(confidence, abs=4.0 * np.sqrt(confidence * (1.0 - confidence) / points))
+    assert np.sqrt(np.mean(local.spread**2)) == pytest.approx(3.0, rel=0.02)
+
+
+def test_hits_on_one_point_give_their_mean():
+    values = np.random.default_rng(3).normal(size=(1, NEIGHBOURS))
+    local = plane_fit(np.zeros((1, NEIGHBOURS, 2)), values)
+    assert local.value == pytest.approx(values.mean())
+    assert np.isfinite(local.half_width).all()
+
+
+def test_uncertainty_shows_local_mean_and_interval_across_the_edges(make_result):
+    dataset = make_result(2048)
+    period = dataset.attrs["plate_period"][0]
+    wave = np.cos(2.0 * np.pi * dataset["hit_y"] / period)  # runs on across the edges
+    noise = np.random.default_rng(4).normal(0.0, 2.0, 2048)
+    dataset["residual_velocity"].values[:] = 700.0 + 50.0 * wave + noise
+    figure = uncertainty(dataset, "residual_velocity")
+    value, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
+    truth = 700.0 + 50.0 * np.cos(2.0 * np.pi * ((np.arange(100) + 0.5) / 100 - 0.5))
+    held = np.mean(np.abs(value - truth) <= half_width)
+    assert 0.9 < held < 0.99
+    assert np.abs(value - truth)[:, [0, -1]].max() < 4.0
+    assert np.median(half_width) == pytest.approx(2.08 * 2.0 / np.sqrt(NEIGHBOURS), rel=0.1)
+
+
+def test_uncertainty_is_grey_where_hits_have_no_value(make_result):
+    dataset = make_result(np.where(np.arange(512) % 4, Status.PERFORATED, Status.ARRESTED))
+    image = np.asarray(uncertainty(dataset, "tilt").axes[0].images[0].get_array())
+    assert 0.1 < np.isnan(image).mean() < 0.4
+
+
+def test_hits_that_leave_gaps_have_no_uncertainty(make_result):
+    with pytest.raises(ValueError, match="do not cover the cell"):
+        uncertainty(make_result(32), "tilt")
+
+
+def test_marginals_are_the_quantiles_of_strips(make_result):
+    dataset = make_result(1000)
+    dataset["residual_velocity"].values[:] = 700.0 + 1e3 * dataset["hit_y"]
+    (centre,) = marginals(dataset, "residual_velocity").axes
+    above, beside, _, histogram = centre.child_axes
+    (median,) = above.lines
+    np.testing.assert_allclose(median.get_ydata(), 700.0 + median.get_xdata(), atol=0.2)
+    assert len(median.get_xdata()) == 20
+    (median,) = beside.lines
+    np.testing.assert_allclose(median.get_xdata(), 700.0, atol=4.0)
+    assert sum(patch.get_width() for patch in histogram.patches) == 1000
+    assert above.get_xlim() == centre.get_xlim()
+    assert beside.get_ylim() == centre.get_ylim()
+
+
+@pytest.mark.parametrize("status", [Status.ARRESTED, Status.PERFORATED])
+def test_uniform_results_have_marginals_and_dispersion(make_result, status):
+    dataset = make_result([status] * 100)
+    dataset["residual_velocity"][:] = 764.0
+    for figure in (marginals(dataset, "residual_velocity"), dispersion(dataset), uncertainty(dataset, "tilt")):
+        figure.draw_without_rendering()
+
+
+@pytest.mark.parametrize("count", [400, 12000])
+def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
+    dataset = make_result(np.tile(MIXED, count // 4))
+    figure = dispersion(dataset, 0.05)
+    above, centre, *_ = figure.axes
+    assert centre.get_xlabel() == "tilt, 50 mm behind the plate [°]"
+    assert centre.get_ylabel() == "residual velocity [m/s]"
+    shown = centre.collections[0]
+    if count > 8000:
+        assert shown.get_array().sum() == count / 2
+    else:
+        behind = dataset.isel(hit=np.isin(dataset["status"], [Status.PERFORATED, Status.MISSED]))
+        expected = np.stack([behind["tilt"][:, 0], behind["residual_velocity"]], axis=-1)
+        np.testing.assert_allclose(shown.get_offsets(), expected)
+    assert sum(patch.get_height() for patch in above.patches) == count / 2

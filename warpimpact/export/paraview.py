@@ -1,0 +1,113 @@
+"""The history of a hit as files of VTK, which ParaView plays: the core's surface on its way, and the weakening plate.
+
+Built with PyVista (`pip install 'warpimpact[vtk]'`). A folder holds ``core.pvd`` and ``plate.pvd``, which name the time
+of each of the files beside them. Lengths are in metres in the frame of the plate, times in seconds.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray
+from scipy.spatial.transform import Rotation
+
+from warpimpact.results import OutputError
+
+if TYPE_CHECKING:
+    import pyvista
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+AROUND = 48
+"""Points round the core's surface."""
+_BODY = ("velocity", "angular_velocity", "force", "moment")
+
+
+def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
+    """Write a history into a new folder, whole or not at all; returns the two files to open.
+
+    Args:
+        history: a Dataset of `results.history_dataset`.
+
+    Raises:
+        OutputError: PyVista is not installed, or the folder cannot be written.
+    """
+    try:
+        import pyvista  # noqa: F401
+    except ImportError:
+        raise OutputError(f"{folder}: VTK needs PyVista: pip install 'warpimpact[vtk]'") from None
+    try:
+        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as aside:
+            pieces = Path(aside) / "vtk"
+            pieces.mkdir()
+            _write_series(pieces, "core", "vtp", history["time"].values, cores(history))
+            _write_series(pieces, "plate", "vti", history["snapshot"].values, plates(history))
+            pieces.rename(folder)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error})") from error
+    return [folder / "core.pvd", folder / "plate.pvd"]
+
+
+def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
+    """The core's surface at every step: quadrilaterals with the velocity [m/s] of each point, and what the history
+    holds of the whole body as field data."""
+    import pyvista
+
+    station, radius = history["station"].values, history["core_radius"].values
+    azimuth = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
+    ring = np.stack([np.zeros(AROUND), np.cos(azimuth), np.sin(azimuth)], axis=-1)
+    arms = (station[:, None, None] * [1.0, 0.0, 0.0] + radius[:, None, None] * ring).reshape(-1, 3)
+    faces = _faces(len(station))
+    for step in range(history.sizes["time"]):
+        now = history.isel(time=step)
+        turned = Rotation.from_quat(now["attitude"].values).apply(arms)
+        velocity = now["velocity"].values + np.cross(now["angular_velocity"].values, turned)
+        surface = pyvista.PolyData((now["plate_position"].values + turned).astype(np.float32), faces)
+        surface.point_data["velocity"] = velocity.astype(np.float32)
+        for name in _BODY:
+            surface.field_data[f"core_{name}"] = now[name].values[None, :]
+        yield surface
+
+
+def _faces(rings: int) -> NDArray[np.int64]:
+    """Quadrilaterals between rings, and the polygons that close nose and base, as PyVista takes them."""
+    here = np.arange(AROUND)
+    nxt = (here + 1) % AROUND
+    start = AROUND * np.arange(rings - 1)[:, None]
+    quads = np.stack([start + here, start + nxt, start + nxt + AROUND, start + here + AROUND], axis=-1).reshape(-1, 4)
+    sides = np.hstack([np.full((len(quads), 1), 4), quads]).ravel()
+    base = AROUND * (rings - 1) + here
+    return np.concatenate([sides, [AROUND], here[::-1], [AROUND], base])
+
+
+def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
+    """The plate within reach of the core at every snapshot: a layer of cells with the share of the resistance left."""
+    import pyvista
+
+    y, z = history["cell_y"].values, history["cell_z"].values
+    dy, dz = y[1] - y[0], z[1] - z[0]
+    for share in history["resistance_share"].values:
+        grid = pyvista.ImageData(
+            dimensions=(2, len(y) + 1, len(z) + 1),
+            spacing=(history.attrs["plate_thickness"], dy, dz),
+            origin=(0.0, y[0] - 0.5 * dy, z[0] - 0.5 * dz),
+        )
+        grid.cell_data["resistance_share"] = share.ravel(order="F")
+        yield grid
+
+
+def _write_series(folder: Path, name: str, kind: str, times: Array, meshes: Iterator[pyvista.DataSet]) -> None:
+    """Write meshes as ``<name>_<number>.<kind>`` and ``<name>.pvd``, which names the time of each."""
+    root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
+    collection = ElementTree.SubElement(root, "Collection")
+    for number, (time, mesh) in enumerate(zip(times, meshes, strict=True)):
+        file = f"{name}_{number:04d}.{kind}"
+        mesh.save(folder / file)
+        ElementTree.SubElement(collection, "DataSet", timestep=repr(float(time)), part="0", file=file)
+    ElementTree.ElementTree(root).write(folder / f"{name}.pvd", xml_declaration=True, encoding="utf-8")

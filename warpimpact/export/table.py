@@ -1,0 +1,50 @@
+"""A hit map as a plain table, for pandas and for spreadsheets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import xarray
+
+from warpimpact.analysis.summary import slices
+from warpimpact.results import aside, status_codes
+
+
+def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
+    """One row per hit, in the units of the Dataset.
+
+    What a hit has at every stand-off or along every axis gets a column for each: ``tilt_130mm``,
+    ``angular_velocity_x``. ``status`` is a word.
+    """
+    columns = {}
+    for name in ("hit_y", "hit_z", *dataset.data_vars):
+        array = dataset[name]
+        if array.dims == ("hit",):
+            columns[str(name)] = array.values
+        elif array.dims == ("hit", "standoff"):
+            for index, standoff in enumerate(dataset["standoff"].values):
+                columns[f"{name}_{standoff * 1e3:g}mm"] = array.values[:, index]
+        elif array.dims == ("hit", "axis"):
+            for index, axis in enumerate(dataset["axis"].values):
+                columns[f"{name}_{axis}"] = array.values[:, index]
+    words = {code: word for word, code in status_codes(dataset).items()}
+    columns["status"] = pd.Categorical.from_codes(columns["status"].astype(int), categories=pd.Index(words.values()))
+    return pd.DataFrame(columns).rename_axis(index="hit")
+
+
+def write_csv(dataset: xarray.Dataset, path: Path) -> None:
+    """Write `to_dataframe` as CSV, whole or not at all; of an open file only a slice is in memory at a time.
+
+    Numbers have all the digits that tell them apart; what does not exist is empty.
+
+    Raises:
+        OutputError: the file cannot be written; what was there before is untouched.
+    """
+    first = 0
+    with aside(path) as file:
+        for part in slices(dataset):
+            frame = to_dataframe(part)
+            frame.index += first
+            frame.to_csv(file, mode="a" if first else "w", header=not first)
+            first += len(frame)

@@ -1,0 +1,82 @@
+"""One hit as a film: the core on its way through the plate, in the two views of `plotting.trajectory`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray
+from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, FuncAnimation, PillowWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.patches import Polygon
+
+from warpimpact.plotting.trajectory import Pose, pose_at_step, silhouette, two_views
+from warpimpact.results import OutputError
+
+FRAMES = 50
+_PER_SECOND = 20
+_MM, _US = 1e3, 1e6
+
+
+def animation(dataset: xarray.Dataset) -> FuncAnimation:
+    """Film of a history, from the first touch to the end of contact, evenly in time.
+
+    Between two steps the core flies straight on and its axis turns evenly, as it does in the model.
+    """
+    times = np.linspace(float(dataset["time"][0]), float(dataset["time"][-1]), FRAMES)
+    between = dataset[["plate_position", "core_axis", "velocity"]].interp(time=times)
+    poses = [_unit(pose_at_step(between, frame)) for frame in range(FRAMES)]
+    speeds = np.linalg.norm(between["velocity"], axis=1)
+    figure, panels = two_views(dataset, poses, "", room=4.0)
+    FigureCanvasAgg(figure)
+    cores = {view: Polygon(np.zeros((1, 2)), facecolor="0.55", edgecolor="black") for view in panels}
+    for view, axes in panels.items():
+        axes.add_patch(cores[view])
+        axes.plot(*np.array([pose.position[[0, "xyz".index(view)]] for pose in poses]).T * _MM, "k--", lw=0.8)
+    title = figure.get_suptitle().rstrip(": ")
+
+    def show(frame: int) -> list[Polygon]:
+        for view, core in cores.items():
+            core.set_xy(silhouette(dataset, poses[frame], view) * _MM)
+        tilt = np.degrees(np.arccos(np.clip(poses[frame].axis @ _line_of_fire(dataset), -1.0, 1.0)))
+        figure.suptitle(f"{title}\n{times[frame] * _US:5.1f} µs, {speeds[frame]:.0f} m/s, tilt {tilt:.1f}°")
+        return list(cores.values())
+
+    show(0)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # places hold for all frames, and solving for them takes most of the time
+    return FuncAnimation(figure, show, frames=FRAMES, interval=1e3 / _PER_SECOND)
+
+
+def save_animation(dataset: xarray.Dataset, path: Path) -> None:
+    """Write the film of a history as GIF, or as MP4 where there is FFmpeg.
+
+    Raises:
+        OutputError: as `writer_for`.
+    """
+    animation(dataset).save(path, writer=writer_for(path), dpi=80)
+
+
+def writer_for(path: Path) -> AbstractMovieWriter:
+    """What writes a film of this name.
+
+    Raises:
+        OutputError: the name ends otherwise, or there is no FFmpeg for a MP4.
+    """
+    match path.suffix.lower():
+        case ".gif":
+            return PillowWriter(fps=_PER_SECOND)
+        case ".mp4" if FFMpegWriter.isAvailable():
+            return FFMpegWriter(fps=_PER_SECOND)
+        case ".mp4":
+            raise OutputError(f"{path}: a MP4 needs the program ffmpeg, which is not found; a name in .gif does not")
+    raise OutputError(f"{path}: is no film that can be written; its name must end in .gif or .mp4")
+
+
+def _unit(pose: Pose) -> Pose:
+    return Pose(pose.position, pose.axis / np.linalg.norm(pose.axis))
+
+
+def _line_of_fire(dataset: xarray.Dataset) -> np.ndarray:
+    obliquity, azimuth = (np.radians(float(dataset[name])) for name in ("obliquity", "azimuth"))
+    return np.array([np.cos(obliquity), np.sin(obliquity) * np.cos(azimuth), np.sin(obliquity) * np.sin(azimuth)])

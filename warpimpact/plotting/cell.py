@@ -1,0 +1,272 @@
+"""What hit maps are made of: values of hits as people read them, their colours, and the unit cell painted with them.
+
+Hits that cover the cell are drawn as an image in which every pixel has the colour of the nearest hit, counted
+across the cell's edges; hits that are few or leave gaps are drawn as points. The view is against the line of
+fire, from behind the plate: y to the right, z up, x towards the viewer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import xarray
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.patches import Patch
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.transforms import ScaledTranslation
+from scipy.spatial import KDTree
+
+from warpimpact.results import BENDING_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES, passed, status_codes
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Colormap
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Scale = tuple[Colormap, Normalize]
+
+MAPPED = tuple(
+    name
+    for name, variable in (SHOT_VARIABLES | OUTCOME_VARIABLES | BENDING_VARIABLES).items()
+    if name != "status" and variable.dims in {("hit",), ("hit", "standoff")}
+)
+
+PIXELS = 400  # along the longer side of the cell
+FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail that is not there
+WIDEST_GAP = 3.0  # distance to a hit that an image bridges, in mean hit spacings; random hits reach about 2
+GREY = "0.62"  # of hits without a value
+# Okabe and Ito's colours, which stay apart in every kind of colour blindness.
+STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00")
+
+_SIGNED = {"azimuth", "impact_pitch", "impact_yaw", "pitch", "yaw"}
+_BEHIND = {"residual_velocity", "deflection"}  # a ricochet has them too, but in front of the plate
+_MM = 1e3
+# Units as people write them, and the factor from those of the Dataset.
+_SHOWN_UNITS = {
+    "m s-1": (" m/s", 1.0),
+    "rad s-1": (" rad/s", 1.0),
+    "degree": ("°", 1.0),
+    "J": (" J", 1.0),
+    "s": (" µs", 1e6),
+    "N m": (" N m", 1.0),
+    "Pa": (" GPa", 1e-9),
+    "m": (" mm", 1e3),
+}
+
+
+class Shown(NamedTuple):
+    """A variable of the hits as it is shown: values of shape [hits], NaN where a hit has none; what an axis and a
+    title call it; and whether it has a sign."""
+
+    values: Array
+    label: str
+    title: str
+    signed: bool
+
+
+def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Shown:
+    """One variable in the units that people read.
+
+    Args:
+        dataset: the result of a campaign.
+        variable: one of `MAPPED`. Residual velocity and deflection are those of cores that passed the plate.
+        standoff: distance behind the plate [m] for a variable that has one; the largest if None.
+
+    Raises:
+        ValueError: the variable cannot be mapped, or the Dataset has no such stand-off.
+    """
+    array = _selected(dataset, variable, standoff)
+    unit, factor = _SHOWN_UNITS[array.attrs["units"]]
+    exists = np.isfinite(array.values) & (passed(dataset) if variable in _BEHIND else True)
+    title = words(variable)
+    if "standoff" in array.coords:
+        title += f", {float(array['standoff']) * _MM:g} mm behind the plate"
+    if array.attrs["long_name"] != title:
+        title += f"\n{array.attrs['long_name']}"
+    values = np.where(exists, array.values * factor, np.nan)
+    return Shown(values, f"{words(variable)} [{unit.strip()}]", title, variable in _SIGNED)
+
+
+def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None) -> xarray.DataArray:
+    """The variable, shape (hit,), at one stand-off if it has any."""
+    mapped = [name for name in MAPPED if name in dataset]
+    if variable not in mapped:
+        raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
+    array = dataset[variable]
+    if "standoff" not in array.dims:
+        return array
+    distances = dataset["standoff"].values
+    index = distances.size - 1 if standoff is None else int(np.argmin(np.abs(distances - standoff)))
+    if standoff is not None and not np.isclose(distances[index], standoff):
+        known = ", ".join(f"{distance:g}" for distance in distances)
+        raise ValueError(f"the result has no stand-off of {standoff:g} m; it has {known} m")
+    return array.isel(standoff=index)
+
+
+def words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def shots_text(dataset: xarray.Dataset) -> str:
+    """How many hits there are, at what velocity and obliquity."""
+    velocity, obliquity = (range_text(dataset[name]) for name in ("impact_velocity", "obliquity"))
+    return f"{dataset.sizes['hit']} hits, {velocity}, obliquity {obliquity}"
+
+
+def range_text(array: xarray.DataArray) -> str:
+    """The value that all hits share, or the range of the values, with its unit."""
+    unit, factor = _SHOWN_UNITS[array.attrs["units"]]
+    lowest, highest = f"{array.values.min() * factor:.4g}", f"{array.values.max() * factor:.4g}"
+    return f"{lowest}{unit}" if lowest == highest else f"{lowest} to {highest}{unit}"
+
+
+def limits(dataset: xarray.Dataset) -> Array:
+    """Range [mm] along y and z that holds the whole cell and every hit, shape [2, 2]."""
+    half = np.asarray(dataset.attrs["plate_period"]) / 2
+    hits = hit_points(dataset)
+    return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * _MM
+
+
+def hit_points(dataset: xarray.Dataset) -> Array:
+    """Where the hits are [m], shape [hits, 2]."""
+    return np.stack([dataset["hit_y"].values, dataset["hit_z"].values], axis=-1)
+
+
+def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
+    """Colours for the values of all columns: symmetric about a neutral zero if they have a sign; grey for NaN."""
+    together = np.concatenate(columns)
+    finite = together[np.isfinite(together)]
+    if signed:
+        highest = np.max(np.abs(finite), initial=0.0)
+        lowest = -highest
+    else:
+        lowest, highest = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
+        if np.isclose(lowest, highest):
+            lowest = highest  # rounding is no pattern
+    colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=GREY)
+    return colours, Normalize(lowest, highest)
+
+
+def draw_values(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale) -> ScalarMappable:
+    """Draw values of the hits, shape [hits], with the holes and a legend; what is returned takes a colour bar."""
+    artist = _paint(axes, dataset, values, *scale)
+    exists = np.isfinite(values)
+    _furnish(axes, dataset, [] if exists.all() else [Patch(facecolor=GREY, label=_without_value(dataset, exists))])
+    return artist
+
+
+def draw_status(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Draw how the shots ended, with the share of each status in the legend."""
+    status = dataset["status"].values
+    scale = Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
+    _paint(axes, dataset, status.astype(float), ListedColormap(STATUS_COLOURS), scale)
+    entries: list[Artist] = [
+        Patch(facecolor=STATUS_COLOURS[code], label=f"{words(name)} {np.mean(status == code):.1%}")
+        for name, code in status_codes(dataset).items()
+        if np.any(status == code)
+    ]
+    _furnish(axes, dataset, entries)
+    axes.set_title("status", fontsize="medium")
+
+
+def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
+    """Draw the edges of holes so that they show on any colour, and set the axes to the cell, to scale.
+
+    Returns the entry of a legend, none of a solid plate.
+    """
+    (left, right), (bottom, top) = limits(dataset)
+    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="hit y [mm]", ylabel="hit z [mm]", aspect="equal")
+    if not dataset.sizes["vertex"]:
+        return []
+    (edge,) = axes.plot(
+        dataset["outline_y"] * _MM,
+        dataset["outline_z"] * _MM,
+        color="white",
+        linewidth=1.2,
+        path_effects=[Stroke(linewidth=2.8, foreground="black"), Normal()],
+        scalex=False,
+        scaley=False,
+        label="edge of hole",
+    )
+    return [edge]
+
+
+def pixels(dataset: xarray.Dataset, count: int = PIXELS) -> Array:
+    """Centres [m] of the cell's pixels, from its lower left corner on, shape [z, y, 2]; `count` along the longer
+    side."""
+    period = np.asarray(dataset.attrs["plate_period"])
+    counts = np.ceil(count * period / period.max()).astype(int)
+    y, z = ((np.arange(n) + 0.5) / n * length for n, length in zip(counts, period, strict=True))
+    return np.stack(np.meshgrid(y, z), axis=-1)
+
+
+def tree_of(dataset: xarray.Dataset, which: NDArray[np.bool_] | slice = slice(None)) -> KDTree:
+    """Hits to look up from `pixels`, across the cell's edges."""
+    period = np.asarray(dataset.attrs["plate_period"])
+    return KDTree((hit_points(dataset)[which] + period / 2) % period, boxsize=period)
+
+
+def nearest_hits(dataset: xarray.Dataset, count: int = PIXELS) -> NDArray[np.intp] | None:
+    """Index of the hit nearest to each of the `pixels`, shape [z, y]; None if the hits do not cover the cell."""
+    period, hits = np.asarray(dataset.attrs["plate_period"]), hit_points(dataset)
+    if len(hits) < FEWEST_HITS or np.any(np.abs(hits) > period / 2):
+        return None
+    distance, nearest = tree_of(dataset).query(pixels(dataset, count))
+    spacing = np.sqrt(period.prod() / len(hits))
+    return nearest if distance.max() <= WIDEST_GAP * spacing else None
+
+
+def paint_pixels(axes: Axes, dataset: xarray.Dataset, image: Array, scale: Scale) -> ScalarMappable:
+    """Colour the cell by an image of shape [z, y]."""
+    y, z = np.asarray(dataset.attrs["plate_period"]) / 2 * _MM
+    colours, norm = scale
+    extent = (-y, y, -z, z)
+    return axes.imshow(image, cmap=colours, norm=norm, origin="lower", extent=extent, interpolation="nearest")
+
+
+def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap, norm: Normalize) -> ScalarMappable:
+    """Colour the cell by values of the hits, shape (hit,): as an image if hits cover it, else as points."""
+    nearest = nearest_hits(dataset)
+    if nearest is not None:
+        return paint_pixels(axes, dataset, values[nearest], (colours, norm))
+    y, z = hit_points(dataset).T * _MM
+    return axes.scatter(
+        y,
+        z,
+        c=values,
+        cmap=colours,
+        norm=norm,
+        s=36,
+        edgecolors="black",
+        linewidths=0.6,
+        plotnonfinite=True,
+        zorder=3,
+    )
+
+
+def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_]) -> str:
+    """Legend of the grey hits: how they ended."""
+    found = set(dataset["status"].values[~exists].tolist())
+    return fill(", ".join(words(name) for name, code in status_codes(dataset).items() if code in found), 30)
+
+
+def _furnish(axes: Axes, dataset: xarray.Dataset, entries: list[Artist]) -> None:
+    """Add holes and a legend below."""
+    entries = [*entries, *draw_holes(axes, dataset)]
+    if entries:
+        below = axes.transAxes + ScaledTranslation(0.0, -0.5, axes.figure.dpi_scale_trans)
+        axes.legend(
+            handles=entries,
+            loc="upper center",
+            bbox_to_anchor=(0.5, 0.0),
+            bbox_transform=below,
+            ncols=2,
+            frameon=False,
+        )

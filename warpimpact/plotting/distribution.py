@@ -1,0 +1,172 @@
+"""Figures of how values spread: along the cell, against each other, and round the value that hits nearby tell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray
+from matplotlib.figure import Figure
+
+from warpimpact.analysis.local import NEIGHBOURS, plane_fit
+from warpimpact.plotting.cell import (
+    draw_holes,
+    draw_values,
+    hit_points,
+    limits,
+    nearest_hits,
+    paint_pixels,
+    pixels,
+    scale_of,
+    shots_text,
+    shown,
+    tree_of,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_MM = 1e3
+_LONGER_SIDE = 4.2  # of a map on paper [inch]
+_BLUE, _VERMILION = "#0072B2", "#D55E00"  # Okabe and Ito's colours
+_BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # quantiles, and how dark
+_PER_STRIP, _MOST_STRIPS = 50, 48  # hits that quantiles are taken of at least; strips along one axis at most
+_FINE = 100  # pixels along the longer side of a smoothed map
+_MOST_POINTS = 4000  # more are drawn as a density
+
+
+def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+    """A map with the distribution of its values along y, along z, and over the whole cell.
+
+    Strips of the cell, each with as many hits, give the median and the middle 50 and 90 %. Args and errors are those
+    of `cell.shown`.
+    """
+    column = shown(dataset, variable, standoff)
+    size = _map_size(dataset)
+    figure = Figure(figsize=(size[0] + 4.6, size[1] + 2.9), layout="constrained")
+    figure.suptitle(f"{dataset.attrs.get('title', '')}\n{column.title}")
+    centre = figure.subplots()
+    artist = draw_values(centre, dataset, column.values, scale_of([column.values], signed=column.signed))
+    exists = np.isfinite(column.values)
+    if exists.any():
+        wide, tall = 1.0 / size  # an inch, as a share of the map
+        above = centre.inset_axes((0.0, 1.0 + 0.12 * tall, 1.0, 1.2 * tall), sharex=centre)
+        beside = centre.inset_axes((1.0 + 0.12 * wide, 0.0, 1.2 * wide, 1.0), sharey=centre)
+        bar = centre.inset_axes((1.0 + 1.6 * wide, 0.0, 0.17 * wide, 1.0))
+        histogram = centre.inset_axes((1.0 + 1.77 * wide, 0.0, 1.2 * wide, 1.0))
+        values, points = column.values[exists], hit_points(dataset)[exists] * _MM
+        _draw_strips(above, points[:, 0], values, upright=False)
+        _draw_strips(beside, points[:, 1], values, upright=True)
+        above.set_ylabel(column.label)
+        beside.set_xlabel(column.label)
+        figure.colorbar(artist, cax=bar).set_ticks([])
+        histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=_BLUE, alpha=0.5)
+        histogram.axhline(np.median(values), color="black", lw=1.2)
+        histogram.set(ylim=artist.get_clim() if np.ptp(values) else None, xlabel="hits", ylabel=column.label)
+        histogram.yaxis.tick_right()
+        histogram.yaxis.set_label_position("right")
+    figure.supxlabel(shots_text(dataset), fontsize="small", color="0.3")
+    return figure
+
+
+def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
+    """Residual velocity against tilt at a stand-off, the largest if None, with the distribution of each."""
+    figure = Figure(figsize=(7.5, 6.5), layout="constrained")
+    figure.suptitle(dataset.attrs.get("title", ""))
+    grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
+    (above, corner), (centre, beside) = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
+    corner.remove()
+    tilt, velocity = draw_dispersion(centre, dataset, standoff)
+    for axes, values, orientation in ((above, tilt, "vertical"), (beside, velocity, "horizontal")):
+        axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
+        axes.label_outer()
+    figure.supxlabel(shots_text(dataset), fontsize="small", color="0.3")
+    return figure
+
+
+def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None = None) -> tuple[Array, Array]:
+    """Draw residual velocity against tilt, with their medians; returns tilt [degree] and velocity [m/s] as drawn."""
+    tilt, velocity = (shown(dataset, name, standoff) for name in ("tilt", "residual_velocity"))
+    both = np.isfinite(tilt.values) & np.isfinite(velocity.values)
+    x, y = tilt.values[both], velocity.values[both]
+    if len(x) > _MOST_POINTS:
+        density = axes.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
+        axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per cell")
+    else:
+        axes.scatter(x, y, s=7, color=_BLUE, alpha=0.4, linewidths=0)
+    if len(x):
+        axes.axvline(np.median(x), color=_VERMILION, lw=1.0, ls="--", label="medians")
+        axes.axhline(np.median(y), color=_VERMILION, lw=1.0, ls="--")
+        axes.legend(frameon=False, loc="best")
+    axes.set(xlabel=f"{tilt.title.partition(chr(10))[0]} [°]", ylabel=velocity.label)
+    return x, y
+
+
+def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+    """What hits nearby tell of a map, beside half the width of its 95 % interval (`analysis.local.plane_fit`).
+
+    Args:
+        dataset: a result whose hits cover the cell; the others as in `cell.shown`.
+
+    Raises:
+        ValueError: the hits do not cover the cell; and as `cell.shown`.
+    """
+    column = shown(dataset, variable, standoff)
+    nearest = nearest_hits(dataset, _FINE)
+    if nearest is None:
+        raise ValueError("the hits do not cover the cell, so nothing is known between them")
+    value, half_width = _smoothed(dataset, column.values, nearest)
+    width, height = _map_size(dataset)
+    figure = Figure(figsize=(2.0 * width + 4.0, height + 1.9), layout="constrained")
+    figure.suptitle(f"{dataset.attrs.get('title', '')}\n{column.title}")
+    labels = f"local mean of {column.label}", f"half width of its 95 % interval [{column.label.partition('[')[2]}"
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    for axes, image, label in zip(panels, (value, half_width), labels, strict=True):
+        figure.colorbar(paint_pixels(axes, dataset, image, scale_of([image.ravel()])), ax=axes, label=label)
+        draw_holes(axes, dataset)
+    note = f"plane through the {NEIGHBOURS} nearest hits, Student's interval; {shots_text(dataset)}"
+    figure.supxlabel(note, fontsize="small", color="0.3")
+    return figure
+
+
+def _smoothed(dataset: xarray.Dataset, values: Array, nearest: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Local mean and half width of its interval at every pixel, NaN where the nearest hit has no value."""
+    images = np.full((2, *nearest.shape), np.nan)
+    exists = np.isfinite(values)
+    there = exists[nearest]
+    if exists.sum() >= NEIGHBOURS:
+        period = np.asarray(dataset.attrs["plate_period"])
+        points = pixels(dataset, _FINE)[there]
+        _, near = tree_of(dataset, exists).query(points, k=NEIGHBOURS)
+        offsets = (hit_points(dataset)[exists] + period / 2)[near] - points[:, None]
+        local = plane_fit(offsets - period * np.round(offsets / period), values[exists][near])
+        images[:, there] = local.value, local.half_width
+    return images[0], images[1]
+
+
+def _map_size(dataset: xarray.Dataset) -> Array:
+    """Width and height of a map to scale [inch]."""
+    extent = np.ptp(limits(dataset), axis=1)
+    size: Array = _LONGER_SIDE * extent / extent.max()
+    return size
+
+
+def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> None:
+    """Draw quantiles of the values against where they are, upright along the vertical axis."""
+    strips = np.array_split(np.argsort(places), np.clip(len(places) // _PER_STRIP, 1, _MOST_STRIPS))
+    middles = [places[strip].mean() for strip in strips]
+
+    def quantiles(share: float) -> list[float]:
+        return [float(np.quantile(values[strip], share)) for strip in strips]
+
+    fill = axes.fill_betweenx if upright else axes.fill_between
+    for label, (low, high, alpha) in _BANDS.items():
+        fill(middles, quantiles(low), quantiles(high), color=_BLUE, alpha=alpha, lw=0, label=label)
+    median = (quantiles(0.5), middles) if upright else (middles, quantiles(0.5))
+    axes.plot(*median, color="black", lw=1.2, label="median")
+    axes.tick_params(labelleft=not upright, labelbottom=upright)
+    if not upright:
+        axes.legend(frameon=False, fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))

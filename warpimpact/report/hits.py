@@ -1,0 +1,157 @@
+"""What the page of a report knows of the hits: their numbers, the map's pixels, and some trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
+from warpimpact.kernels.status import Status
+from warpimpact.plotting.cell import MAPPED, STATUS_COLOURS, Shown, hit_points, limits, nearest_hits, shown, words
+from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
+from warpimpact.results import SHOT_VARIABLES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+MOST_HITS = 20_000
+"""Hits that a page holds, of all results together: some 3 MB."""
+WORST_SHARE = 0.25
+"""Of the trajectories, those of the worst hits; the others are spread evenly."""
+_MAIN = ("residual_velocity", "deflection", "tilt")  # what the label at the pointer tells
+_PIXELS = 160
+_BEHIND = "#707070"  # colour of the core behind the plate
+_DIGITS = 5
+_TURN = 1.5  # of an outline from point to point [degree]: 0.01 mm of a core's profile
+_MM = 1e3
+
+
+def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
+    """The hits that a page holds, in memory, with their numbers as the coordinate "hit": all, or at most so many, those
+    to `keep` and others by chance.
+
+    Every so manieth hit of a grid or of a Sobol sampling would leave out parts of the cell.
+    """
+    numbers = np.arange(dataset.sizes["hit"])
+    if len(numbers) > most:
+        others = np.setdiff1d(numbers, keep)
+        chosen = np.random.default_rng(0).choice(others, most - len(keep), replace=False)
+        numbers = np.union1d(chosen, np.array(keep, dtype=int))
+    return dataset.isel(hit=numbers).load().assign_coords(hit=numbers)
+
+
+def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
+    """Numbers of the hits that get a trajectory: those that are to come first, those with the largest residual
+    velocity, then again and again the hit that is farthest from all chosen so far, across the cell's edges."""
+    velocity = shown(dataset, "residual_velocity").values
+    worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")[: round(WORST_SHARE * count)]
+    numbers = dataset["hit"].values
+    chosen = list(dict.fromkeys([*np.searchsorted(numbers, first).tolist(), *worst.tolist()]))[:count]
+    points, period = hit_points(dataset), np.asarray(dataset.attrs["plate_period"])
+    distance = np.full(len(points), np.inf)
+
+    def step_back(hit: int) -> None:
+        offset = points - points[hit]
+        np.minimum(distance, np.linalg.norm(offset - period * np.round(offset / period), axis=1), out=distance)
+
+    for hit in chosen:
+        step_back(hit)
+    while len(chosen) < count and distance.max() > 0.0:
+        chosen.append(int(distance.argmax()))
+        step_back(chosen[-1])
+    return [int(number) for number in numbers[chosen]]
+
+
+def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
+    """What the maps of a page draw, as plain data: the variables, and each result's hits in their units.
+
+    Args:
+        datasets: results, each as `thinned` gives it.
+    """
+    columns = [_columns(dataset) for dataset in datasets]
+    shared = {key: column for key, column in columns[0].items() if all(key in others for others in columns)}
+    return {
+        "variables": [{"key": key, "label": column.label, "signed": column.signed} for key, column in shared.items()],
+        "main": [key for key in shared if key.startswith(tuple(map(words, _MAIN)))],
+        "statuses": [
+            {"code": status.value, "label": words(status.name.lower()), "colour": STATUS_COLOURS[status]}
+            for status in Status
+        ],
+        "results": [
+            _map_data(dataset, {key: column[key].values for key in shared})
+            for dataset, column in zip(datasets, columns, strict=True)
+        ],
+    }
+
+
+def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
+    """The variables that differ from hit to hit, and outcomes in any case, by what people call them."""
+    columns = {}
+    for variable in (name for name in MAPPED if name in dataset):
+        at_standoff = "standoff" in dataset[variable].dims
+        for standoff in dataset["standoff"].values.tolist() if at_standoff else [None]:
+            column = shown(dataset, variable, standoff)
+            if variable not in SHOT_VARIABLES or np.ptp(column.values) > 0.0:
+                name = words(variable) + ("" if standoff is None else f" at {standoff * _MM:g} mm")
+                columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
+    return columns
+
+
+def _map_data(dataset: xarray.Dataset, columns: dict[str, Array]) -> dict[str, Any]:
+    nearest = nearest_hits(dataset, _PIXELS)
+    y, z = hit_points(dataset).T * _MM
+    return {
+        "period": _rounded(np.asarray(dataset.attrs["plate_period"]) * _MM),
+        "limits": limits(dataset).tolist(),
+        "outline": [_rounded(dataset[f"outline_{axis}"].values * _MM) for axis in "yz"],
+        "number": dataset["hit"].values.tolist(),
+        "y": _rounded(y),
+        "z": _rounded(z),
+        "status": dataset["status"].values.astype(int).tolist(),
+        "columns": {key: _rounded(values) for key, values in columns.items()},
+        "nearest": None if nearest is None else nearest.tolist(),
+    }
+
+
+def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
+    """The core in two views, in the plate and behind it, and the plate cut through the hit point; lengths in mm."""
+    inside, behind = poses_in_plate(history), poses_behind(history)
+    colours = [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0.0, 0.9, len(inside)))]
+
+    def drawn(label: str, pose: Pose, colour: str) -> dict[str, Any]:
+        return {"label": label, "colour": colour} | {view: _outline(history, pose, view) for view in "yz"}
+
+    return {
+        "thickness": history.attrs["plate_thickness"] * _MM,
+        "solid": {view: _solid_ranges(history, view) for view in "yz"},
+        "inside": [drawn(*pose, colour) for pose, colour in zip(inside.items(), colours, strict=True)],
+        "behind": [drawn(*pose, _BEHIND) for pose in behind.items()],
+    }
+
+
+def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float | None]]:
+    """The core in a view, closed [mm]: of its outline, which is convex, a point for every so many degrees it turns."""
+    outline = silhouette(history, pose, view) * _MM
+    along, up = (np.roll(outline, -1, axis=0) - outline).T
+    heading = np.floor(np.degrees(np.arctan2(up, along)) / _TURN)
+    few = outline[heading != np.roll(heading, 1)]
+    return [_rounded(np.append(coordinate, coordinate[0])) for coordinate in few.T]
+
+
+def _solid_ranges(history: xarray.Dataset, view: str) -> list[list[float]]:
+    """From where to where the plate is solid along y or z through the hit point [mm]."""
+    along = (history["section"].values + float(history[f"hit_{view}"])) * _MM
+    solid = np.concatenate([[0], history[f"solid_along_{view}"].values, [0]])
+    starts, ends = np.flatnonzero(np.diff(solid) == 1), np.flatnonzero(np.diff(solid) == -1) - 1
+    return [[float(along[start]), float(along[end])] for start, end in zip(starts, ends, strict=True)]
+
+
+def _rounded(values: Array) -> list[float | None]:
+    """As short as a page shows them; None for what does not exist."""
+    return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]

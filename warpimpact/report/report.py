@@ -1,0 +1,107 @@
+"""A report of one or several results: one HTML file that works without a network, for a person who has no warpimpact.
+
+The maps are drawn by Plotly, whose JavaScript (4.8 MB) stands in the file; everything that comes from a result or a
+campaign is escaped, and the page forbids itself to load anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import xarray
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+import warpimpact
+from warpimpact.analysis.effectiveness import SHOWN_UNITS, interval_text, number_text
+from warpimpact.analysis.study import study_text
+from warpimpact.campaign.replay import replay
+from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
+from warpimpact.report.words import compared, told
+from warpimpact.results import aside
+
+Progress = Callable[[int, int], None]
+_PLATE_WIDTH = 240.0  # of the widest plate on the page [px]
+
+
+def write_report(
+    datasets: Mapping[str, xarray.Dataset],
+    path: Path,
+    *,
+    folders: Mapping[str, Path],
+    trajectories: int = 32,
+    study: xarray.Dataset | None = None,
+    progress: Progress | None = None,
+) -> None:
+    """Write the report of some results, whole or not at all.
+
+    Args:
+        datasets: results by the names they get; of open files only what is used is read.
+        path: the HTML file; an existing one is replaced.
+        folders: where the files are that each campaign names.
+        trajectories: how many hits of each result are replayed, on the CPU.
+        study: error and speed of the numerics on such a scene (`analysis.study.study`).
+        progress: called with (hits replayed, hits to replay).
+
+    Raises:
+        OutputError: the file cannot be written.
+        ResultError, CampaignError: a hit cannot be replayed.
+    """
+    results = [told(name, dataset) for name, dataset in datasets.items()]
+    worst = [
+        list(dict.fromkeys(measure.hit for measure in result["measures"] if measure.hit is not None))
+        for result in results
+    ]
+    most = MOST_HITS // len(datasets)
+    shown = [thinned(dataset, most, keep=hits) for dataset, hits in zip(datasets.values(), worst, strict=True)]
+    chosen = [worst_and_spread(few, trajectories, first=hits) for few, hits in zip(shown, worst, strict=True)]
+    followed = _followed(sum(map(len, chosen)), progress)
+    data = page_data(shown)
+    for name, hits, drawn in zip(datasets, chosen, data["results"], strict=True):
+        drawn["trajectories"] = {
+            hit: trajectory_data(replay(datasets[name], hit, folder=folders[name])) for hit in followed(hits)
+        }
+        drawn["first"] = hits[0] if hits else None
+    page = _page(
+        data=data,
+        results=[result | {"shown": few.sizes["hit"]} for result, few in zip(results, shown, strict=True)],
+        comparison=compared(datasets) if len(datasets) > 1 else None,
+        study=None if study is None else study.attrs | {"text": study_text(study)},
+    )
+    with aside(path) as file:
+        file.write_text(page, encoding="utf-8")
+
+
+def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]], Iterator[int]]:
+    """A function that goes through hits and tells `progress` how many of all lie behind."""
+    done = 0
+
+    def follow(hits: Sequence[int]) -> Iterator[int]:
+        nonlocal done
+        for hit in hits:
+            yield hit
+            done += 1
+            if progress:
+                progress(done, total)
+
+    return follow
+
+
+def _page(*, results: Sequence[dict[str, Any]], **content: Any) -> str:
+    """The page, from what page.html names."""
+    environment = Environment(
+        loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    return environment.get_template("page.html").render(
+        results=results,
+        pixels_per_mm=_PLATE_WIDTH / max(result["plate"]["y"] for result in results),
+        plotly=Markup(get_plotlyjs()),
+        made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
+        version=warpimpact.__version__,
+        texts={"number": number_text, "interval": interval_text, "units": SHOWN_UNITS},
+        **content,
+    )

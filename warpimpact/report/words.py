@@ -1,0 +1,141 @@
+"""What the page of a report says of the results, in words, tables and small drawings."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from base64 import b64encode
+from collections.abc import Iterator, Mapping
+from io import BytesIO
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray
+
+from warpimpact.analysis.comparison import compare, comparison_text
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.summary import UNITS, estimated, main_measures
+from warpimpact.campaign.estimates import STATUSES, Measure
+from warpimpact.plotting.cell import range_text, words
+from warpimpact.plotting.comparison import comparison_figure
+from warpimpact.results import ResultError
+
+_MM = 1e3
+_PROVENANCE = (
+    "history",
+    "warpimpact_version",
+    "warp_version",
+    "device",
+    "numerics",
+    "sampling",
+    "seed",
+    "replicates",
+    "symmetries",
+    "computed_hits",
+    "fingerprint",
+    "references",
+)
+
+
+class Row(NamedTuple):
+    """A number of a table, and its interval, as text."""
+
+    label: str
+    value: str
+    interval: str
+
+
+def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
+    """What the page says of a result in words, tables and a drawing; of an open file a slice is in memory at a time."""
+    attributes = dataset.attrs
+    return {
+        "name": name,
+        "title": attributes.get("title", "untitled"),
+        "hits": dataset.sizes["hit"],
+        "asked": _asked(dataset),
+        "campaign": attributes.get("campaign", ""),
+        "tables": _tables(dataset),
+        "statuses": list(_statuses(dataset)),
+        "numbers": list(_numbers(dataset)),
+        "measures": effectiveness(dataset),
+        "plate": _plate(dataset),
+        "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
+        "speed": float(f"{attributes.get('hits_per_second', 0.0):.2g}"),
+    }
+
+
+def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, str]:
+    """The comparison of plates as text and as a picture; or why there is none."""
+    try:
+        comparison = compare(list(datasets.values()), list(datasets))
+    except ResultError as error:
+        return {"text": str(error), "picture": ""}
+    picture = BytesIO()
+    comparison_figure(comparison).savefig(picture, dpi=100)
+    return {"text": comparison_text(comparison), "picture": b64encode(picture.getvalue()).decode()}
+
+
+def _asked(dataset: xarray.Dataset) -> str:
+    """What was shot at what, as a sentence or two."""
+    y, z = (f"{length * _MM:.4g}" for length in dataset.attrs["plate_period"])
+    velocity, obliquity = (range_text(dataset[name]) for name in ("impact_velocity", "obliquity"))
+    sampling = f", {dataset.attrs['sampling']} sampling" if "sampling" in dataset.attrs else ""
+    text = (
+        f"{dataset.sizes['hit']} hits{sampling}, over a cell of {y} × {z} mm, at {velocity} and obliquity {obliquity}."
+    )
+    if "areal_density" in dataset.attrs:
+        told = dataset.attrs
+        text += f" The plate is open by {told['open_area']:.1%} and weighs {told['areal_density']:.3g} kg/m²."
+    return text
+
+
+def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
+    """Tables of a campaign with its values as they were written, the one inside another as `plate.pattern`; the number
+    of hits may be that of the command line."""
+    campaign = dataset.attrs.get("campaign", "")
+    values = json.loads(campaign) if campaign.startswith("{") else tomllib.loads(campaign)
+    tables = dict(_flat(values, ""))
+    if "count" in dataset.attrs and "count" in tables.get("hits", {}):
+        tables["hits"]["count"] = str(dataset.attrs["count"])
+    return tables
+
+
+def _flat(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, dict[str, str]]]:
+    """A table, and those inside it, by their dotted names."""
+    plain = {key: _plain(value) for key, value in table.items() if not isinstance(value, dict) and value is not None}
+    if name and plain:
+        yield name, plain
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{name}.{key}".strip("."))
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
+    for measure, estimate in estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES]).items():
+        if estimate.value > 0.0:
+            yield Row(words(measure.variable), f"{estimate.value:.2%}", f"{estimate.low:.2%} to {estimate.high:.2%}")
+
+
+def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
+    for measure, estimate in estimated(dataset, main_measures(dataset["standoff"].values.tolist())).items():
+        if estimate.count:
+            at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
+            unit = UNITS[measure.units]
+            interval = f"{estimate.low:.2f} to {estimate.high:.2f}{unit}"
+            yield Row(f"mean {words(measure.variable)}{at}", f"{estimate.value:.2f}{unit}", interval)
+
+
+def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
+    """The cell that hits are spread over, its holes as the path of an SVG: lengths in mm, y to the right, z up."""
+    vertices = np.stack([dataset["outline_y"].values, -dataset["outline_z"].values], axis=-1) * _MM
+    gaps = np.flatnonzero(np.isnan(vertices[:, 0]))
+    rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(vertices, gaps)]
+    path = " ".join("M" + "L".join(f"{y:.3f},{z:.3f}" for y, z in ring) + "Z" for ring in rings if len(ring))
+    y, z = (float(length) * _MM for length in dataset.attrs["plate_period"])
+    return {"path": path, "y": y, "z": z}
