@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
@@ -59,7 +60,7 @@ def compute(
     else:
         outcomes, estimates = simulate_to_tolerance(campaign.core, campaign.plate, computed, **how)
     elapsed = time.perf_counter() - begin
-    period, chosen = campaign.plate.sampled_cell, find_device(device)
+    period, chosen = campaign.hits.covered(campaign.plate), find_device(device)
     return to_dataset(
         shots,
         unfolded(outcomes, group),
@@ -85,6 +86,7 @@ def compute(
             "hits_per_second": len(computed) / elapsed,
         }
         | ({} if campaign.hits.count is None else {"count": campaign.hits.count})
+        | ({"ligament": campaign.plate.ligament} if math.isfinite(campaign.plate.ligament) else {})
         | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {}),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
     )

@@ -6,11 +6,14 @@ from .numerics import Numerics, Tolerance
 from .patterns import (
     AnyPattern,
     CirclePattern,
+    EllipsePattern,
+    HexagonPattern,
     LatticePattern,
     MaskPattern,
     NoPattern,
     Pattern,
     SlotPattern,
+    SquarePattern,
     TrianglePattern,
 )
 from .plate import Plate
@@ -26,6 +29,8 @@ __all__ = [
     "CirclePattern",
     "ConeCore",
     "Core",
+    "EllipsePattern",
+    "HexagonPattern",
     "Hits",
     "Impact",
     "Interaction",
@@ -43,6 +48,7 @@ __all__ = [
     "Scatter",
     "Shots",
     "SlotPattern",
+    "SquarePattern",
     "Symmetry",
     "Tolerance",
     "TrianglePattern",
