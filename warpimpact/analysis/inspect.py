@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 import xarray
 
+from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import UNITS, estimated, main_measures, slices, stop_lines, symmetry_text
 from warpimpact.campaign.estimates import STATUSES, Estimate, Measure
 from warpimpact.kernels.status import Status
@@ -35,6 +37,9 @@ def _origin(dataset: xarray.Dataset) -> Iterator[str]:
     yield f"{'hits':<12}{hits}"
     if "symmetries" in told:
         yield f"{'symmetry':<12}{symmetry_text(dataset)}"
+    if "areal_density" in told:
+        numbers = plate_numbers(told["open_area"], told.get("ligament", math.inf), told["areal_density"])
+        yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}"
     for label, name in (("numerics", "numerics"), ("device", "device"), ("history", "history")):
         if name in told:
             yield f"{label:<12}{told[name]}"
