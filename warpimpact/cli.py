@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_inspect(commands)
     _add_plot(commands)
     _add_compare(commands)
+    _add_plate(commands)
     _add_replay(commands)
     _add_export(commands)
     _add_report(commands)
@@ -154,6 +155,31 @@ def _add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--resume", action="store_true", help="continue a campaign that was broken off")
     parser.add_argument("--overwrite", action="store_true", help="compute the plates of a campaign anew")
     parser.set_defaults(command=_compare)
+
+
+def _add_plate(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    parser = commands.add_parser(
+        "plate",
+        help="draw the plate of a campaign to scale",
+        description="Draw the plate of a campaign to scale, with the largest section of the core; tell its open area, "
+        "smallest ligament and areal density. Nothing is computed.",
+        epilog="example: warpimpact plate campaigns/slotted_plate.toml",
+    )
+    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="what is shot at what")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=_picture,
+        metavar="PLATE.png",
+        help="picture (default: the campaign's name with _plate, here)",
+    )
+    parser.set_defaults(command=_plate)
+
+
+def _picture(text: str) -> Path:
+    if (path := Path(text)).suffix not in (".png", ".svg", ".pdf"):
+        raise argparse.ArgumentTypeError(f'got "{text}", but a picture is a .png, .svg or .pdf file')
+    return path
 
 
 def _add_replay(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -503,6 +529,24 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
         except MemoryError as error:
             raise CampaignError(f"{arguments.files[0]}: {error}") from None
     return paths
+
+
+def _plate(arguments: argparse.Namespace) -> None:
+    from .analysis.plate import plate_numbers
+    from .campaign.campaign import Campaign
+    from .plotting import plate_figure
+
+    campaign = Campaign.from_toml(arguments.campaign)
+    output = arguments.output or Path(arguments.campaign.stem + "_plate.png")
+    _check_place(output)
+    plate = campaign.plate
+    plate_figure(plate, campaign.core, campaign.title).savefig(output, dpi=150)
+    print(campaign.title)
+    print(f"{'thickness':<18}  {1e3 * plate.thickness:g} mm")
+    numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)
+    for name, number in numbers.items():
+        print(f"{name:<18}  {number}")
+    print(output)
 
 
 def _replay(arguments: argparse.Namespace) -> None:

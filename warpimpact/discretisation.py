@@ -23,6 +23,8 @@ BLOCKS = 96
 """Most blocks, in each direction, in which a period is searched for room that no core fills."""
 SUBSAMPLES = 8
 """Points per cell of the tile and direction behind a material fraction."""
+AT_A_TIME = 2**13
+"""Cells of the tile that are looked at together."""
 
 
 @dataclass(frozen=True)
@@ -349,13 +351,16 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
             f"would take {needed / 2**30:.3g} GiB at that spacing, of {free / 2**30:.3g} GiB free"
         )
     samples = 1 if sharp else SUBSAMPLES
-    within = (np.arange(samples) + 0.5) / samples
-    y = (np.arange(count_y)[:, None] + within).reshape(-1) * dy
-    z = (np.arange(count_z)[:, None] + within).reshape(-1) * dz
-    material = np.empty((count_y, count_z))
-    for row in range(count_y):
-        solid = ~plate.pattern.is_hole(y[row * samples : (row + 1) * samples, None], z[None, :])
-        material[row] = solid.reshape(samples, count_z, samples).mean(axis=(0, 2))
+    within = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
+    half_diagonal, middle_z = 0.501 * math.hypot(dy, dz), (np.arange(count_z, dtype=np.float64) + 0.5) * dz
+    material, rows = np.empty((count_y, count_z)), max(1, AT_A_TIME // count_z)
+    for first in range(0, count_y, rows):
+        part = material[first : first + rows]
+        middle_y = (np.arange(first, first + len(part), dtype=np.float64)[:, None] + 0.5) * dy
+        part[:] = ~plate.pattern.is_hole(middle_y, middle_z)
+        row, column = np.nonzero(plate.pattern.has_edge(middle_y, middle_z, half_diagonal))
+        y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
+        part[row, column] = 1.0 - plate.pattern.is_hole(y, z).mean(axis=(1, 2))
     return Tile(material, dy, dz)
 
 

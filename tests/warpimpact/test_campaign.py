@@ -87,7 +87,8 @@ MISTAKES = {
     "unknown shape": (
         'shape = "slot"',
         'shape = "slit"',
-        "plate.pattern.shape: got \"slit\", but it must be one of 'slot', 'circle', 'triangle', 'none', 'mask'",
+        "plate.pattern.shape: got \"slit\", but it must be one of 'slot', 'circle', 'triangle', "
+        "'square', 'hexagon', 'ellipse', 'none', 'mask'",
     ),
     "unknown choice": (
         '"standard"',
@@ -148,12 +149,14 @@ MISTAKES = {
     "holes that overlap into no plate": (
         SLOT,
         CIRCLE,
-        "plate.pattern: got spacing = 8 mm along y, but it must be larger than the hole, 9 mm",
+        "plate.pattern: got spacing = (8, 16) mm, which lets the holes at (0, 0) mm and (-8, 0) mm overlap or touch, "
+        "but a ligament must be left between them",
     ),
     "spacing smaller than the hole": (
         '"16 mm"',
         '"11 mm"',
-        "plate.pattern: got spacing = 11 mm along z, but it must be larger than the hole, 12 mm",
+        "plate.pattern: got spacing = (8, 11) mm, which lets the holes at (0, 0) mm and (0, -11) mm overlap or touch, "
+        "but a ligament must be left between them",
     ),
     "negative spacing": (
         '"16 mm"',
@@ -193,7 +196,7 @@ MISTAKES = {
     "mask that is no mask": (
         SLOT,
         MASK.format("bad_hits.csv"),
-        "plate.pattern: bad_hits.csv is not a mask: give a .png image or a .npy array",
+        "plate.pattern: bad_hits.csv is not a mask: give a .png image, a .npy array or a .svg drawing",
     ),
     "mask absurdly large": (
         SLOT,

@@ -22,7 +22,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"]])
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"], ["plate"]]
+)
 def test_help_shows_how(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         main([*command, "--help"])

@@ -234,6 +234,23 @@ def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
     np.testing.assert_allclose(extent, pattern.period, rtol=1e-12)
 
 
+def test_tile_looks_closely_only_where_edges_are_and_misses_none() -> None:
+    holes = [["0 mm", "0 mm", "20 deg"], ["6 mm", "3 mm", "-70 deg"]]
+    hairlines = SlotPattern(length="6 mm", width="0.05 mm", spacing=["12 mm", "8 mm"], holes=holes)
+    plate = PLATE.model_copy(update={"pattern": hairlines})
+    tile = tile_of(plate, 0.25e-3)
+    samples = discretisation.SUBSAMPLES
+    y, z = (
+        (np.arange(samples * n) + 0.5) * d / samples
+        for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True)
+    )
+    solid = ~hairlines.is_hole(y[:, None], z)
+    shares = solid.reshape(tile.material.shape[0], samples, -1, samples).mean(axis=(1, 3))
+    np.testing.assert_allclose(tile.material, shares, rtol=0, atol=1.5 / samples**2)  # rounding decides on edges
+    assert (tile.material != shares).mean() < 1e-3
+    assert 0.0 < 1.0 - tile.material.mean() < 0.01
+
+
 def test_tile_tells_material_from_holes_by_area() -> None:
     # A 5 mm hole on the origin, which is a corner of cell (0, 0); cells on the edge are fractions.
     plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 10e-3))})

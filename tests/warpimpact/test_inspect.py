@@ -28,6 +28,8 @@ def test_it_tells_origin_and_numbers_with_intervals(result: Path, capsys: pytest
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines[0] == ["7.62", "mm", "P80", "core", "against", "a", "slotted", "plate"]
     assert ["hits", "512", "hits,", "sobol", "sampling,", "seed", "1,", "8", "replicates"] in lines
+    plate = "plate open area 34.8%, smallest ligament 4.00 mm, areal density 20.5 kg/m²"  # (32 + 4π)/128 is hole
+    assert plate.split() in lines
     assert next(line for line in lines if line[:1] == ["perforated"])[1] == "100.00%"
     # Eight replicates of 64 hits: Student's interval over their means, by hand.
     velocity = results.read(result)["residual_velocity"].values

@@ -2,10 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from warpimpact.scene import CirclePattern, Interaction, NoPattern, Plate
+from warpimpact.scene import CirclePattern, Hits, Impact, Interaction, NoPattern, Plate, SlotPattern, make_shots
+from warpimpact.scene.symmetry import symmetries
 
 STEEL = {"thickness": "4 mm", "resistance": "2600 MPa"}
 
@@ -53,3 +55,50 @@ def test_interaction_scales_with_resistance_and_density() -> None:
     assert law.coefficients(plate.resistance, plate.density) == pytest.approx((1.2e9, 0.5e6, 3750.0), rel=1e-14)
     with pytest.raises(ValidationError, match="greater than or equal to 0"):
         Interaction(linear=-1)
+
+
+SLOTS = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
+RIMMED = {"size": ["50 mm", "44 mm"], "margin": "3 mm"}
+
+
+def test_a_margin_counts_in_the_figures_of_the_plate() -> None:
+    plate = Plate(**STEEL, pattern=SLOTS, **RIMMED)
+    # Seven slots are left whole, of the 32 mm² between their flanks and 4π mm² of their ends.
+    assert plate.open_area == pytest.approx(7 * (32 + 4 * math.pi) / 2200, rel=1e-12)
+    assert plate.areal_density == pytest.approx(31.4 * (1 - plate.open_area), rel=1e-12)
+    assert plate.ligament == pytest.approx(4e-3, rel=1e-9)
+    assert Plate(**STEEL, pattern=SLOTS, size=["43 mm", "40 mm"]).ligament == pytest.approx(3.5e-3, rel=1e-9)
+    assert Plate(**STEEL, **RIMMED).ligament == math.inf
+
+
+def test_a_plate_with_a_margin_is_read_back_as_it_was() -> None:
+    plate = Plate(**STEEL, pattern=SLOTS, **RIMMED)
+    again = Plate.model_validate_json(plate.model_dump_json())
+    assert again == plate
+    assert again.pattern.period == plate.pattern.period == (50e-3, 44e-3)
+    assert Plate(**STEEL, pattern=plate.pattern).pattern.period == (50e-3, 44e-3)
+
+
+def test_a_margin_needs_a_rim() -> None:
+    with pytest.raises(ValidationError, match="got margin = 3 mm without size, but only a finite plate has a rim"):
+        Plate(**STEEL, pattern=SLOTS, margin="3 mm")
+    with pytest.raises(ValidationError, match="greater than 0"):
+        Plate(**STEEL, pattern=SLOTS, size=[1, 1], margin=0)
+
+
+def test_a_margin_keeps_the_mirror_images_that_it_leaves() -> None:
+    impact = Impact(velocity=825)
+    assert len(symmetries(Plate(**STEEL, pattern=SLOTS, **RIMMED), impact)) == 4  # a rim has no centring
+    aside = SLOTS.model_validate({**SLOTS.model_dump(), "staggered": False, "holes": [["1 mm", "0 mm"]]})
+    assert [str(s) for s in symmetries(Plate(**STEEL, pattern=aside, **RIMMED), impact)] == ["(y, z)", "(y, -z)"]
+
+
+def test_hits_cover_the_cell_or_all_of_a_finite_plate() -> None:
+    plate, impact = Plate(**STEEL, pattern=SLOTS, **RIMMED), Impact(velocity=825)
+    for area, extent in (("cell", (16e-3, 16e-3)), ("plate", (50e-3, 44e-3))):
+        shots = make_shots(impact, Hits(count=4096, area=area), plate)
+        assert (np.ptp(shots.hit_y), np.ptp(shots.hit_z)) == pytest.approx(extent, rel=2e-3)
+    solid = plate.is_solid(shots.hit_y, shots.hit_z)
+    assert solid.mean() == pytest.approx(1 - plate.open_area, abs=5e-3)
+    with pytest.raises(ValueError, match=r'got hits.area = "plate" without plate.size, but only a'):
+        make_shots(impact, Hits(count=4, area="plate"), Plate(**STEEL, pattern=SLOTS))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 import xarray
 
 from warpimpact.analysis.effectiveness import effectiveness_text
+from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
     UNITS,
     estimated,
@@ -43,6 +45,9 @@ def _origin(dataset: xarray.Dataset) -> Iterator[str]:
     yield f"{'hits':<12}{hits}"
     if "symmetries" in told:
         yield f"{'symmetry':<12}{symmetry_text(dataset)}"
+    if "areal_density" in told:
+        numbers = plate_numbers(told["open_area"], told.get("ligament", math.inf), told["areal_density"])
+        yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}"
     for label, name in (("numerics", "numerics"), ("device", "device"), ("history", "history")):
         if name in told:
             yield f"{label:<12}{told[name]}"

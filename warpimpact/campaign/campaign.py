@@ -160,6 +160,11 @@ class Campaign(Model):
         return self
 
     @model_validator(mode="after")
+    def _hits_cover_something(self) -> Self:
+        self.hits.covered(self.plate)
+        return self
+
+    @model_validator(mode="after")
     def _images_share_their_shot(self) -> Self:
         check_scatter(self.hits, self.scatter)
         return self
@@ -297,6 +302,8 @@ def _complaint(problem: ErrorDetails) -> str:
             return f'got "{context["tag"]}", but it must be one of {context["expected_tags"]}'
         case "model_type" | "model_attributes_type":
             return f"got {quoted(problem['input'])}, but it must be a table"
+        case "too_long":
+            return f"got {quoted(problem['input'])}, but it must have at most {context['max_length']} items"
         case "tuple_type":
             return f"got {quoted(problem['input'])}, but it must be a list"
     allowed = problem["msg"].replace("Input should", "it must")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -63,7 +64,8 @@ def compute(
     begin = time.perf_counter()
     outcomes, estimates = _outcomes(campaign, campaign.plate, computed, **how, progress=follow)
     elapsed = time.perf_counter() - begin
-    period, chosen = campaign.plate.sampled_cell, find_device(device)
+    period, chosen = campaign.hits.covered(campaign.plate), find_device(device)
+    ligament = campaign.plate.ligament
     dataset = to_dataset(
         shots,
         unfolded(outcomes, group),
@@ -91,6 +93,7 @@ def compute(
             "hits_per_second": len(computed) / elapsed,
         }
         | ({} if campaign.hits.count is None else {"count": campaign.hits.count})
+        | ({"ligament": ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {}),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
     )

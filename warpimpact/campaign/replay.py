@@ -72,7 +72,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         again.outcomes,
         standoffs=np.array(campaign.output.standoffs),
         outlines=campaign.plate.pattern.outlines(*reach),
-        period=campaign.plate.sampled_cell,
+        period=campaign.hits.covered(campaign.plate),
         attributes={},
     ).isel(hit=0)
     stored = result.isel(hit=hit)

@@ -1,8 +1,9 @@
-"""Figures: a Dataset goes in, a matplotlib Figure comes out."""
+"""Figures: a Dataset, or a plate, goes in, a matplotlib Figure comes out."""
 
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, uncertainty
 from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
+from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.study import study_figure
 
 __all__ = [
@@ -12,6 +13,7 @@ __all__ = [
     "hit_maps",
     "marginals",
     "overview",
+    "plate_figure",
     "save_beside",
     "save_maps",
     "status_map",

@@ -6,11 +6,14 @@ from .numerics import Numerics, Tolerance
 from .patterns import (
     AnyPattern,
     CirclePattern,
+    EllipsePattern,
+    HexagonPattern,
     LatticePattern,
     MaskPattern,
     NoPattern,
     Pattern,
     SlotPattern,
+    SquarePattern,
     TrianglePattern,
 )
 from .plate import Plate
@@ -27,6 +30,8 @@ __all__ = [
     "CirclePattern",
     "ConeCore",
     "Core",
+    "EllipsePattern",
+    "HexagonPattern",
     "Hits",
     "Impact",
     "Interaction",
@@ -44,6 +49,7 @@ __all__ = [
     "Scatter",
     "Shots",
     "SlotPattern",
+    "SquarePattern",
     "Symmetry",
     "Tolerance",
     "TrianglePattern",

@@ -1,7 +1,7 @@
 """What the models of a scene have in common."""
 
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,20 @@ class Model(BaseModel):
             hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(allowed)}"
             raise ValueError(f'got the unknown key "{unknown[0]}"; {hint}')
         return values
+
+    def __copy__(self) -> Self:
+        """A copy without what was computed from the fields, which model_copy may change."""
+        copied = super().__copy__()
+        copied.__dict__ = {name: value for name, value in copied.__dict__.items() if name in type(self).model_fields}
+        return copied
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all fields are the same, whatever was computed from them."""
+        return isinstance(other, Model) and type(self) is type(other) and self._values == other._values
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return *(getattr(self, name) for name in type(self).model_fields), self.__pydantic_private__
 
     @classmethod
     def _keys(cls) -> list[str]:

@@ -3,10 +3,10 @@
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, ValidationInfo, field_validator, model_validator
 
 from .model import Array, Model
-from .patterns import AnyPattern, BoolArray, NoPattern
+from .patterns import AnyPattern, BoolArray, NoPattern, Pattern
 from .units import (
     NonNegativeNumber,
     NonNegativeStress,
@@ -28,8 +28,10 @@ class Plate(Model):
         degradation_interval: Δt_β [s].
         degradation_length: ℓ, how far around a contact the material weakens [m].
         density: [kg/m³].
-        pattern: shape and lattice of the holes.
         size: extent along y and z of a finite plate centred on the origin [m]; None is unbounded.
+        margin: width of a band along the rim that has no holes [m]: those that would reach into it are left out whole;
+            None lets the rim cut holes.
+        pattern: shape and lattice of the holes; with a margin, those that are left on the plate.
     """
 
     thickness: PositiveLength
@@ -39,13 +41,31 @@ class Plate(Model):
     degradation_interval: PositiveTime = 1e-6
     degradation_length: PositiveLength = 0.5e-3
     density: PositiveDensity = 7850.0
-    pattern: AnyPattern = NoPattern()
     size: tuple[PositiveLength, PositiveLength] | None = None
+    margin: PositiveLength | None = None
+    pattern: AnyPattern = NoPattern()
+
+    @field_validator("pattern")
+    @classmethod
+    def _within_the_margin(cls, pattern: Pattern, info: ValidationInfo) -> Pattern:
+        size, margin = (info.data.get(name) for name in ("size", "margin"))
+        return pattern.bounded(size, margin) if size is not None and margin is not None else pattern
+
+    @model_validator(mode="after")
+    def _margin_has_a_rim(self) -> Self:
+        if self.margin is not None and self.size is None:
+            raise ValueError(f"got margin = {1e3 * self.margin:g} mm without size, but only a finite plate has a rim")
+        return self
 
     @property
     def open_area(self) -> float:
-        """Share of holes in a unit cell."""
+        """Share of holes in a unit cell, or with a margin in all of the plate."""
         return self.pattern.open_area
+
+    @property
+    def ligament(self) -> float:
+        """Smallest distance between two holes, or of a whole hole to the rim [m]; inf where there is none."""
+        return self.pattern.ligament(self.size)
 
     def is_solid(self, y: Array, z: Array) -> BoolArray:
         """Whether points y, z [m] lie on the plate and in none of its holes; bool, of their broadcast shape."""
@@ -55,15 +75,16 @@ class Plate(Model):
     @property
     def sampled_cell(self) -> tuple[float, float]:
         """Extent (y, z) of the cell that hits are spread over [m]: the unit cell, or a plate smaller than it."""
-        cell_y, cell_z = self.pattern.period
+        cell_y, cell_z = self.pattern.unit_cell
         return (cell_y, cell_z) if self.size is None else (min(cell_y, self.size[0]), min(cell_z, self.size[1]))
 
     @property
     def solid(self) -> Self:
         """The plate without holes of the same areal density, of the same material."""
-        return self.model_copy(update={"thickness": self.thickness * (1.0 - self.open_area), "pattern": NoPattern()})
+        thickness = self.thickness * (1.0 - self.open_area)
+        return self.model_copy(update={"thickness": thickness, "margin": None, "pattern": NoPattern()})
 
     @property
     def areal_density(self) -> float:
-        """Mass per area of the perforated plate, averaged over a unit cell [kg/m²]."""
+        """Mass per area of the perforated plate, of a unit cell or with a margin of all of it [kg/m²]."""
         return self.density * self.thickness * (1 - self.open_area)

@@ -27,19 +27,20 @@ class Sampler:
     Args:
         impact: velocity and attitude where nothing else is said.
         hits: where, and how numbers are drawn.
-        plate: hits cover one unit cell of it, or all of a plate smaller than that.
+        plate: hits cover one unit cell of it, or all of it (`Hits.area`).
         scatter: what differs from shot to shot.
         replicates: independent scramblings of a sobol sampling.
 
     Raises:
-        ValueError: hits.irreducible beside scatter that leaves no symmetry to all shots.
+        ValueError: hits.irreducible beside scatter that leaves no symmetry to all shots; hits on all of a plate without
+            end.
     """
 
     def __init__(
         self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None, replicates: int = 1
     ) -> None:
         check_scatter(hits, scatter or Scatter())
-        self._impact, self._cell, self._group = impact, plate.sampled_cell, symmetries_used(impact, hits, plate)
+        self._impact, self._cell, self._group = impact, hits.covered(plate), symmetries_used(impact, hits, plate)
         (low_y, high_y), (low_z, high_z) = irreducible_part(self._group)
         self._extent = self._cell[0] * (high_y - low_y), self._cell[1] * (high_z - low_z)
         self._middle = 0.5 * self._cell[0] * (high_y + low_y), 0.5 * self._cell[1] * (high_z + low_z)
@@ -110,7 +111,7 @@ class Sampler:
 
 
 def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> Shots:
-    """All shots at once: at the hit points over one unit cell of the plate, or over all of a plate smaller than that.
+    """All shots at once: at the hit points over one unit cell of the plate, or over all of it (`Hits.area`).
 
     With hits.irreducible a shot's images follow it. A campaign of any size takes them from a `Sampler` bit by bit.
     """

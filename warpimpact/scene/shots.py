@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from .files import InputFile, read_columns
 from .model import Array, Model
+from .plate import Plate
 from .units import Angle, AngularVelocity, PositiveSpeed
 
 _RIGHT_ANGLE = np.pi / 2
@@ -64,6 +65,7 @@ class Hits(Model):
         repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
         replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
             two. Their spread tells how certain a mean is; None is 16 for a campaign with a stop rule, else 1.
+        area: what the sampling covers: one unit cell, or a plate smaller than it, or all of a finite "plate".
         irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
             each hit there with its images, as many in all as `count` holds, or one hit's.
     """
@@ -72,13 +74,14 @@ class Hits(Model):
     count: Annotated[int, Field(strict=True, ge=1, le=2**30)] | None = None
     seed: Annotated[int, Field(strict=True, ge=0)] = 0
     file: InputFile | None = None
+    area: Literal["cell", "plate"] = "cell"
     irreducible: Annotated[bool, Field(strict=True)] = False
     repeats: Annotated[int, Field(strict=True, ge=1, le=2**20)] = 1
     replicates: Literal[1, 8, 16, 32, 64] | None = None
 
     @model_validator(mode="after")
     def _is_complete(self) -> Self:
-        needed, foreign = ("file", {"count", "irreducible"}) if self.sampling == "list" else ("count", {"file"})
+        needed, foreign = ("file", {"count", "area", "irreducible"}) if self.sampling == "list" else ("count", {"file"})
         if getattr(self, needed) is None:
             raise ValueError(f'got sampling = "{self.sampling}" without {needed}, which it needs')
         if self.sampling in ("sobol", "random"):
@@ -98,6 +101,18 @@ class Hits(Model):
             return None
         required = ("hit_y", "hit_z")
         return read_columns(self.file, required, tuple(f.name for f in fields(Shots) if f.name not in required))
+
+    def covered(self, plate: Plate) -> tuple[float, float]:
+        """Extent along y and z [m] of what the hits are spread over, about the origin.
+
+        Raises:
+            ValueError: all of a plate that has no end.
+        """
+        if self.area == "cell":
+            return plate.sampled_cell
+        if plate.size is None:
+            raise ValueError('got hits.area = "plate" without plate.size, but only a finite plate can be covered')
+        return plate.size
 
     def total(self, period: tuple[float, float]) -> int:
         """How many shots there are over a unit cell of this extent along y and z [m]."""

@@ -98,9 +98,7 @@ def _of_plate(symmetry: Symmetry, plate: Plate) -> bool:
     """Whether the image of the plate is the plate itself."""
     if plate.size is not None and symmetry.centred:
         return False  # a plate with a rim has no translation
-    y, z = plate.pattern.probes
-    there = symmetry.image(y[:, None], z, plate.pattern.period)
-    return np.array_equal(plate.pattern.is_hole(*there), plate.pattern.is_hole(y[:, None], z))
+    return plate.pattern.is_symmetric(symmetry.along_y, symmetry.along_z, centred=symmetry.centred)
 
 
 def irreducible_part(group: Sequence[Symmetry]) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -1,0 +1,45 @@
+"""Finite plates: where a hole was left out is solid plate, where one was kept is the unbounded plate."""
+
+import numpy as np
+import pytest
+
+from warpimpact.scene import Hits, Impact, SlotPattern, make_shots
+from warpimpact.scene.symmetry import symmetries
+
+from .scenes import SLOTS, paper_plate, shots_at, simulate, solid_plate
+
+RIM = {"size": (48e-3, 48e-3), "margin": 4e-3}
+
+
+def test_left_out_holes_are_solid_and_kept_ones_are_holes() -> None:
+    # Slots reach 6 mm along z about 0, ±16 mm (even rows) and ±8 mm (odd rows); 20 mm are left along z.
+    left_out, kept = (
+        shots_at([0.0, 1.0e-3, -0.5e-3], [16e-3, 15e-3, -15e-3]),
+        shots_at([0.0, 1.0e-3, 7e-3], [0.0, 3e-3, 9e-3]),
+    )
+    bounded = paper_plate(**RIM)
+    solid = simulate(solid_plate(size=RIM["size"]), left_out).residual_velocity
+    np.testing.assert_allclose(simulate(bounded, left_out).residual_velocity, solid, rtol=0, atol=1e-3)
+    unbounded = simulate(paper_plate(), kept).residual_velocity
+    np.testing.assert_allclose(simulate(bounded, kept).residual_velocity, unbounded, rtol=0, atol=0.02)
+    assert np.abs(simulate(paper_plate(), left_out).residual_velocity - solid).min() > 5.0
+
+
+def test_a_listed_lattice_computes_the_bits_of_the_staggered_one() -> None:
+    listed = SlotPattern(length=12e-3, width=4e-3, spacing=(16e-3, 16e-3), holes=((0, 0), (8e-3, 8e-3)))
+    shots = make_shots(Impact(velocity=825), Hits(count=64), paper_plate())
+    one, other = (simulate(paper_plate(pattern=pattern), shots) for pattern in (SLOTS, listed))
+    np.testing.assert_array_equal(one.residual_velocity, other.residual_velocity)
+    np.testing.assert_array_equal(one.tilt, other.tilt)
+
+
+@pytest.mark.parametrize("holes", [((1e-3, 0.0, 0.0),), ((0.0, 0.0, 0.2), (8e-3, 8e-3, 0.2))], ids=["aside", "turned"])
+def test_hits_on_all_of_a_plate_and_their_images_fare_alike(holes: tuple[tuple[float, float, float], ...]) -> None:
+    pattern = SlotPattern(length=12e-3, width=4e-3, spacing=(16e-3, 16e-3), holes=holes)
+    plate, impact = paper_plate(pattern=pattern, **RIM), Impact(velocity=825)
+    assert len(symmetries(plate, impact)) == 2
+    velocity = simulate(
+        plate, make_shots(impact, Hits(count=64, area="plate", irreducible=True), plate)
+    ).residual_velocity
+    np.testing.assert_allclose(velocity[::2], velocity[1::2], rtol=0, atol=0.05)
+    assert np.ptp(velocity) > 20.0

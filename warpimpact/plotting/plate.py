@@ -1,0 +1,120 @@
+"""A plate to scale: its holes, the cell that repeats, and the largest section of the core.
+
+The view is that of the maps: against the line of fire, y to the right, z up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
+from matplotlib.path import Path
+
+from warpimpact.analysis.plate import plate_numbers
+from warpimpact.scene import NoPattern
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from warpimpact.scene import Core, Plate
+
+_MM = 1e3
+_CELLS = 3  # of an unbounded plate, along each side
+_LONGER_SIDE = 5.0  # of the plate on paper [inch], amid room for axes, title and legend
+_ROOM_ACROSS, _BELOW, _ABOVE = 1.5, 1.7, 0.85
+_NARROWEST = 6.0
+_STEEL, _CORE = "0.72", "#D55E00"
+
+
+def plate_figure(plate: Plate, core: Core | None = None, title: str = "") -> Figure:
+    """Picture of a plate, all of a finite one, else three cells by three, with its numbers.
+
+    Args:
+        plate: what is drawn.
+        core: whose largest section is drawn on the plate, in the middle of it.
+        title: above the picture.
+    """
+    figure, axes = _sheet(_extent(plate, core) * _MM)
+    patches = [*_holes(plate, axes), *_frames(plate), *([] if core is None else [_section(core)])]
+    for patch in patches:
+        axes.add_patch(patch)
+    steel = Patch(facecolor=_STEEL, edgecolor="black", label=f"plate, {plate.thickness * _MM:g} mm thick")
+    numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)
+    parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
+    axes.set_title(fill(", ".join(parts), 70), fontsize="medium")
+    inch = 1.0 / figure.get_figheight()
+    figure.suptitle(title, y=1.0 - 0.12 * inch, va="top", wrap=True)
+    figure.legend(
+        handles=[steel, *patches],
+        loc="lower center",
+        bbox_to_anchor=(0.5, 0.35 * inch),
+        ncols=2,
+        frameon=False,
+    )
+    note = "to scale, seen from behind the plate"
+    figure.supxlabel(note, y=0.12 * inch, va="bottom", fontsize="small", color="0.3")
+    return figure
+
+
+def _extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
+    """What is drawn of a plate, along y and z [m]: enough of an unbounded one to hold the core twice."""
+    if plate.size is not None:
+        return np.array(plate.size)
+    return np.maximum(_CELLS * np.array(plate.pattern.unit_cell), 0.0 if core is None else 4.0 * core.max_radius)
+
+
+def _sheet(extent: NDArray[np.float64]) -> tuple[Figure, Axes]:
+    """Figure with axes about the origin that are to scale; extent in mm."""
+    across, up = _LONGER_SIDE * extent / extent.max()
+    width, height = max(across + _ROOM_ACROSS, _NARROWEST), up + _BELOW + _ABOVE
+    figure = Figure(figsize=(width, height))
+    axes = figure.add_axes(
+        ((width - across) / 2 / width, _BELOW / height, across / width, up / height),
+        xlim=(-extent[0] / 2, extent[0] / 2),
+        ylim=(-extent[1] / 2, extent[1] / 2),
+        aspect="equal",
+        facecolor=_STEEL,
+        xlabel="y [mm]",
+        ylabel="z [mm]",
+    )
+    return figure, axes
+
+
+def _holes(plate: Plate, axes: Axes) -> list[Patch]:
+    """All holes that the axes show, as one patch: islands in them stay steel."""
+    ranges = (np.array(ends) / _MM for ends in (axes.get_xlim(), axes.get_ylim()))
+    outlines = plate.pattern.outlines(*((low, high) for low, high in ranges))
+    if not outlines:
+        return []
+    path = Path.make_compound_path(*(Path(outline * _MM, closed=True) for outline in outlines))
+    return [PathPatch(path, facecolor="white", edgecolor="black", linewidth=0.8, label="hole")]
+
+
+def _frames(plate: Plate) -> list[Patch]:
+    """Unit cell and margin."""
+    frames = []
+    if not isinstance(plate.pattern, NoPattern):
+        frames.append(_frame(plate.pattern.unit_cell, label="unit cell", edgecolor="#0072B2", linestyle="--"))
+    if plate.size is not None and plate.margin is not None:
+        inner = [side - 2.0 * plate.margin for side in plate.size]
+        frames.append(_frame(inner, label=f"margin, {plate.margin * _MM:g} mm", edgecolor="0.35", linestyle=":"))
+    return frames
+
+
+def _frame(extent: Sequence[float], **style: Any) -> Patch:
+    """Rectangle of an extent [m] about the origin."""
+    along_y, along_z = (side * _MM for side in extent)
+    return Rectangle((-along_y / 2, -along_z / 2), along_y, along_z, fill=False, linewidth=1.6, **style)
+
+
+def _section(core: Core) -> Patch:
+    """The largest section of the core, about the origin."""
+    radius = core.max_radius * _MM
+    label = f"largest section of the core, \u2300 {2 * radius:.2f} mm"
+    return Circle((0.0, 0.0), radius, facecolor=to_rgba(_CORE, 0.45), edgecolor=_CORE, linewidth=1.5, label=label)

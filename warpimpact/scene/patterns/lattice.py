@@ -1,0 +1,279 @@
+"""Lattices: one hole shape at any places of a rectangular cell that repeats (MODEL §3)."""
+
+import math
+from abc import abstractmethod
+from functools import cached_property
+from typing import Annotated, Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, PrivateAttr, model_validator
+
+from ..model import Array
+from ..units import Angle, Length, PositiveLength
+from .pattern import BoolArray, Pattern, Range, half_sides
+from .roundings import area, distance, geometries, neighbours, outline, placed
+
+_MOST_HOLES = 20_000
+_SAME = 1e-9
+"""What two lengths may differ by, as a share of the period, and be the same."""
+
+
+class Place(NamedTuple):
+    """Where a hole of a cell lies: its origin [m], and how far it is turned from +y towards +z [rad]."""
+
+    y: Length
+    z: Length
+    rotation: Angle = 0.0
+
+
+class LatticePattern(Pattern):
+    """Holes of one shape in a rectangular cell that repeats.
+
+    A shape is a convex polygon, a line or a point, its `spine`, and all that lies within a `rounding` of it: a slot is
+    a line and a radius, a triangle with rounded corners a smaller triangle and theirs.
+
+    Attributes:
+        spacing: extent (a, b) of the cell along y and z [m].
+        staggered: shifts every odd row of cells along y by b/2 along z.
+        holes: where the holes of a cell lie, and perhaps a turn of each beyond `rotation`; one, on the origin, if not
+            given.
+        rotation: turn of every hole from +y towards +z [rad].
+    """
+
+    spacing: tuple[PositiveLength, PositiveLength]
+    staggered: Annotated[bool, Field(strict=True)] = False
+    holes: Annotated[tuple[Place, ...], Field(min_length=1, max_length=_MOST_HOLES)] | None = None
+    rotation: Angle = 0.0
+    _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
+    """Size and margin of the plate that holes are left on; None is all of an unbounded one."""
+
+    @property
+    @abstractmethod
+    def spine(self) -> Array:
+        """Corners of a convex polygon, anticlockwise, or the ends of a line, or a point, before any turn; shape
+        [corners, 2] [m]."""
+
+    @property
+    def rounding(self) -> float:
+        """How far the hole reaches beyond its spine [m]."""
+        return 0.0
+
+    @property
+    def hole_area(self) -> float:
+        """Area of one hole [m²]."""
+        return area(self.spine, self.rounding)
+
+    @property
+    def _marks(self) -> Array:
+        """Points, shape [marks, 2] [m]: where those of two holes of the shape are the same, the holes are."""
+        return self.spine
+
+    def _depth(self, y: Array, z: Array) -> Array:
+        """How far [m] points lie within the edge of the hole on the origin, not turned; negative outside.
+
+        It is 0 on the edge and nowhere steeper than 1.
+        """
+        return self.rounding - distance(self.spine, y, z)
+
+    def _check_shape(self) -> None:
+        """Raise a ValueError where the sizes make no hole."""
+
+    @model_validator(mode="after")
+    def _leaves_ligaments(self) -> Self:
+        if self.staggered and self.holes is not None:
+            raise ValueError("got staggered beside holes, but it is short for two holes; list all of the cell instead")
+        self._check_shape()
+        if self.open_area >= 1:
+            raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
+        gap, one, other = self._nearest
+        if gap <= _SAME * max(self.spacing):
+            raise ValueError(
+                f"got spacing = {_millimetres(self.spacing)}, which lets the holes at {_millimetres(one)} and "
+                f"{_millimetres(other)} overlap or touch, but a ligament must be left between them"
+            )
+        return self
+
+    @property
+    def unit_cell(self) -> tuple[float, float]:
+        """Extent along y and z [m] of the smallest rectangle that repeats: two rows of a staggered lattice."""
+        a, b = self.spacing
+        return (2 * a, b) if self.staggered else (a, b)
+
+    @property
+    def period(self) -> tuple[float, float]:
+        """That of the unit cell, or the size of the plate that the pattern is bounded by [m]."""
+        return self.unit_cell if self._plate is None else self._plate[0]
+
+    @property
+    def open_area(self) -> float:
+        """Share of holes in a period."""
+        return float(len(self._places) * self.hole_area / math.prod(self.period))
+
+    def bounded(self, size: tuple[float, float], margin: float) -> Self:
+        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m]."""
+        on_plate = self.model_copy()
+        on_plate._plate = (size, margin)
+        if not len(on_plate._places):
+            raise ValueError(
+                f"got size = {_millimetres(size)} and margin = {1e3 * margin:g} mm, which leave no hole on the plate"
+            )
+        return on_plate
+
+    def is_hole(self, y: Array, z: Array) -> BoolArray:
+        """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
+        inside: BoolArray = self._deepest(y, z) >= 0
+        return inside
+
+    def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
+        """Whether the edge of a hole may lie within `reach` of points y, z [m]; bool, of their broadcast shape."""
+        nearby: BoolArray = ~(np.abs(self._deepest(y, z)) > reach)
+        return nearby if reach <= self._sight else np.ones_like(nearby)
+
+    def _deepest(self, y: Array, z: Array) -> Array:
+        """How far points lie within the edge of a hole [m]; negative outside, −inf where no hole is in sight."""
+        (count_y, count_z), near = self._bins
+        period_y, period_z = self.period
+        y, z = y - period_y * np.round(y / period_y), z - period_z * np.round(z / period_z)
+        cell = _bin(y, period_y, count_y) * count_z + _bin(z, period_z, count_z)
+        deepest = np.full(cell.shape, -np.inf)
+        for hole_y, hole_z, cosine, sine in near:
+            from_y, from_z = y - hole_y[cell], z - hole_z[cell]
+            along_y = cosine[cell] * from_y + sine[cell] * from_z
+            along_z = cosine[cell] * from_z - sine[cell] * from_y
+            deepest = np.fmax(deepest, self._depth(along_y, along_z))  # a bin with fewer holes has NaN
+        return deepest
+
+    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
+        """Closed outlines, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
+        return [outline(spine, self.rounding) for spine in placed(self.spine, self._reaching(y_range, z_range))]
+
+    def ligament(self, size: tuple[float, float] | None = None) -> float:
+        """Smallest distance between two holes, or of a whole hole to the rim of a plate of this `size` [m]; exact but
+        for ellipses, which are polygons here."""
+        if size is None:
+            return self._nearest[0]
+        half = half_sides(size, self.period, np.ptp(self._boxes(self._places), axis=1).max(axis=0))
+        places = self._reaching((-half[0], half[0]), (-half[1], half[1]))
+        to_rim = (half - np.abs(self._boxes(places))).min(axis=(1, 2))
+        between = neighbours(geometries(placed(self.spine, places)), len(places))[0] - 2 * self.rounding
+        return float(min(between, to_rim[to_rim >= 0].min(initial=np.inf)))
+
+    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
+        """Whether a mirror image, then half a period along both axes if `centred`, changes nothing."""
+        from scipy.spatial import KDTree
+
+        period, mirror = np.array(self.period), np.array([along_y, along_z])
+        tolerance = _SAME * period.max()
+        marks = placed(self._marks, self._places)
+        middles = marks.mean(axis=1)
+        images = middles * mirror + (period / 2 if centred else 0.0)
+        apart, same = KDTree(middles % period % period, boxsize=period).query(images % period % period)
+        if apart.max() > tolerance:
+            return False
+        turned, there = (marks - middles[:, None]) * mirror, (marks - middles[:, None])[same]
+        return bool(np.linalg.norm(turned[:, :, None] - there[:, None], axis=-1).min(axis=-1).max() <= tolerance)
+
+    @cached_property
+    def _cell_places(self) -> Array:
+        """Origin [m] and turn [rad] of every hole of a unit cell, shape [holes, 3]."""
+        a, b = self.spacing
+        places = np.array(self.holes or ((0.0, 0.0, 0.0), (a, b / 2, 0.0))[: 1 + self.staggered])
+        places[:, :2] -= np.round(places[:, :2] / self.unit_cell) * self.unit_cell
+        places[:, 2] += self.rotation
+        return places
+
+    @cached_property
+    def _places(self) -> Array:
+        """Origin [m] and turn [rad] of every hole of a period, shape [holes, 3]."""
+        if self._plate is None:
+            return self._cell_places
+        size, margin = self._plate
+        if (count := len(self._cell_places) * math.prod(size) / math.prod(self.unit_cell)) > _MOST_HOLES:
+            raise ValueError(
+                f"got size = {_millimetres(size)}, a plate of some {count:.3g} holes, but with a margin at most "
+                f"{_MOST_HOLES} can be told apart"
+            )
+        inner = np.array(size) / 2 - margin
+        places = self._repeated(self._cell_places, self.unit_cell, (-inner[0], inner[0]), (-inner[1], inner[1]))
+        kept: Array = places[(np.abs(self._boxes(places)) <= inner * (1 + _SAME)).all(axis=(1, 2))]
+        return kept
+
+    def _reaching(self, y_range: Range, z_range: Range) -> Array:
+        """Places of the holes that reach into a rectangle, shape [holes, 3]; none beyond the plate."""
+        if self._plate is None:
+            return self._repeated(self._places, self.period, y_range, z_range)
+        boxes, (low, high) = self._boxes(self._places), np.array([y_range, z_range]).T
+        kept: Array = self._places[((boxes[:, 0] <= high) & (boxes[:, 1] >= low)).all(axis=1)]
+        return kept
+
+    def _repeated(self, places: Array, period: tuple[float, float], y_range: Range, z_range: Range) -> Array:
+        """Places and those whole periods away, as far as their holes reach into a rectangle."""
+        repeated = []
+        for place, (low, high) in zip(places, self._boxes(places), strict=True):
+            along_y, along_z = (
+                np.arange(math.ceil((ends[0] - high[axis]) / step), math.floor((ends[1] - low[axis]) / step) + 1) * step
+                for axis, (ends, step) in enumerate(zip((y_range, z_range), period, strict=True))
+            )
+            shifts = np.stack(np.meshgrid(along_y, along_z, 0.0, indexing="ij"), axis=-1)
+            repeated.append(place + shifts.reshape(-1, 3))
+        return np.concatenate(repeated)
+
+    def _boxes(self, places: Array) -> Array:
+        """Lower and upper corners (y, z) of the holes at some places, shape [holes, 2, 2] [m]."""
+        spines = placed(self.spine, places)
+        return np.stack([spines.min(axis=1) - self.rounding, spines.max(axis=1) + self.rounding], axis=1)
+
+    @cached_property
+    def _nearest(self) -> tuple[float, Array, Array]:
+        """Smallest distance between two holes of the unbounded lattice [m], and the origins of these."""
+        extent, cell = np.ptp(self._boxes(self._cell_places), axis=1).max(axis=0), np.array(self.unit_cell)
+        around = [
+            np.arange(-count, count + 1) * step for count, step in zip(1 + np.ceil(extent / cell), cell, strict=True)
+        ]
+        shifts = np.stack(np.meshgrid(*around, 0.0, indexing="ij"), axis=-1).reshape(-1, 3)
+        shifts = shifts[np.argsort(np.abs(shifts).sum(axis=1), kind="stable")]  # the cell itself comes first
+        places = (shifts[:, None] + self._cell_places).reshape(-1, 3)
+        gap, one, other = neighbours(geometries(placed(self.spine, places)), len(self._cell_places))
+        return gap - 2 * self.rounding, places[one, :2], places[other, :2]
+
+    @property
+    def _sight(self) -> float:
+        """How far from its edge a hole is seen [m]."""
+        return 0.1 * float(np.ptp(self.spine, axis=0).min() + 2 * self.rounding)
+
+    @cached_property
+    def _bins(self) -> tuple[tuple[int, int], list[tuple[Array, ...]]]:
+        """Bins along y and z that a period divides into, and the holes in sight of each.
+
+        The k-th entry of the list is origin and cosine and sine of the turn of the k-th such hole, each of shape
+        [bins], NaN in a bin that has no more.
+        """
+        period, boxes = np.array(self.period), self._boxes(self._places)
+        finest = math.ceil(8 * math.sqrt(len(boxes)))
+        counts = np.minimum(np.ceil(2 * period / np.ptp(boxes, axis=1).max(axis=0)), finest).astype(int)
+        half = period / 2 + self._sight
+        places = self._repeated(self._places, self.period, (-half[0], half[0]), (-half[1], half[1]))
+        reaches = _bin(self._boxes(places) + np.array([[-self._sight], [self._sight]]), period, counts)
+        inside: list[list[int]] = [[] for _ in range(math.prod(counts))]
+        for hole, ((low_y, low_z), (high_y, high_z)) in enumerate(reaches):
+            for row in range(low_y, high_y + 1):
+                for column in range(low_z, high_z + 1):
+                    inside[row * counts[1] + column].append(hole)
+        columns = np.vstack(
+            [np.column_stack([places[:, :2], np.cos(places[:, 2]), np.sin(places[:, 2])]), [np.nan] * 4]
+        )
+        most = max(map(len, inside))
+        which = np.array([[*holes, *[-1] * (most - len(holes))] for holes in inside])
+        return (int(counts[0]), int(counts[1])), [tuple(columns[hole].T) for hole in which.T]
+
+
+def _bin(at: Array, period: Any, count: Any) -> NDArray[np.int64]:
+    """Which of `count` bins of a period about the origin each coordinate lies in; the last ones also beyond it."""
+    return np.clip(np.floor((at / period + 0.5) * count), 0, count - 1).astype(np.int64)
+
+
+def _millimetres(pair: Any) -> str:
+    """Two lengths as a person writes them."""
+    y, z = (f"{round(1e3 * length, 6) + 0.0:g}" for length in pair)
+    return f"({y}, {z}) mm"

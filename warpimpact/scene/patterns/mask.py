@@ -1,0 +1,120 @@
+"""Masks: any holes, as square cells that are hole or material (MODEL §3)."""
+
+import math
+from functools import cached_property
+from itertools import pairwise
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import model_validator
+
+from ..files import InputFile
+from ..model import Array
+from ..units import PositiveLength
+from .mask_files import read_mask
+from .pattern import BoolArray, Pattern, Range, half_sides
+from .roundings import neighbours
+
+
+class MaskPattern(Pattern):
+    """Square cells of `cell_size` [m] from a file, repeated periodically, the mask centred on the origin.
+
+    A .npy file holds a two-dimensional array, axis 0 along y and axis 1 along z: zero is hole, one other
+    value is material. In a PNG image y runs from left to right and z from bottom to top: black is hole, one
+    other grey is material. In an SVG drawing, which lies alike and has a width and a height in mm, filled shapes are
+    holes; a cell is hole where its middle lies in one.
+    """
+
+    shape: Literal["mask"] = "mask"
+    file: InputFile
+    cell_size: PositiveLength
+
+    @model_validator(mode="after")
+    def _is_a_mask(self) -> Self:
+        _ = self.material
+        return self
+
+    @cached_property
+    def material(self) -> BoolArray:
+        """Where a cell is material, bool of shape [cells along y, cells along z], read-only."""
+        material = read_mask(self.file, self.cell_size)
+        material.setflags(write=False)
+        return material
+
+    @property
+    def period(self) -> tuple[float, float]:
+        """Extent of the mask along y and z [m]."""
+        along_y, along_z = self.material.shape
+        return (along_y * self.cell_size, along_z * self.cell_size)
+
+    @property
+    def open_area(self) -> float:
+        """Share of holes in the mask."""
+        return 1 - float(self.material.mean())
+
+    def is_hole(self, y: Array, z: Array) -> BoolArray:
+        """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
+        i, j = (
+            np.floor(coordinate / self.cell_size + cells / 2).astype(np.int64) % cells
+            for coordinate, cells in zip((y, z), self.material.shape, strict=True)
+        )
+        return ~self.material[i, j]
+
+    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
+        """Closed outlines, each of shape [points, 2] [m], of holes cut off at a rectangle."""
+        lines: list[Array] = self._contours(y_range, z_range).lines(0.5)
+        return lines
+
+    def ligament(self, size: tuple[float, float] | None = None) -> float:
+        """Smallest distance between two holes, or of a whole hole to the rim of a plate of this `size` [m].
+
+        Outlines cut the corners of cells. A hole that goes on beyond two periods counts as several.
+        """
+        import shapely
+
+        period = np.array(self.period)
+        half = period if size is None else half_sides(size, self.period, period)
+        # Outer and inner rings of each hole, one after the other, with their offsets.
+        rings, starts = self._contours(*((-end, end) for end in half)).filled(0.5, math.inf)
+        holes = [
+            shapely.Polygon(points[at[0] : at[1]], [points[a:b] for a, b in pairwise(at[1:])])
+            for points, at in zip(rings, starts, strict=True)
+        ]
+        between = neighbours(np.array(holes), len(holes))[0]
+        if size is None:
+            return between
+        low_y, low_z, high_y, high_z = shapely.bounds(holes).reshape(-1, 4).T
+        to_rim = half[:, None] - np.maximum(np.abs([low_y, low_z]), np.abs([high_y, high_z]))
+        whole = to_rim.min(axis=0)
+        return min(between, float(whole[whole > 0].min(initial=np.inf)))
+
+    @property
+    def resolution(self) -> float:
+        """What the ligament may be off by [m]: a cell."""
+        return self.cell_size
+
+    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
+        """Whether a mirror image, then half a period along both axes if `centred`, changes no cell."""
+        halves = self.material.repeat(2, axis=0).repeat(2, axis=1)  # of which half a period is a whole number
+        image = halves[::along_y, ::along_z]
+        return np.array_equal(np.roll(image, self.material.shape, axis=(0, 1)) if centred else image, halves)
+
+    def bounded(self, size: tuple[float, float], margin: float) -> Self:
+        """Refused: which cells make a hole is not said."""
+        raise ValueError("got a mask beside margin, which leaves out single holes; draw the mask as large as the plate")
+
+    def _contours(self, y_range: Range, z_range: Range) -> Any:
+        """What draws lines between hole, which is 1, and material, which is 0, within a rectangle."""
+        from contourpy import FillType, LineType, contour_generator
+
+        y, z = (
+            self._cell_centres(ends, cells) for ends, cells in zip((y_range, z_range), self.material.shape, strict=True)
+        )
+        hole = self.is_hole(y, z[:, None]).astype(float)
+        hole[[0, -1], :] = hole[:, [0, -1]] = 0.0  # closes the outlines of holes that go on outside
+        return contour_generator(y, z, hole, line_type=LineType.Separate, fill_type=FillType.OuterOffset)
+
+    def _cell_centres(self, ends: Range, cells: int) -> Array:
+        """Centres [m] of the cells that cover a range, and of one more at each end."""
+        low, high = np.floor(np.array(ends) / self.cell_size + cells / 2)
+        return (np.arange(low - 1, high + 2) + 0.5 - cells / 2) * self.cell_size

@@ -1,0 +1,121 @@
+"""What any hole pattern tells, and the one without holes."""
+
+import math
+from abc import ABC, abstractmethod
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Array, Model
+
+BoolArray = NDArray[np.bool_]
+Range = tuple[float, float]
+
+
+def half_sides(size: tuple[float, float], cell: tuple[float, float], reach: Array) -> Array:
+    """Half the sides [m] of a plate with the ligaments of one of this `size`, but not much larger than a cell.
+
+    The same rim cuts the same holes where a plate is whole cells smaller on every side, as long as there are two more
+    cells than single holes `reach`.
+    """
+    half, sides = np.array(size) / 2, np.array(cell)
+    spare: Array = np.maximum(0.0, np.floor((half - reach) / sides) - 2)
+    return np.asarray(half - spare * sides)
+
+
+class Pattern(Model, ABC):
+    """Where a plate has holes."""
+
+    @property
+    @abstractmethod
+    def period(self) -> tuple[float, float]:
+        """Extent along y and z [m] of a rectangle, centred on the origin, of which the pattern consists."""
+
+    @property
+    def unit_cell(self) -> tuple[float, float]:
+        """Extent along y and z [m] of the cell that represents the pattern; its period, but for a bounded one."""
+        return self.period
+
+    @property
+    @abstractmethod
+    def open_area(self) -> float:
+        """Share of holes in a period."""
+
+    @abstractmethod
+    def is_hole(self, y: Array, z: Array) -> BoolArray:
+        """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
+
+    def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
+        """Whether the edge of a hole may lie within `reach` of points y, z [m]; bool, of their broadcast shape.
+
+        Where it is False there is none for sure.
+        """
+        return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
+
+    @abstractmethod
+    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
+        """Closed outlines, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
+
+    @abstractmethod
+    def ligament(self, size: tuple[float, float] | None = None) -> float:
+        """Smallest distance between two holes, or of a whole hole to the rim of a plate of this `size` [m]; inf where
+        there is none. A hole that the rim cuts has no distance to it."""
+
+    @property
+    def resolution(self) -> float:
+        """What the ligament may be off by [m]; 0 for shapes that formulas describe."""
+        return 0.0
+
+    @abstractmethod
+    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
+        """Whether (y, z) → (along_y·y, along_z·z), then half a period along both if `centred`, changes nothing.
+
+        Args:
+            along_y, along_z: 1, or −1 for a mirror image.
+        """
+
+    @abstractmethod
+    def bounded(self, size: tuple[float, float], margin: float) -> Self:
+        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m], which
+        becomes its period.
+
+        Raises:
+            ValueError: says why that cannot be.
+        """
+
+
+class NoPattern(Pattern):
+    """A plate without holes; its unit cell is a square millimetre."""
+
+    shape: Literal["none"] = "none"
+
+    @property
+    def period(self) -> tuple[float, float]:
+        """Extent of the unit cell along y and z [m]; any would do."""
+        return (1e-3, 1e-3)
+
+    @property
+    def open_area(self) -> float:
+        """Share of holes in a unit cell."""
+        return 0.0
+
+    def is_hole(self, y: Array, z: Array) -> BoolArray:
+        """False everywhere, of the broadcast shape of y and z."""
+        return np.zeros(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
+
+    def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
+        """There are none."""
+        return []
+
+    def ligament(self, size: tuple[float, float] | None = None) -> float:
+        """There is none."""
+        return math.inf
+
+    def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
+        """True: all points are alike."""
+        return True
+
+    def bounded(self, size: tuple[float, float], margin: float) -> Self:
+        """Itself: there is no hole to leave out."""
+        return self
