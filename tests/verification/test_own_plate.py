@@ -86,11 +86,11 @@ def test_a_shot_depends_on_its_own_numbers_alone(scheme: str, every: int, device
         plain = simulated(core, plate, without(SHOTS)[shot : shot + 1], device, **numerics)
         for name, values in vars(together).items():
             np.testing.assert_array_equal(getattr(alone, name)[0], values[shot], err_msg=name)
-        # Another build of the kernels rounds otherwise: by 1e-4 m/s and 1e-6 rad (measured), here with room.
+        # Another build of the kernels may round otherwise: measured 1e-6 rad, and nothing in speed and energy.
         assert plain.status[0] == alone.status[0]
-        assert plain.residual_velocity[0] == pytest.approx(alone.residual_velocity[0], abs=5e-3)
-        assert plain.energy_loss[0] == pytest.approx(alone.energy_loss[0], abs=5e-2)
-        np.testing.assert_allclose(plain.tilt, alone.tilt, atol=1e-4)
+        assert plain.residual_velocity[0] == pytest.approx(alone.residual_velocity[0], abs=1e-3)
+        assert plain.energy_loss[0] == pytest.approx(alone.energy_loss[0], abs=1e-2)
+        np.testing.assert_allclose(plain.tilt, alone.tilt, atol=1e-5)
 
 
 @pytest.mark.parametrize("double", [False, True], ids=["single", "double"])
@@ -116,8 +116,7 @@ def test_every_shot_does_the_work_of_its_own_plate(device: str) -> None:
 
 
 def test_a_given_moment_of_inertia_scales_with_the_mass() -> None:
-    # Torque-free behind a plate without resistance: axial spin about the axis stays as it is, whatever the mass; a
-    # core twice as heavy with twice the moments keeps its motion through a plate twice as strong.
+    # A core twice as heavy moves against twice the resistance as the light one does against once.
     core = core_with(inertia_transverse=3e-7)
     double = Shots(**shots_at(5e-3, 2e-3, yaw=5.0).columns | {"mass": np.array([8e-3]), "resistance": np.array([4e9])})
     heavy = simulation.simulate(core, paper_plate(), double, standoffs=STANDOFFS, device="cpu")
