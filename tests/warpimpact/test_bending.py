@@ -8,7 +8,8 @@ from warpimpact import Campaign, results
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.replay import replay
 from warpimpact.cli import main
-from warpimpact.plotting.maps import MAPPED, hit_map
+from warpimpact.plotting.cell import MAPPED
+from warpimpact.plotting.maps import hit_map
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 STOP = """
