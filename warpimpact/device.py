@@ -51,3 +51,12 @@ def _start_warp() -> None:
 def cores() -> int:
     """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def load(kernel: Any, device: Any) -> None:
+    """Have a kernel ready on a device for launches of Warp's own block size, compiled if it is not cached yet.
+
+    A module is compiled for one block size; without it Warp would take that of CUDA on a CPU, too, and compile again
+    when the kernel is launched.
+    """
+    kernel.module.load(device, 1 if device.is_cpu else 256)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpimpact import discretisation
 from warpimpact.bending import check_bending, sections_of
-from warpimpact.discretisation import Fidelity
+from warpimpact.discretisation import Fidelity, Resolution
 from warpimpact.kernels import march
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import OF_THE_SCENE, Core, Interaction, Numerics, Plate, Shots
@@ -20,6 +20,22 @@ Array = NDArray[np.float64]
 
 STEP_ALLOWANCE = 200
 """How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+
+
+def variant_of(
+    resolution: Resolution, plate: Plate, interaction: Interaction, shots: Shots, *, bending: bool
+) -> Variant:
+    """The build of the kernels that a scene needs."""
+    return Variant(
+        double=resolution.double,
+        nodal=resolution.nodal,
+        degrades=plate.degradation < 1.0 or "degradation" in shots.columns,
+        rubs=plate.shear_coefficient > 0.0 or "shear_coefficient" in shots.columns,
+        rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
+        rimmed=plate.size is not None,
+        bends=bending,
+        scattered=any(name in shots.columns for name in OF_THE_SCENE),
+    )
 
 
 class Inputs:
@@ -50,16 +66,7 @@ class Inputs:
             check_bending(core, numerics)
         self._device = device
         self.resolution = discretisation.resolve(numerics, core, plate, shots.columns)
-        self.variant = Variant(
-            double=self.resolution.double,
-            nodal=self.resolution.nodal,
-            degrades=plate.degradation < 1.0 or "degradation" in shots.columns,
-            rubs=plate.shear_coefficient > 0.0 or "shear_coefficient" in shots.columns,
-            rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
-            rimmed=plate.size is not None,
-            bends=bending,
-            scattered=any(name in shots.columns for name in OF_THE_SCENE),
-        )
+        self.variant = variant_of(self.resolution, plate, interaction, shots, bending=bending)
         self.stage = march.build(self.variant)
         self.spacing = self.resolution.grid_spacing
         self._rings = discretisation.rings_of(

@@ -14,7 +14,7 @@ import psutil
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.device import cores
+from warpimpact.device import cores, load
 from warpimpact.discretisation import Fidelity
 from warpimpact.inputs import Inputs
 from warpimpact.kernels import free_flight
@@ -250,7 +250,7 @@ class March:
 
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
-        self.stage.kernel.module.load(self.device)
+        load(self.stage.kernel, self.device)
         launch = partial(self._launch, self.inputs.array(which, dtype=wp.int32), outcomes)
         if self.device.is_cpu:
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)

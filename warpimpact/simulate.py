@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.device import find_device
-from warpimpact.discretisation import Fidelity
+from warpimpact.device import find_device, load
+from warpimpact.discretisation import Fidelity, resolve
 from warpimpact.history import History
+from warpimpact.inputs import variant_of
+from warpimpact.kernels import free_flight
+from warpimpact.kernels import march as marching
 from warpimpact.marching import March, Progress
 from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots
 
@@ -123,6 +126,23 @@ def simulate(
         bending=bending,
     )
     return _outcomes(march, march.march(progress), standoffs, standoff_point)
+
+
+def build(
+    core: Core,
+    plate: Plate,
+    shots: Shots,
+    *,
+    interaction: Interaction | None = None,
+    numerics: Numerics | Fidelity | None = None,
+    bending: bool = False,
+    device: str = "auto",
+) -> None:
+    """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
+    resolution = resolve(numerics or Numerics(), core, plate, shots.columns)
+    variant = variant_of(resolution, plate, interaction or Interaction(), shots, bending=bending)
+    for stage in (marching, free_flight):
+        load(stage.build(variant).kernel, find_device(device))
 
 
 def _outcomes(march: March, contact: Any, standoffs: Sequence[float], standoff_point: str) -> Outcomes:

@@ -21,9 +21,9 @@ from warpimpact.discretisation import resolve
 from warpimpact.marching import Progress
 from warpimpact.refine import LADDER, Estimates, simulate_to_tolerance
 from warpimpact.results import solid_dataset, to_dataset
-from warpimpact.scene import Plate, Shots, Symmetry
+from warpimpact.scene import Numerics, Plate, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
-from warpimpact.simulate import Outcomes, simulate
+from warpimpact.simulate import Outcomes, build, simulate
 from warpimpact.unfold import unfolded, unfolded_estimates
 
 
@@ -61,6 +61,7 @@ def compute(
         "threads": threads,
     }
     follow = progress and (lambda done, total: progress(done * len(group), total * len(group)))
+    _build(campaign, computed, device)
     begin = time.perf_counter()
     outcomes, estimates = _outcomes(campaign, campaign.plate, computed, **how, progress=follow)
     elapsed = time.perf_counter() - begin
@@ -103,6 +104,20 @@ def compute(
     if solid.thickness is not None:
         solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
     return dataset.merge(solid_dataset(_outcomes(campaign, thinner, solid, **how)[0]))
+
+
+def _build(campaign: Campaign, shots: Shots, device: str) -> None:
+    """Have the kernels ready, so that the time of computing is that alone."""
+    numerics = campaign.numerics
+    build(
+        campaign.core,
+        campaign.plate,
+        shots,
+        interaction=campaign.interaction,
+        numerics=numerics if numerics.tolerance is None else Numerics(precision=numerics.precision),
+        bending=campaign.output.bending,
+        device=device,
+    )
 
 
 def _outcomes(campaign: Campaign, plate: Plate, shots: Shots, **how: Any) -> tuple[Outcomes, Estimates | None]:
