@@ -1,6 +1,7 @@
 VENV := .venv
 PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
+PARALLEL := --numprocesses auto --dist worksteal
 
 .PHONY: demo gallery test clean
 
@@ -16,8 +17,8 @@ test: $(INSTALLED)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
-	$(VENV)/bin/pytest
-	$(VENV)/bin/pytest tests/kernels tests/verification/test_determinism.py::test_any_chunk --warp-mode debug
+	$(VENV)/bin/pytest $(PARALLEL)
+	$(VENV)/bin/pytest $(PARALLEL) tests/kernels tests/verification/test_determinism.py::test_any_chunk --warp-mode debug
 
 clean:
 	rm -rf $(VENV) build slotted.nc slotted.nc.parts slotted_*.png

@@ -22,7 +22,7 @@ import numpy as np
 from bench import CAMPAIGN, machine, seconds, shots_of, store
 from matplotlib.figure import Figure
 
-from warpimpact import Campaign, Plate, Shots, results
+from warpimpact import Campaign, Plate, Shots, SlotPattern, results
 from warpimpact.campaign.run import run
 from warpimpact.simulate import simulate
 
@@ -30,6 +30,7 @@ COMMAND = [sys.executable, "-c", "import sys; from warpimpact.cli import main; s
 TARGETS = {"help_seconds": 0.3, "warm_run_seconds": 2.0, "compilation_seconds": 5.0, "file_share": 0.1}
 SMALLEST, PER_DECADE = 1000, 2
 PLATE_SIDES = (0.1, 0.3, 1.0, 3.0, 10.0)  # [m]
+LATTICES = (1, 4, 9, 25)  # unit cells of the pattern that the plate calls one
 YAWS = (0.0, 15.0, 30.0, 60.0, 80.0)  # [°], of one shot among many, which widens the window of all
 SCENE_HITS = 1024
 REPEATS = 3
@@ -53,12 +54,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         values["file_share"] = _file_share(campaign, Path(folder), arguments.largest)
     straight = _shots(campaign, 0.0)
     values["plate_side"] = _rates(campaign, {side: (_sized(campaign.plate, side), straight) for side in PLATE_SIDES})
+    values["lattice"] = _rates(campaign, {count: (_relabelled(campaign.plate, count), straight) for count in LATTICES})
     values["widest_yaw"] = _rates(campaign, {yaw: (campaign.plate, _shots(campaign, yaw)) for yaw in YAWS})
     for name, target in TARGETS.items():
         print(f"{name}: {values[name]:.3g} (target: below {target:g})")
     for row in values["hits"]:
         print(f"{row['count']} hits: {row['hits_per_second']:.4g} hits/s, {row['peak_memory'] / 2**20:.0f} MiB at most")
-    for name in ("plate_side", "widest_yaw"):
+    for name in ("plate_side", "lattice", "widest_yaw"):
         rates = ", ".join(f"{key:g}: {rate:.4g}" for key, rate in values[name].items())
         print(f"hits/s by {name}: {rates}")
     store("overheads", values, draw(values))
@@ -139,6 +141,16 @@ def _sized(plate: Plate, side: float) -> Plate:
     return plate.model_copy(update={"size": (side, side)})
 
 
+def _relabelled(plate: Plate, count: int) -> Plate:
+    """The same plate, with a square of several of its unit cells called one."""
+    side, cell = math.isqrt(count), plate.pattern.period
+    steps = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2) * cell
+    holes = [tuple(map(float, step + within)) for step in steps for within in ((0.0, 0.0), (cell[0] / 2, cell[1] / 2))]
+    spacing = (side * cell[0], side * cell[1])
+    pattern = SlotPattern(length=plate.pattern.length, width=plate.pattern.width, spacing=spacing, holes=holes)
+    return plate.model_copy(update={"pattern": pattern})
+
+
 def _shots(campaign: Campaign, yaw: float) -> Shots:
     """SCENE_HITS shots, the last one yawed [°]."""
     shots = shots_of(campaign, SCENE_HITS)
@@ -162,13 +174,15 @@ def _rates(campaign: Campaign, scenes: dict[float, tuple[Plate, Shots]]) -> dict
 
 def draw(values: dict[str, Any]) -> Figure:
     """Rate and memory against hits, rate against plate and window."""
-    figure = Figure(figsize=(11, 7), layout="constrained")
-    panels = figure.subplots(2, 2).flat
+    figure = Figure(figsize=(11, 10), layout="constrained")
+    *panels, spare = figure.subplots(3, 2).flat
+    spare.set_axis_off()
     count = [row["count"] for row in values["hits"]]
     curves = [
         (count, {"march": [row["hits_per_second"] for row in values["hits"]]}, "hits"),
         (count, {"memory": [row["peak_memory"] / 2**20 for row in values["hits"]]}, "hits"),
         (list(values["plate_side"]), {"march": list(values["plate_side"].values())}, "side of the plate [m]"),
+        (list(values["lattice"]), {"march": list(values["lattice"].values())}, "lattice cells in one period"),
         (list(values["widest_yaw"]), {"march": list(values["widest_yaw"].values())}, "yaw of one shot in 1024 [°]"),
     ]
     curves[0][1]["whole command"] = [row["count"] / row["seconds"] for row in values["hits"]]

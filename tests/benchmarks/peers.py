@@ -96,8 +96,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     floors = floors_of(campaign, contenders, shots[:FLOOR_HITS])
     for one in floors:
         print(
-            f"{one['warpimpact']}: {one['operations']:.3g} operations per hit, {one['above_floor']:.3g} times "
-            f"the floor at {one['peak']:.3g} operations/s"
+            f"{one['warpimpact']}: {one['operations']:.3g} operations and {one['bytes']:.3g} bytes per hit, "
+            f"{one['above_floor']:.3g} times the floor at {one['peak']:.3g} operations/s"
         )
     print(f"literal scheme, warpimpact against NumPy: {apart[0]:.2g} m/s and {apart[1]:.2g}° apart (90 %)")
     values = {
