@@ -1,9 +1,23 @@
-"""Ctrl-C, and the SIGTERM of a batch system, that wait for what must not be broken off."""
+"""Ctrl-C and the SIGTERM of a batch system: they stop alike, and wait for what must not be broken off."""
 
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+
+@contextmanager
+def terminated_as_interrupted() -> Iterator[None]:
+    """A batch system ends what has used up its time by SIGTERM: that stops as cleanly as Ctrl-C."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @contextmanager

@@ -13,8 +13,8 @@ import xarray
 from warpimpact import ConeCore, results
 from warpimpact.campaign import parts
 from warpimpact.kernels.status import Status
-from warpimpact.results import SHOT_VARIABLES
 from warpimpact.scene import Shots
+from warpimpact.variables import SHOT_VARIABLES
 
 STANDOFFS = np.array([0.05, 0.13])
 PERIOD = (16e-3, 8e-3)

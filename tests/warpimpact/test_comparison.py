@@ -243,7 +243,7 @@ def test_a_comparison_that_was_broken_off_goes_on(
         yield follow
 
     with monkeypatch.context() as patched:
-        patched.setattr("warpimpact.cli._standing", breaking)
+        patched.setattr("warpimpact.cli.compare.show_standing", breaking)
         assert main(command) == 130
     assert "continue with --resume" in capsys.readouterr().err
     assert main(command) == 2

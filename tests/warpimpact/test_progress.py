@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from warpimpact import cli
 from warpimpact.campaign.estimates import Estimate, Measure
 from warpimpact.campaign.run import Standing
+from warpimpact.cli.progress import show_standing
 
 
 def standing(done: int, *, failed: int = 0, resumed: int = 100) -> Standing:
@@ -25,12 +25,12 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     now = [0.0]
-    monkeypatch.setattr("warpimpact.cli.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("warpimpact.cli.progress.time.monotonic", lambda: now[0])
     return now
 
 
 def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with cli._standing() as show:
+    with show_standing() as show:
         for done in range(100, 1001, 10):
             clock[0] += 0.1
             show(standing(done, failed=done // 300))
@@ -46,7 +46,7 @@ def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: 
 
 
 def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with cli._standing() as show:
+    with show_standing() as show:
         for _ in range(100):
             show(standing(101))
             clock[0] += 60.0
@@ -56,7 +56,7 @@ def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: lis
 def test_a_terminal_gets_a_bar_that_counts_what_was_resumed_as_done(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with cli._standing() as show:
+    with show_standing() as show:
         show(standing(100))
         show(standing(600, failed=3))
         show(standing(590, failed=3))  # what is under way may be given up: a bar does not go back

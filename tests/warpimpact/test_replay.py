@@ -13,8 +13,9 @@ from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.results import OUTCOME_VARIABLES, ResultError
+from warpimpact.results import ResultError
 from warpimpact.scene import Interaction
+from warpimpact.variables import HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 NOWHERE = Path("nowhere")
@@ -100,7 +101,7 @@ def test_history_tells_where_the_core_is(history: xarray.Dataset, result: xarray
     axis = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], axis=1)
     np.testing.assert_allclose(history["core_axis"], axis, atol=1e-14)
     assert dict(history.sizes)["quaternion"] == 4
-    for name, variable in (results.HISTORY_COORDINATES | results.HISTORY_VARIABLES).items():
+    for name, variable in (HISTORY_COORDINATES | HISTORY_VARIABLES).items():
         assert history[name].dims == variable.dims
         assert history[name].attrs == {"units": variable.units, "long_name": variable.long_name}
 

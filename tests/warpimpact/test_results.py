@@ -13,6 +13,7 @@ from warpimpact import results
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Shots
 from warpimpact.simulate import BentOutcomes, Outcomes
+from warpimpact.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SCATTER_VARIABLES, SHOT_VARIABLES
 
 CONTRACT = {
     "hit_y": (("hit",), "m"),
@@ -205,8 +206,8 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
 
 
 def test_every_field_of_shots_and_outcomes_has_a_variable():
-    shot_names = {name.removeprefix("impact_") for name in results.SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | results.SCATTER_VARIABLES.keys()
-    assert {field.name for field in dataclasses.fields(Outcomes)} == set(results.OUTCOME_VARIABLES)
+    shot_names = {name.removeprefix("impact_") for name in SHOT_VARIABLES} | {"hit_y", "hit_z"}
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | SCATTER_VARIABLES.keys()
+    assert {field.name for field in dataclasses.fields(Outcomes)} == set(OUTCOME_VARIABLES)
     bent = {field.name for field in dataclasses.fields(BentOutcomes)}
-    assert bent == set(results.OUTCOME_VARIABLES | results.BENDING_VARIABLES)
+    assert bent == set(OUTCOME_VARIABLES | BENDING_VARIABLES)

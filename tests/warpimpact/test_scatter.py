@@ -15,9 +15,9 @@ from warpimpact.campaign.compute import compute
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
-from warpimpact.results import OUTCOME_VARIABLES
 from warpimpact.scene import Hits, NoPattern, Numerics, Sampler, Scatter, Shots
 from warpimpact.scene.scatter import QUANTITIES
+from warpimpact.variables import OUTCOME_VARIABLES
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())

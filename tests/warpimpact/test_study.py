@@ -28,8 +28,9 @@ from warpimpact.cli import main
 from warpimpact.discretisation import FIDELITIES, Fidelity, resolve, spelt_out
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import study_figure
-from warpimpact.results import STUDY_COORDINATES, STUDY_VARIABLES, write
+from warpimpact.results import write
 from warpimpact.scene import Numerics, Shots
+from warpimpact.variables import STUDY_COORDINATES, STUDY_VARIABLES
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 LADDER = {"coarse": Fidelity(8, 16, 1.0, 0.8), "middle": Fidelity(16, 32, 2.0, 0.4), "fine": Fidelity(32, 64, 4.0, 0.2)}

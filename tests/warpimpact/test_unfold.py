@@ -23,6 +23,7 @@ from warpimpact.history import History
 from warpimpact.refine import LADDER
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.unfold import image_of
+from warpimpact.variables import ESTIMATE_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
@@ -97,7 +98,7 @@ def test_unfolded_equals_computed(
     assert unfolded.attrs["computed_hits"] == 32 // images
     assert unfolded.attrs["symmetries"].count("(") == images
     every = every_hit_computed(scene, unfolded, tmp_path)
-    for name, variable in (results.SHOT_VARIABLES | results.OUTCOME_VARIABLES).items():
+    for name, variable in (SHOT_VARIABLES | OUTCOME_VARIABLES).items():
         tolerance = ROUNDING[variable.units]
         np.testing.assert_allclose(unfolded[name], every[name], rtol=0.0, atol=tolerance, err_msg=name)
     for name in ("pitch", "yaw"):
@@ -128,7 +129,7 @@ def test_a_tolerance_run_is_unfolded_with_its_estimates(tmp_path: Path) -> None:
     assert unfolded.attrs["computed_hits"] == 4
     every = every_hit_computed(campaign(numerics=numerics), unfolded, tmp_path)
     assert 1 <= every["level"].min() < every["level"].max() < len(LADDER)
-    for name, variable in results.ESTIMATE_VARIABLES.items():
+    for name, variable in ESTIMATE_VARIABLES.items():
         np.testing.assert_allclose(unfolded[name], every[name], rtol=0.0, atol=ROUNDING[variable.units], err_msg=name)
     last = 8 * int(unfolded["level"].values[::8].argmax()) + 5
     assert replay(unfolded, last, folder=tmp_path).attrs["agreement"] == "bit-identical"

@@ -26,7 +26,8 @@ from warpimpact.analysis.effectiveness import number_text as number
 from warpimpact.analysis.summary import sampling_note
 from warpimpact.campaign.intervals import estimate_of
 from warpimpact.campaign.parts import first_difference
-from warpimpact.results import SHOT_VARIABLES, ResultError
+from warpimpact.results import ResultError
+from warpimpact.variables import SHOT_VARIABLES
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""

@@ -22,7 +22,8 @@ from warpimpact.analysis.summary import (
 from warpimpact.campaign.estimates import STATUSES, Measure
 from warpimpact.campaign.intervals import Estimate
 from warpimpact.kernels.status import Status
-from warpimpact.results import failed, shot_variables
+from warpimpact.results import failed
+from warpimpact.variables import shot_variables
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _SHOWN = {"Pa": ("GPa", 1e-9)}

@@ -15,9 +15,10 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from warpimpact.campaign.intervals import Dealt, Estimate
 from warpimpact.kernels.status import Status
-from warpimpact.results import BENDING_VARIABLES, OUTCOME_VARIABLES, failed, passed
+from warpimpact.results import failed, passed
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
+from warpimpact.variables import BENDING_VARIABLES, OUTCOME_VARIABLES
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,8 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
-from warpimpact.results import BENDING_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES, passed, status_codes
+from warpimpact.results import passed, status_codes
+from warpimpact.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -1,0 +1,78 @@
+"""Study, validate: how far the numbers can be trusted."""
+
+import argparse
+from pathlib import Path
+
+from .mistakes import memory_told
+from .options import Commands, add_campaign, add_command, add_device, add_output, add_overwrite, at_least
+from .paths import check_output
+from .progress import show_count
+
+
+def add_study(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "study",
+        _study,
+        summary="measure what accuracy costs on a campaign's scene",
+        description="Measure error and speed of the numerics, coarse to fine, against a converged answer; write them "
+        "as one netCDF file with a figure beside it. Takes minutes.",
+        example="study campaigns/slotted_plate.toml --hits 128",
+    )
+    add_campaign(parser)
+    add_output(parser, "STUDY.nc", "study (default: the campaign's name with _study, here)")
+    parser.add_argument(
+        "--hits",
+        type=at_least(1),
+        default=512,
+        metavar="N",
+        help="hits, spread over the campaign's cell (default: 512)",
+    )
+    add_device(parser)
+    add_overwrite(parser, "an existing study")
+
+
+def _study(arguments: argparse.Namespace) -> None:
+    from warpimpact import results
+    from warpimpact.analysis.study import study, study_text
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.plotting import study_figure
+
+    campaign = Campaign.from_toml(arguments.campaign)
+    output = arguments.output or Path(arguments.campaign.stem + "_study.nc")
+    check_output(output, overwrite=arguments.overwrite)
+    with memory_told(arguments.campaign), show_count() as progress:
+        dataset = study(campaign, hits=arguments.hits, device=arguments.device, progress=progress)
+    results.write(dataset, output)
+    print(study_text(dataset))
+    picture = output.with_suffix(".png")
+    study_figure(dataset).savefig(picture, dpi=150)
+    for written in (output, picture):
+        print(written)
+
+
+def add_validate(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "validate",
+        _validate,
+        summary="compare with the published shots",
+        description="Compute the paper's two shots and print them beside its model, experiment and LS-DYNA.",
+        example="validate",
+    )
+    parser.add_argument(
+        "campaign", type=Path, nargs="?", metavar="CAMPAIGN.toml", help="two hits (default: the bundled ones)"
+    )
+    add_device(parser)
+
+
+def _validate(arguments: argparse.Namespace) -> None:
+    from importlib.resources import files
+
+    from warpimpact.analysis.paper import validation_table
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.campaign.run import run
+
+    bundled = Path(str(files("warpimpact.campaigns") / "paper_shots.toml"))
+    campaign = Campaign.from_toml(arguments.campaign or bundled)
+    print(validation_table(run(campaign, device=arguments.device)))

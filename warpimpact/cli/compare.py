@@ -1,0 +1,115 @@
+"""Compare: which of several plates protects better."""
+
+import argparse
+import math
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+
+from warpimpact.interrupts import terminated_as_interrupted
+
+from .mistakes import memory_told
+from .options import Commands, add_command, add_count, add_device, add_output
+from .paths import check_picture, named
+from .progress import show_standing
+from .run import failure_code
+
+
+def add_compare(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "compare",
+        _compare,
+        summary="tell which of several plates protects better",
+        description="Compare plates that were hit by the same shots: rankings, differences with their intervals, and a "
+        "figure. A campaign with several plates is run first, each plate into NAME.nc beside the figure; a plate "
+        "whose result is there already is not run again.",
+        example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
+    )
+    parser.add_argument(
+        "files",
+        type=Path,
+        nargs="+",
+        metavar="RESULT.nc",
+        help="two or more results of warpimpact run, or one campaign with several [[plate]] tables",
+    )
+    add_output(parser, "FIGURE.png", "figure, PNG, PDF or SVG (default: comparison.png here, or the campaign's name)")
+    parser.add_argument(
+        "--angle",
+        default="30 deg",
+        metavar="ANGLE",
+        help='inclination beyond which a core counts as tilted (default: "%(default)s")',
+    )
+    parser.add_argument(
+        "--standoff",
+        metavar="LENGTH",
+        help='where tilt counts, such as "130 mm" (default: the largest of the results)',
+    )
+    add_device(parser)
+    add_count(parser)
+    parser.add_argument("--resume", action="store_true", help="continue a campaign that was broken off")
+    parser.add_argument("--overwrite", action="store_true", help="compute the plates of a campaign anew")
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    from warpimpact import results
+    from warpimpact.analysis.comparison import compare, comparison_text
+    from warpimpact.plotting import comparison_figure
+
+    is_campaign = arguments.files[0].suffix == ".toml"
+    default = arguments.files[0].stem if is_campaign else "comparison"
+    figure = arguments.output or Path(f"{default}.png")
+    check_picture(figure)
+    angle, standoff = _quantities(arguments)
+    paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
+    if len(paths) < 2:
+        raise results.ResultError(
+            f"{arguments.files[0]}: is one result, but two or more, or one campaign, are needed to compare"
+        )
+    with ExitStack() as stack:
+        datasets = [stack.enter_context(results.opened(path)) for path in paths.values()]
+        comparison = compare(datasets, list(paths), angle=angle, standoff=standoff)
+        code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
+    print(comparison_text(comparison))
+    comparison_figure(comparison).savefig(figure, dpi=150)
+    print(figure)
+    return code
+
+
+def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
+    """Angle [rad] and stand-off [m] that a person wrote."""
+    from warpimpact.results import ResultError
+    from warpimpact.scene.units import Angle, Length, quantity
+
+    try:
+        angle = quantity(Angle)(arguments.angle)
+        standoff = None if arguments.standoff is None else quantity(Length)(arguments.standoff)
+    except ValueError as error:
+        raise ResultError(f"--angle, --standoff: {error}") from None
+    if not 0.0 <= angle < math.pi / 2:
+        raise ResultError(f'--angle: got "{arguments.angle}", but it must be at least 0 and less than 90 deg')
+    return angle, standoff
+
+
+def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
+    """The results of a campaign's plates by their names, computed where they are not there."""
+    from warpimpact.campaign.campaign import CampaignError
+    from warpimpact.campaign.plates import read_plates
+    from warpimpact.campaign.run import run_to_file
+
+    if len(arguments.files) > 1:
+        raise CampaignError(f"{arguments.files[0]}: is a campaign, which is compared on its own")
+    campaigns = read_plates(arguments.files[0], count=arguments.count)
+    paths = {name: folder / f"{name}.nc" for name in campaigns}
+    for name, campaign in campaigns.items():
+        print(f"plate {name}", file=sys.stderr)
+        with memory_told(arguments.files[0]), terminated_as_interrupted(), show_standing() as progress:
+            run_to_file(
+                campaign,
+                paths[name],
+                device=arguments.device,
+                resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
+                overwrite=arguments.overwrite,
+                progress=progress,
+            )
+    return paths

@@ -1,0 +1,37 @@
+"""Mistakes that a person can put right, and what they are told."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+def mistakes() -> tuple[type[Exception], ...]:
+    """Errors whose message is for the user."""
+    from warpimpact.campaign.campaign import CampaignError
+    from warpimpact.campaign.team import ClusterError
+    from warpimpact.device import DeviceError
+    from warpimpact.results import OutputError, ResultError
+
+    return CampaignError, ClusterError, OutputError, ResultError, DeviceError
+
+
+@contextmanager
+def memory_told(campaign: Path) -> Iterator[None]:
+    """Memory that cannot be had is a mistake of the campaign that asks for it."""
+    from warpimpact.campaign.campaign import CampaignError
+
+    try:
+        yield
+    except MemoryError as error:
+        raise CampaignError(f"{campaign}: {error}") from None
+
+
+@contextmanager
+def folder_told(more: str = "") -> Iterator[None]:
+    """What is wrong with the campaign that a result carries, with the option that may help, and more."""
+    from warpimpact.campaign.campaign import CampaignError
+
+    try:
+        yield
+    except CampaignError as error:
+        raise CampaignError(f"{error}; --campaign-folder tells where the campaign's files are{more}") from None

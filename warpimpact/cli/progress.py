@@ -1,0 +1,94 @@
+"""How far a computation is: a bar on a terminal, plain lines in a log."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from warpimpact.campaign.run import Standing
+
+_LONGEST_SILENCE = 600.0
+"""Of a log [s]."""
+
+
+@contextmanager
+def show_standing() -> "Iterator[Callable[[Standing], None]]":
+    """Shows how far a run is, with its running estimates."""
+    if not sys.stderr.isatty():
+        yield _log_standing()
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="hit", dynamic_ncols=True) as bar:
+
+        def show(standing: "Standing") -> None:
+            if bar.total is None:
+                bar.total, bar.initial, bar.n = standing.total, standing.resumed, standing.resumed
+            bar.set_postfix_str(_running(standing), refresh=False)
+            bar.update(max(0, standing.done - bar.n))
+
+        yield show
+
+
+def _log_standing() -> "Callable[[Standing], None]":
+    """A line at the start, at every tenth, and after the longest silence at the latest."""
+    shown, last, begin = -1, 0.0, time.monotonic()
+
+    def show(standing: "Standing") -> None:
+        nonlocal shown, last
+        tenths, elapsed = 10 * standing.done // standing.total, time.monotonic() - begin
+        if tenths == shown and elapsed - last < _LONGEST_SILENCE:
+            return
+        shown, last = tenths, elapsed
+        line = f"{standing.done} of {standing.total} hits"
+        if (fresh := standing.done - standing.resumed) > 0 and elapsed > 0.0:
+            left = (standing.total - standing.done) * elapsed / fresh
+            line += f", {fresh / elapsed:.4g} hits/s, {left:.0f} s left; {_running(standing)}"
+        print(line, file=sys.stderr, flush=True)
+
+    return show
+
+
+def _running(standing: "Standing") -> str:
+    """Running estimates and failed shots as one short line."""
+    from warpimpact.analysis.summary import UNITS
+
+    parts = [
+        f"{measure.text} {estimate.value:.5g} ± {estimate.half_width:.2g}{UNITS[measure.units]}"
+        for measure, estimate in standing.estimates.items()
+        if estimate.count > 1
+    ]
+    return ", ".join([*parts, f"{standing.failed} failed"])
+
+
+@contextmanager
+def show_count() -> Iterator[Callable[[int, int], None]]:
+    """Shows how many hits of how many are done."""
+    if not sys.stderr.isatty():
+        yield _log_count()
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="hit") as bar:
+
+        def show(done: int, total: int) -> None:
+            bar.total = total
+            bar.update(done - bar.n)
+
+        yield show
+
+
+def _log_count() -> Callable[[int, int], None]:
+    """A line at every tenth."""
+    shown = 0
+
+    def show(done: int, total: int) -> None:
+        nonlocal shown
+        tenths = 10 * done // total
+        if tenths > shown:
+            shown = tenths
+            print(f"{done} of {total} hits", file=sys.stderr, flush=True)
+
+    return show

@@ -1,0 +1,55 @@
+"""Replay: one hit of a result again, with its history."""
+
+import argparse
+from pathlib import Path
+
+from .mistakes import folder_told
+from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_result
+from .paths import check_output
+
+
+def add_replay(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "replay",
+        _replay,
+        summary="compute one hit of a result again, with its history",
+        description="Compute one hit of a result again on the CPU; write its history as netCDF and PNG files. It ends "
+        "bit-identical to the stored outcome where this CPU and version computed that; a result from a GPU is met "
+        "within rounding only.",
+        example="replay slotted.nc --hit 34",
+    )
+    add_result(parser)
+    parser.add_argument("--hit", type=int, required=True, metavar="N", help="which hit of the result, from 0")
+    add_output(parser, "HIT.nc", "history (default: RESULT_hitN.nc beside the result)")
+    add_campaign_folder(
+        parser, "where the files are that the campaign names, such as a hit list (default: the result's folder)"
+    )
+    parser.add_argument(
+        "--animation", type=Path, metavar="HIT.gif", help="film of the hit too; HIT.mp4 where there is FFmpeg"
+    )
+    add_overwrite(parser, "an existing history")
+
+
+def _replay(arguments: argparse.Namespace) -> None:
+    from warpimpact import results
+    from warpimpact.analysis.hit import hit_text
+    from warpimpact.campaign.replay import replay
+    from warpimpact.plotting.animation import save_animation, writer_for
+    from warpimpact.plotting.trajectory import save_figures
+
+    result, path, film = results.read(arguments.result), arguments.result, arguments.animation
+    output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
+    check_output(output, overwrite=arguments.overwrite)
+    if film:
+        writer_for(film)
+        check_output(film, overwrite=arguments.overwrite)
+    with folder_told():
+        history = replay(result, arguments.hit, folder=arguments.campaign_folder or path.parent)
+    results.write(history, output)
+    print(hit_text(history))
+    for written in (output, *save_figures(history, output.parent, output.stem)):
+        print(written)
+    if film:
+        save_animation(history, film)
+        print(film)

@@ -1,0 +1,86 @@
+"""Run: the hit map of a campaign."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpimpact.interrupts import terminated_as_interrupted
+
+from .mistakes import memory_told
+from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
+from .paths import check_place
+from .progress import show_standing
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def add_run(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "run",
+        _run,
+        summary="compute the hit map of a campaign",
+        description="Compute every hit of a campaign and write one netCDF file.",
+        example="run campaigns/slotted_plate.toml -o slotted.nc --count 512",
+    )
+    add_campaign(parser)
+    add_output(parser, "RESULT.nc", "result (default: the campaign's name, here)")
+    add_device(parser)
+    cluster = parser.add_mutually_exclusive_group()
+    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
+    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes of this machine")
+    add_count(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="continue a run that was broken off; begin where there is none"
+    )
+    add_overwrite(parser, "an existing result, and a run that was broken off")
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    from warpimpact import results
+    from warpimpact.analysis.summary import summary_text, symmetry_text
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.campaign.run import run_to_file
+    from warpimpact.campaign.team import cluster_team
+
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
+    output = arguments.output or Path(arguments.campaign.stem + ".nc")
+    check_place(output)
+    team = None
+    if arguments.scheduler or arguments.workers:
+        team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
+    with memory_told(arguments.campaign), terminated_as_interrupted(), show_standing() as progress:
+        run_to_file(
+            campaign,
+            output,
+            device=arguments.device,
+            team=team,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=progress,
+        )
+    with results.opened(output) as dataset:
+        print(summary_text(dataset))
+        if "symmetries" in dataset.attrs:
+            print(symmetry_text(dataset))
+        print(f"{dataset.attrs['hits_per_second']:.4g} hits per second on {dataset.attrs['device']}")
+        print(f"written to {output}")
+        return failure_code(dataset, output)
+
+
+def failure_code(dataset: "xarray.Dataset", path: Path) -> int:
+    """3, and a line, when more shots failed than the campaign allows."""
+    from warpimpact import results
+
+    share = float(results.failed(dataset).mean())
+    allowed = dataset.attrs["failed_share"]
+    if share <= allowed:
+        return 0
+    print(
+        f"warpimpact: {share:.3g} of the shots failed, more than output.failed_share = {allowed:g}; "
+        f"warpimpact inspect {path} lists them",
+        file=sys.stderr,
+    )
+    return 3

@@ -1,0 +1,88 @@
+"""Inspect, plot, plate: what is there already, in words and pictures."""
+
+import argparse
+from pathlib import Path
+
+from .options import Commands, add_campaign, add_command, add_output, add_result, add_results
+from .paths import check_folder, check_picture, named
+
+
+def add_inspect(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "inspect",
+        _inspect,
+        summary="tell what is in a result",
+        description="Tell who made a result, from what campaign, its numbers with their intervals, and which shots "
+        "failed.",
+        example="inspect slotted.nc",
+    )
+    add_result(parser)
+    parser.add_argument("--campaign", action="store_true", help="print the campaign that it carries, and no more")
+
+
+def _inspect(arguments: argparse.Namespace) -> None:
+    from warpimpact import results
+    from warpimpact.analysis.inspect import inspect_text
+
+    with results.opened(arguments.result) as dataset:
+        print(dataset.attrs["campaign"] if arguments.campaign else inspect_text(dataset))
+
+
+def add_plot(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "plot",
+        _plot,
+        summary="draw the maps of a result, or of several side by side",
+        description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
+        "against tilt, and how sure a map is. Of several results, maps side by side in the same colours.",
+        example="plot slotted.nc -o maps",
+    )
+    add_results(parser)
+    add_output(parser, "FOLDER", "existing folder (default: the result's)")
+
+
+def _plot(arguments: argparse.Namespace) -> None:
+    from warpimpact import results
+    from warpimpact.plotting import save_beside, save_maps
+
+    datasets = {name: results.read(path) for name, path in named(arguments.results).items()}
+    folder = arguments.output or arguments.results[0].parent
+    check_folder(folder)
+    stem = "_".join(path.stem for path in arguments.results)
+    dataset, *others = datasets.values()
+    for path in save_beside(datasets, folder, stem) if others else save_maps(dataset, folder, stem):
+        print(path)
+
+
+def add_plate(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "plate",
+        _plate,
+        summary="draw the plate of a campaign to scale",
+        description="Draw the plate of a campaign to scale, with the largest section of the core; tell its open area, "
+        "smallest ligament and areal density. Nothing is computed.",
+        example="plate campaigns/slotted_plate.toml",
+    )
+    add_campaign(parser)
+    add_output(parser, "PLATE.png", "picture (default: the campaign's name with _plate, here)")
+
+
+def _plate(arguments: argparse.Namespace) -> None:
+    from warpimpact.analysis.plate import plate_numbers
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.plotting import plate_figure
+
+    output = arguments.output or Path(arguments.campaign.stem + "_plate.png")
+    check_picture(output)
+    campaign = Campaign.from_toml(arguments.campaign)
+    plate = campaign.plate
+    plate_figure(plate, campaign.core, campaign.title).savefig(output, dpi=150)
+    print(campaign.title)
+    print(f"{'thickness':<18}  {1e3 * plate.thickness:g} mm")
+    numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)
+    for name, number in numbers.items():
+        print(f"{name:<18}  {number}")
+    print(output)
