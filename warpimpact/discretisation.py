@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.optimize import brentq, minimize_scalar
 
-from warpimpact.scene import Core, Impact, Numerics, Plate
+from warpimpact.scene import Core, Impact, Numerics, Pattern, Plate
 
 Array = NDArray[np.float64]
 
@@ -311,7 +312,7 @@ class Tile:
     dy: float
     dz: float
 
-    @property
+    @cached_property
     def clearance(self) -> Array:
         """Distance [m] that every cell keeps at least from the material of the whole lattice, shape of `material`."""
         # In blocks of cells, of which any material makes a wall; seen from one period amid eight others: no hole is
@@ -339,7 +340,27 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     Raises:
         MemoryError: the tile does not fit; the message is for a person.
     """
-    period_y, period_z = plate.pattern.period
+    return _tile(_Itself(plate.pattern), spacing, sharp)
+
+
+@dataclass(frozen=True, eq=False)
+class _Itself:
+    """A pattern that is the same only as itself: a mask of the same name may have changed on the disk."""
+
+    pattern: Pattern
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Itself) and self.pattern is other.pattern
+
+    def __hash__(self) -> int:
+        return id(self.pattern)
+
+
+@lru_cache(maxsize=2)
+def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
+    """Kept for the next shots at the same plate."""
+    pattern = itself.pattern
+    period_y, period_z = pattern.period
     # An even number, so that a row staggered by half a period sees the same cells.
     step = 1 if sharp else 2
     count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
@@ -357,10 +378,10 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     for first in range(0, count_y, rows):
         part = material[first : first + rows]
         middle_y = (np.arange(first, first + len(part), dtype=np.float64)[:, None] + 0.5) * dy
-        part[:] = ~plate.pattern.is_hole(middle_y, middle_z)
-        row, column = np.nonzero(plate.pattern.has_edge(middle_y, middle_z, half_diagonal))
+        part[:] = ~pattern.is_hole(middle_y, middle_z)
+        row, column = np.nonzero(pattern.has_edge(middle_y, middle_z, half_diagonal))
         y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
-        part[row, column] = 1.0 - plate.pattern.is_hole(y, z).mean(axis=(1, 2))
+        part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
     return Tile(material, dy, dz)
 
 
