@@ -131,8 +131,7 @@ def test_straight_flight_deep_in_a_plate_meets_the_work_per_way(
     surface = surface_of(Surface, core, 128, 32, device)
     pose = {"position": np.array([[0.5, 0.0, 0.0]]), "attitude": ALIGNED, "velocity": np.array([[800.0, 0, 0]])}
     found = loaded(surface, law_of(friction=friction), device, **pose, thickness=1.0)
-    length = core.cone_length if core is CONE else core.nose_length
-    nose = core.radius(length * (np.arange(4000) + 0.5) / 4000).mean() * length
+    nose = core.radius(core.nose_length * (np.arange(4000) + 0.5) / 4000).mean() * core.nose_length
     expected = STRENGTH * (np.pi * core.max_radius**2 + 2 * np.pi * friction * nose)
     force, moment = found.force[0], found.moment[0]
     assert force[0] == pytest.approx(-expected, rel=tolerance)
