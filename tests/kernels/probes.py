@@ -41,6 +41,17 @@ def attitudes(rng: np.random.Generator, count: int) -> NDArray[np.float64]:
     return quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
 
 
+def astride(count: int) -> dict[str, NDArray[np.float64]]:
+    """Random poses and motions of a core near the slab."""
+    rng = np.random.default_rng(count)
+    return {
+        "position": rng.uniform(-8e-3, 8e-3, (count, 3)),
+        "attitude": attitudes(rng, count),
+        "velocity": 500.0 * rng.standard_normal((count, 3)),
+        "omega": 2e4 * rng.standard_normal((count, 3)),
+    }
+
+
 def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
     """The Surface of a core in `axial` × `around` patches and its discs."""
     rings, azimuths = rings_of(core, axial, around), azimuths_of(around)

@@ -184,23 +184,25 @@ class PolynomialCore(Core):
         return real[(real > 0) & (real < self.length)]
 
 
-class OgiveCore(Core):
-    """Tangent ogive nose of `crh` calibres radius, then a cylindrical shank of `diameter` up to `length`."""
+class _NosedCore(Core):
+    """A nose up to its shoulder, then a cylindrical shank of `diameter` up to `length`."""
 
-    shape: Literal["ogive"] = "ogive"
     diameter: PositiveLength
-    crh: Annotated[Number, Field(ge=0.5)]
     length: PositiveLength
 
     @model_validator(mode="after")
     def _holds_its_nose(self) -> Self:
-        _check_nose(self.nose_length, self.length)
+        if self.nose_length > self.length * (1 + 1e-12):  # a nose as long as the core may round to a little more
+            raise ValueError(
+                f"got length = {self.length:g} m, but the core must be at least as long as its nose, "
+                f"{self.nose_length:g} m"
+            )
         return self
 
     @property
+    @abstractmethod
     def nose_length(self) -> float:
-        """From tip to shoulder [m]: √(R² − (R − d/2)²) with R = crh·d."""
-        return float(self.diameter * np.sqrt(self.crh - 0.25))
+        """From tip to shoulder [m]."""
 
     @property
     def max_radius(self) -> float:
@@ -209,8 +211,20 @@ class OgiveCore(Core):
 
     @property
     def breaks(self) -> tuple[float, ...]:
-        """The shoulder, where a shank follows; curvature jumps there, the slope does not [m]."""
+        """The shoulder, where a shank follows; slope or curvature jump there [m]."""
         return (self.nose_length,) if self.nose_length < self.length else ()
+
+
+class OgiveCore(_NosedCore):
+    """Tangent ogive nose of `crh` calibres radius, then a cylindrical shank of `diameter` up to `length`."""
+
+    shape: Literal["ogive"] = "ogive"
+    crh: Annotated[Number, Field(ge=0.5)]
+
+    @property
+    def nose_length(self) -> float:
+        """From tip to shoulder [m]: √(R² − (R − d/2)²) with R = crh·d."""
+        return float(self.diameter * np.sqrt(self.crh - 0.25))
 
     def radius(self, s: Array) -> Array:
         """Radius [m] at stations `s` [m] within [0, length]; same shape."""
@@ -220,36 +234,20 @@ class OgiveCore(Core):
         return np.maximum(arc - curvature_radius + self.diameter / 2, 0.0)
 
 
-class ConeCore(Core):
+class ConeCore(_NosedCore):
     """Sharp cone of `cone_length` (by default all of `length`), then a cylindrical shank of `diameter`."""
 
     shape: Literal["cone"] = "cone"
-    diameter: PositiveLength
-    length: PositiveLength
     cone_length: PositiveLength | None = None
 
-    @model_validator(mode="after")
-    def _holds_its_nose(self) -> Self:
-        _check_nose(self._shoulder, self.length)
-        return self
-
     @property
-    def max_radius(self) -> float:
-        """Largest radius [m]."""
-        return self.diameter / 2
-
-    @property
-    def breaks(self) -> tuple[float, ...]:
-        """The shoulder, where a shank follows [m]."""
-        return (self._shoulder,) if self._shoulder < self.length else ()
+    def nose_length(self) -> float:
+        """From tip to shoulder [m]."""
+        return self.length if self.cone_length is None else self.cone_length
 
     def radius(self, s: Array) -> Array:
         """Radius [m] at stations `s` [m] within [0, length]; same shape."""
-        return self.diameter / 2 * np.minimum(np.asarray(s) / self._shoulder, 1.0)
-
-    @property
-    def _shoulder(self) -> float:
-        return self.length if self.cone_length is None else self.cone_length
+        return self.diameter / 2 * np.minimum(np.asarray(s) / self.nose_length, 1.0)
 
 
 class ProfileCore(Core):
@@ -314,11 +312,6 @@ class ProfileCore(Core):
 
 
 AnyCore = Annotated[PolynomialCore | OgiveCore | ConeCore | ProfileCore, Field(discriminator="shape")]
-
-
-def _check_nose(nose: float, length: float) -> None:
-    if nose > length * (1 + 1e-12):  # a nose as long as the core may round to a little more
-        raise ValueError(f"got length = {length:g} m, but the core must be at least as long as its nose, {nose:g} m")
 
 
 def _first_given(override: float | None, computed: float) -> float:

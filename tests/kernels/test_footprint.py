@@ -1,0 +1,122 @@
+"""The cells and rings that one step may touch (MODEL.md §4)."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.kernels import contact, core_surface, plate_grid
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import ConeCore
+
+from .probes import astride, plate_of, poisoned, poisoned_fields, surface_of
+
+Array = NDArray[np.float64]
+
+VARIANT = Variant(double=True, rate_dependent=True)
+real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
+surfaces, grid, contacts = (part.build(VARIANT) for part in (core_surface, plate_grid, contact))
+Surface, Plate, Fields, Footprint = surfaces.Surface, grid.Plate, grid.Fields, contacts.Footprint
+
+CELL = 0.25e-3
+CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
+
+
+def footprints(
+    surface: Surface,
+    plate: Plate,
+    fields: Fields,
+    position: wp.array(dtype=vec3),
+    attitude: wp.array(dtype=quat),
+    velocity: vec3,
+    omega: vec3,
+    dt: real,
+    found: wp.array(dtype=Footprint),
+    immersed: wp.array2d(dtype=wp.int32),
+    rows: wp.array3d(dtype=wp.int32),
+    columns: wp.array3d(dtype=wp.int32),
+) -> None:
+    """The footprints of poses; per ring whether anything is immersed, per patch its first cell."""
+    i = wp.tid()
+    window = contacts.open_window(plate, fields, i, wp.float64(0.0), wp.float64(0.0))
+    pose = surfaces.pose_of(surface, position[i], attitude[i], velocity, omega)
+    found[i] = contacts.footprint_of(surface, plate, fields, window, pose, dt)
+    for k in range(surface.rings):
+        ring = surfaces.ring_at(surface, pose, k)
+        immersed[i, k] = 0
+        for j in range(surface.around):
+            patch = surfaces.patch_at(pose, ring, surface.cosine[ring.first + j], surface.sine[ring.first + j])
+            if surfaces.immersed_area(pose, ring, patch, plate.thickness, dt) > real(0.0):
+                immersed[i, k] = 1
+            cell = grid.cell_at(fields, window, patch.y, patch.z)
+            rows[i, k, j] = (cell.index - window.first) // fields.cells_z
+            columns[i, k, j] = (cell.index - window.first) % fields.cells_z
+
+
+FOOTPRINTS = VARIANT.kernel(footprints)
+
+
+def footprints_of(
+    poses: dict[str, Array], cells: tuple[int, int], device: str, *, velocity: Any, omega: Any = (0.0, 0.0, 0.0)
+) -> tuple[Any, ...]:
+    """Footprints of a cone in windows of cells_y × cells_z; per ring and patch what the kernel says of them."""
+    surface = surface_of(Surface, CONE, 12, 24, device)
+    plate = plate_of(Plate, np.ones((1, 1)), (CELL, CELL), CELL, device)
+    count, per_patch = len(poses["position"]), (surface.rings, surface.around)
+    outputs = [
+        poisoned(count, Footprint, device),
+        poisoned((count, surface.rings), wp.int32, device),
+        *(poisoned((count, *per_patch), wp.int32, device) for _ in range(2)),
+    ]
+    inputs = [
+        surface,
+        plate,
+        poisoned_fields(Fields, count, *cells, device),
+        wp.array(poses["position"], dtype=vec3, device=device),
+        wp.array(poses["attitude"], dtype=quat, device=device),
+        vec3(*velocity),
+        vec3(*omega),
+        1e-6,
+    ]
+    wp.launch(FOOTPRINTS, count, inputs=inputs, outputs=outputs, device=device)
+    return tuple(array.numpy() for array in outputs)
+
+
+def test_footprint_holds_every_cell_and_ring_that_a_step_touches(device: str) -> None:
+    count, cells = 200, 240
+    motion = {"velocity": (600.0, 300.0, -90.0), "omega": (2e4, 5e4, -3e4)}
+    found, immersed, rows, columns = footprints_of(astride(count), (cells, cells), device, **motion)
+    ring = np.arange(immersed.shape[1])
+    within = (ring >= found["first_ring"][:, None]) & (ring <= found["last_ring"][:, None])
+    touched = immersed == 1
+    some = touched.any(axis=1)
+    assert some.sum() > count / 2
+    assert not (touched & ~within).any()
+    assert found["inside"].all()
+    for cell, low, high in ((rows, "y_low", "y_high"), (columns, "z_low", "z_high")):
+        lowest = np.where(touched, cell.min(axis=2), cells).min(axis=1)
+        highest = np.where(touched, cell.max(axis=2) + 1, -1).max(axis=1)
+        assert (found["box"][low] <= lowest)[some].all()
+        assert (found["box"][high] >= highest)[some].all()
+        # Nor far too large: every step works through the whole box.
+        tight = some & (touched.sum(axis=1) == within.sum(axis=1))
+        assert tight.sum() > count / 10
+        assert (found["box"][low] >= lowest - 4)[tight].all()
+        assert (found["box"][high] <= highest + 4)[tight].all()
+
+
+@pytest.mark.parametrize("axis", ["y", "z"])
+def test_footprint_tells_when_the_window_is_too_small(axis: str, device: str) -> None:
+    # The rim of the core, 3 mm off its axis, lies 12 or 13 cells from the hit's; the slack of the box and the reach of
+    # the filter, 1 at ℓ = 2 cells, come on top. The filter's second pass looks at rows twice its reach away.
+    pose = {"position": np.array([[2e-3, 0.0, 0.0]]), "attitude": np.array([[0.0, 0.0, 0.0, 1.0]])}
+    inside, margin = [], 2 if axis == "y" else 1
+    for cells in (34, 32, 30, 28):
+        window = (cells, 64) if axis == "y" else (64, cells)
+        footprint = footprints_of(pose, window, device, velocity=(800.0, 0.0, 0.0))[0][0]
+        low, high = footprint["box"][f"{axis}_low"], footprint["box"][f"{axis}_high"]
+        assert footprint["inside"] == (low - margin >= 0 and high + margin < cells)
+        inside.append(bool(footprint["inside"]))
+    assert inside == [True, axis == "z", False, False]

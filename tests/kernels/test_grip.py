@@ -1,0 +1,166 @@
+"""How a curved patch touches: the part of it that closes in, its normal and its closing speed (MODEL.md §4)."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.kernels import contact, core_surface, interaction
+from warpimpact.kernels.variant import Variant
+
+from .probes import poisoned, records
+
+Array = NDArray[np.float64]
+
+VARIANT = Variant(double=True, rate_dependent=True)
+real = VARIANT.real
+surfaces, laws, contacts = (part.build(VARIANT) for part in (core_surface, interaction, contact))
+Ring, Patch, Law, Grip = surfaces.Ring, surfaces.Patch, laws.Law, contacts.Grip
+
+SLIDING = 100.0  # [m/s]
+
+
+def grips(
+    law: Law,
+    speed: real,
+    rings: wp.array(dtype=Ring),
+    patches: wp.array(dtype=Patch),
+    grips: wp.array(dtype=Grip),
+) -> None:
+    i = wp.tid()
+    pose = surfaces.Pose()
+    pose.speed = speed
+    grips[i] = contacts.grip_of(law, pose, rings[i], patches[i])
+
+
+GRIPS = VARIANT.kernel(grips)
+
+
+def gripped(device: str, *, speed: float, onset: float = 1e-9, **columns: Any) -> Any:
+    """Grips of patches, from members of rings and patches of shape [n]; the onset far below their speeds."""
+    members = {struct: struct.numpy_dtype()["names"] for struct in (Ring, Patch)}
+    rings, patches = (
+        records(struct, device, **{name: value for name, value in columns.items() if name in names})
+        for struct, names in members.items()
+    )
+    law, found = Law(), poisoned(len(rings), Grip, device)
+    law.onset = onset
+    wp.launch(GRIPS, len(rings), inputs=[law, speed, rings, patches], outputs=[found], device=device)
+    return found.numpy()
+
+
+def bent(slant: Array, bend: Any, sector: Any, velocity: Array) -> dict[str, Any]:
+    """Members of rings and patches [n]: normals at angles `slant` to the plane of the ring, ±`bend` along the meridian
+    and ±`sector` around; velocity (axial, outward, around) of shape [n, 3]."""
+    normal_axial, normal_radial = np.sin(slant), np.cos(slant)
+    return {
+        "normal_axial": normal_axial,
+        "normal_radial": normal_radial,
+        "turn_axial": np.sin(bend) * normal_radial,
+        "turn_radial": -np.sin(bend) * normal_axial,
+        "sector": np.broadcast_to(sector, slant.shape),
+        "velocity_axial": velocity[:, 0],
+        "velocity_outward": velocity[:, 1],
+        "velocity_around": velocity[:, 2],
+        "closing": normal_axial * velocity[:, 0] + normal_radial * velocity[:, 1],
+    }
+
+
+def closing_part(
+    slant: Array, bend: float, sector: float, velocity: Array, cells: tuple[int, int]
+) -> tuple[Array, ...]:
+    """Share of the bent patches that closes in, its mean normal [n, 3] and mean closing speed, of so many elements."""
+    along = bend * (2 * (np.arange(cells[0]) + 0.5) / cells[0] - 1)[:, None]
+    around = sector * (2 * (np.arange(cells[1]) + 0.5) / cells[1] - 1)[None, :]
+    shares, normals, speeds = [], [], []
+    for angle, v in zip(slant, velocity, strict=True):
+        radial = np.cos(angle + along)
+        normal = np.stack(
+            np.broadcast_arrays(np.sin(angle + along), radial * np.cos(around), radial * np.sin(around)), axis=-1
+        )
+        closing = normal @ v
+        touching = closing > 0
+        shares.append(touching.mean())
+        normals.append(normal[touching].mean(axis=0) if touching.any() else np.full(3, np.nan))
+        speeds.append(closing[touching].mean() if touching.any() else np.nan)
+    return np.array(shares), np.array(normals), np.array(speeds)
+
+
+def grazing(count: int, bend: float, sector: float) -> tuple[Array, Array]:
+    """Slants of normals, and velocities along which parts of so bent patches close in while they slide at `SLIDING`,
+    within 60° of the way of the (greater) bend."""
+    rng = np.random.default_rng(11)
+    slant = rng.uniform(-1.0, 1.0, count)
+    normal = np.stack([np.sin(slant), np.cos(slant), 0 * slant], axis=1)
+    meridian = np.stack([np.cos(slant), -np.sin(slant), 0 * slant], axis=1)
+    angle = rng.uniform(-np.pi / 3, np.pi / 3, count) + np.pi * rng.integers(0, 2, count)
+    along, around = (np.cos(angle), np.sin(angle)) if bend > 0 else (np.sin(angle), np.cos(angle))
+    sideways = along[:, None] * meridian + around[:, None] * np.array([0.0, 0.0, 1.0])
+    closing = rng.uniform(-1.3, 1.3, count) * np.hypot(along * np.sin(bend), around * sector * np.cos(slant))
+    return slant, SLIDING * (sideways + closing[:, None] * normal)
+
+
+@pytest.mark.parametrize("way", ["meridian", "around"])
+def test_part_of_a_patch_bent_one_way_that_touches_is_the_part_that_closes_in(way: str, device: str) -> None:
+    # Normals vary linearly but for ½ angle² of their length. So do closing speeds: a bend along the meridian leaves
+    # ½ angle² of the speed at the centre; one around, ½ angle² of the speed outwards, which is at most 1.5 times that
+    # around here and shifts the edge of contact by up to 0.4 angle of the patch.
+    for angle in (0.2, 0.1, 0.05):
+        bend, sector, cells = (angle, 0.0, (20_000, 1)) if way == "meridian" else (0.0, angle, (1, 20_000))
+        slant, velocity = grazing(200, bend, sector)
+        found = gripped(device, speed=1e-3, **bent(slant, bend, sector, velocity))
+        share, normal, closing = closing_part(slant, bend, sector, velocity, cells)
+        some = (share > 0.01) & (found["share"] > 0.01)
+        assert (some & (share < 0.99)).sum() > 100
+        means = np.stack([found["axial"], found["outward"], found["around"]], axis=1)
+        tolerance = 0.4 * (angle**2 if way == "meridian" else angle)
+        np.testing.assert_allclose(found["share"], share, rtol=0, atol=tolerance)
+        np.testing.assert_allclose(means[some], normal[some], rtol=0, atol=angle**2 / 2)
+        np.testing.assert_allclose(found["closing"][some], closing[some], rtol=0, atol=SLIDING * angle**2 / 8)
+
+
+def test_part_of_a_doubly_curved_patch_that_touches_is_that_of_a_strip(device: str) -> None:
+    # Closing speeds of a square patch on the diagonal have a triangular distribution over ±√2 V, the strip's an even
+    # one over ±V, of the same variance: shares differ by (√2 − 1)²/4 at most, and their power by (3 − 2√2)/12 V.
+    angle = 0.05
+    slant, velocity = grazing(300, angle, angle)
+    found = gripped(device, speed=1e-3, **bent(slant, angle, angle, velocity))
+    share, _, closing = closing_part(slant, angle, angle, velocity, (400, 400))
+    assert np.abs(found["share"] - share).max() < 0.25 * (np.sqrt(2) - 1) ** 2 + angle**2 + 2 / 400
+    power = np.where(share > 0, share * np.nan_to_num(closing), 0.0)
+    off = np.abs(found["share"] * found["closing"] - power)
+    assert off.max() < (3 - 2 * np.sqrt(2)) / 12 * angle * SLIDING + angle**2 * SLIDING / 20
+
+
+def test_patch_that_closes_in_or_moves_away_as_a_whole_is_flat(device: str) -> None:
+    # Straight flight: all of a nose's patches close in, and carry the ring's own exact normal.
+    slant, velocity = grazing(500, 0.1, 0.1)
+    members = bent(slant, 0.1, 0.1, velocity)
+    meridian = members["turn_axial"] * velocity[:, 0] + members["turn_radial"] * velocity[:, 1]
+    variation = np.hypot(meridian, 0.1 * np.cos(slant) * velocity[:, 2])
+    for sign, share in ((1.0, 1.0), (-1.0, 0.0)):
+        members["closing"] = sign * variation * np.random.default_rng(12).uniform(1.01, 9.0, 500)
+        found = gripped(device, speed=1e-3, **members)
+        np.testing.assert_array_equal(found["share"], share)
+        if share:
+            np.testing.assert_array_equal(found["axial"], members["normal_axial"])
+            np.testing.assert_array_equal(found["outward"], members["normal_radial"])
+            np.testing.assert_array_equal(found["around"], 0.0)
+            np.testing.assert_array_equal(found["closing"], members["closing"])
+
+
+@pytest.mark.parametrize("onset", [1e-9, 5.0, 1e3])
+def test_curved_patch_takes_power_from_the_core(onset: float, device: str) -> None:
+    # With the velocity of the patch's centre, the normal's power is the closing speed's: never negative in contact.
+    slant, velocity = grazing(2000, 0.4, 0.4)
+    found = gripped(device, speed=100.0, onset=onset, **bent(slant, 0.4, 0.4, velocity))
+    normal = np.stack([found["axial"], found["outward"], found["around"]], axis=1)
+    power = (normal * velocity).sum(axis=1)
+    np.testing.assert_allclose(power, found["closing"], rtol=1e-9, atol=1e-9)
+    assert (found["closing"][found["share"] > 0] > 0).all()
+    assert ((found["share"] > 0) & (found["share"] < 1)).sum() > 500
+    # Friction is against what is left of the velocity: v·(v − c n) ≥ 0 as long as no patch spans a quarter turn.
+    sliding = velocity - found["closing"][:, None] * normal
+    assert ((sliding * velocity).sum(axis=1)[found["share"] > 0] > 0).all()
