@@ -356,7 +356,7 @@ class _Itself:
         return id(self.pattern)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=4)
 def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
     """Kept for the next shots at the same plate."""
     pattern = itself.pattern

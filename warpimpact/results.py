@@ -6,6 +6,7 @@ follows the CF conventions and opens with plain ``xarray.open_dataset``.
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
@@ -277,6 +278,9 @@ def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> No
         at = dataset.sizes["hit"]
         with netCDF4.Dataset(file, "a") as joined:
             joined.set_auto_maskandscale(False)
+            for variable in joined.variables.values():
+                if variable.chunking() != "contiguous":  # of the megabytes that a variable may keep, two chunks will do
+                    variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
             for part in parts[1:]:
                 at = _append(joined, part, at)
 
@@ -401,8 +405,12 @@ def is_history(dataset: xarray.Dataset) -> bool:
 
 
 def _netcdf(path: Path) -> xarray.Dataset:
-    """An open netCDF file."""
+    """An open netCDF file, with room for some chunks of a variable instead of for tens of megabytes."""
+    _, slots, preemption = kept = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(4 * 8 * CHUNK, slots, preemption)
     try:
         return xarray.open_dataset(path, engine="netcdf4")
     except (OSError, RuntimeError) as error:
         raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error
+    finally:
+        netCDF4.set_chunk_cache(*kept)

@@ -26,12 +26,15 @@ from matplotlib.figure import Figure
 
 from warpimpact import Campaign, Numerics, Shots
 from warpimpact.analysis.study import LEVELS, QUOTED, study
+from warpimpact.discretisation import Fidelity, spelt_out
 from warpimpact.simulate import simulate
 
-STATED = {"draft": (1.0, 3.0), "standard": (1.0, 1.0), "reference": (0.1, 0.3)}
+STATED = {"draft": (2.0, 5.0), "standard": (1.0, 1.0), "reference": (0.1, 0.3)}
 """What warpimpact's fidelities stand for: 90 % errors in m/s and degrees of tilt at the last stand-off."""
 SAME = (0.01, 0.01)
 """How far warpimpact's literal scheme in double precision and NumPy's may be apart: m/s and degrees, 90 %."""
+COARSEST = Fidelity(8, 12, 0.7, 1.0)
+"""Still far more accurate than the literal scheme, whose programs it is the one to compare with."""
 LITERAL_HITS, FLOOR_HITS = 128, 8
 TIMED = 0.5
 """Length of one timed run [s]."""
@@ -80,7 +83,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = _parser().parse_args(argv)
     campaign = Campaign.from_toml(CAMPAIGN)
     shots = shots_of(campaign, arguments.hits)
-    settings = {name: Numerics(fidelity=name) for name in STATED} | {"nodal": Numerics(scheme="nodal")}
+    settings = {name: Numerics(fidelity=name) for name in STATED} | {
+        "coarsest": spelt_out(COARSEST, campaign.core, campaign.plate, campaign.impact),
+        "nodal": Numerics(scheme="nodal"),
+    }
     truth = study(campaign, hits=len(shots), device="cpu", settings=settings, levels=LEVELS[: arguments.levels])
     contenders = [
         *_warpimpact(campaign, truth, settings),
@@ -213,12 +219,12 @@ def measure(contenders: Sequence[Contender], shots: Shots) -> None:
 
 
 def compare(contenders: Sequence[Contender]) -> list[dict[str, Any]]:
-    """What the project sets itself targets for: each fidelity against the fastest Numba setting that is no less
-    accurate, all cores against all cores, and against NumPy on its one core; all cores against one."""
+    """What the project sets itself targets for: each fidelity against the fastest Numba setting within what it stands
+    for, all cores against all cores, and against NumPy on its one core; all cores against one."""
     ours = {one.setting: one for one in contenders if one.program == "warpimpact"}
     pairs = []
     for name in STATED:
-        exact = [one for one in contenders if one.program == "Numba" and all(np.array(one.error) <= ours[name].error)]
+        exact = [one for one in contenders if one.program == "Numba" and all(np.array(one.error) <= STATED[name])]
         pairs += [(name, max(exact, key=lambda one: one.rate))] if exact else []
     pairs += [(name, one) for one in contenders if one.program == "NumPy" for name in ours]
     rivals = [
