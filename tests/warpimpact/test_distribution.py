@@ -5,7 +5,7 @@ import pytest
 
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import dispersion, marginals, uncertainty
+from warpimpact.plotting import dispersion, marginals, probability_map, uncertainty
 
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
 
@@ -58,6 +58,32 @@ def test_uncertainty_is_grey_where_hits_have_no_value(make_result):
 def test_hits_that_leave_gaps_have_no_uncertainty(make_result):
     with pytest.raises(ValueError, match="do not cover the cell"):
         uncertainty(make_result(32), "tilt")
+
+
+def test_probability_map_holds_the_share_at_every_place(make_result):
+    dataset = make_result(4096)
+    chance = 0.5 + 0.3 * np.sin(2.0 * np.pi * dataset["hit_y"].values / dataset.attrs["plate_period"][0])
+    beyond = np.random.default_rng(5).random(4096) < chance
+    dataset["residual_velocity"].values[:] = np.where(beyond, 800.0, 600.0)
+    figure = probability_map(dataset, "P(residual_velocity > 700 m/s)")
+    share, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
+    truth = 0.5 + 0.3 * np.sin(2.0 * np.pi * ((np.arange(share.shape[1]) + 0.5) / share.shape[1] - 0.5))
+    assert 0.9 < np.mean(np.abs(share - truth) <= half_width) < 0.99
+    # Wilson's of one half among 24 hits: 1.96 · √(1/(4·24) + 1.96²/(4·24²)) / (1 + 1.96²/24) = 0.186.
+    assert half_width.max() == pytest.approx(0.186, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "complaint"),
+    [
+        ("mean(residual_velocity)", "needs a P"),
+        ("P(bending_stress > 1 GPa)", "the result has no bending_stress"),
+        ("P(nonsense > 1)", "must be one of"),
+    ],
+)
+def test_probability_map_says_what_it_cannot_show(make_result, quantity: str, complaint: str):
+    with pytest.raises(ValueError, match=complaint):
+        probability_map(make_result(512), quantity)
 
 
 def test_marginals_are_the_quantiles_of_strips(make_result):

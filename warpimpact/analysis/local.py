@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.stats import norm as normal
 from scipy.stats import t as student
 
 if TYPE_CHECKING:
@@ -48,3 +49,16 @@ def plane_fit(offsets: Array, values: Array, confidence: float = 0.95) -> Local:
     spread = np.sqrt(np.sum(residual**2, axis=1) / freedom)
     error = spread * np.sqrt(np.sum(inverse[:, 0] ** 2, axis=1))
     return Local(plane[:, 0], float(student.ppf(0.5 + 0.5 * confidence, freedom)) * error, spread)
+
+
+def share_of(hits: Array, confidence: float = 0.95) -> tuple[Array, Array]:
+    """Share of the ones among zeros and ones, and half the width of its interval (Wilson's; it takes the hits for
+    independent).
+
+    Args:
+        hits: shape [points, hits]; the results have the shape [points].
+    """
+    count, share = hits.shape[1], hits.mean(axis=1)
+    z = float(normal.ppf(0.5 + 0.5 * confidence))
+    half_width = z * np.sqrt(share * (1.0 - share) / count + z**2 / (4.0 * count**2)) / (1.0 + z**2 / count)
+    return share, half_width

@@ -123,7 +123,8 @@ def cluster_team(
             )
             address = stack.enter_context(cluster).scheduler_address
         try:
-            client = stack.enter_context(Client(address, timeout="20s"))
+            # Not the default of its process, of which xarray takes the locks of the files that are written here.
+            client = stack.enter_context(Client(address, timeout="20s", set_as_default=False))
         except (OSError, ValueError) as error:
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:

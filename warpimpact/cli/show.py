@@ -41,17 +41,33 @@ def add_plot(commands: Commands) -> None:
     )
     add_results(parser)
     add_output(parser, "FOLDER", "existing folder (default: the result's)")
+    parser.add_argument(
+        "--probability",
+        metavar="QUANTITY",
+        help='only the map of a probability of one result, such as "P(tilt@130mm > 30 deg)"',
+    )
 
 
 def _plot(arguments: argparse.Namespace) -> None:
     from warpimpact import results
-    from warpimpact.plotting import save_beside, save_maps
+    from warpimpact.plotting import probability_map, save_beside, save_maps
 
     datasets = {name: results.read(path) for name, path in named(arguments.results).items()}
     folder = arguments.output or arguments.results[0].parent
     check_folder(folder)
     stem = "_".join(path.stem for path in arguments.results)
     dataset, *others = datasets.values()
+    if arguments.probability is not None:
+        if others:
+            raise results.ResultError("--probability: got several results, but it draws the map of one")
+        try:
+            figure = probability_map(dataset, arguments.probability)
+        except ValueError as error:
+            raise results.ResultError(f"--probability: {error}") from None
+        picture = folder / f"{stem}_probability.png"
+        figure.savefig(picture, dpi=150)
+        print(picture)
+        return
     for path in save_beside(datasets, folder, stem) if others else save_maps(dataset, folder, stem):
         print(path)
 

@@ -1,7 +1,7 @@
 """Figures: a Dataset, or a plate, goes in, a matplotlib Figure comes out."""
 
 from warpimpact.plotting.comparison import comparison_figure
-from warpimpact.plotting.distribution import dispersion, marginals, uncertainty
+from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
 from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.study import study_figure
@@ -14,6 +14,7 @@ __all__ = [
     "marginals",
     "overview",
     "plate_figure",
+    "probability_map",
     "save_beside",
     "save_maps",
     "status_map",

@@ -8,7 +8,8 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.local import NEIGHBOURS, plane_fit
+from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
+from warpimpact.campaign.estimates import Measure
 from warpimpact.plotting.cell import (
     draw_holes,
     draw_values,
@@ -24,6 +25,8 @@ from warpimpact.plotting.cell import (
 )
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -115,25 +118,61 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
         ValueError: the hits do not cover the cell; and as `cell.shown`.
     """
     column = shown(dataset, variable, standoff)
+    images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
+    labels = f"local mean of {column.label}", f"half width of its 95 % interval [{column.label.partition('[')[2]}"
+    return _two_maps(dataset, images, labels, column.title, "plane through the {} nearest hits, Student's interval")
+
+
+def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
+    """Map of a probability, such as that of a bending stress above the core's strength, from the hits nearby, beside
+    half the width of its 95 % interval (`analysis.local.share_of`).
+
+    Args:
+        dataset: a result whose hits cover the cell.
+        quantity: ``P(bending_stress > 1.5 GPa)`` or the like, ``P(perforated)``; as in a campaign's ``stop.quantity``.
+
+    Raises:
+        ValueError: the quantity is no probability, or not one of this result; or the hits do not cover the cell.
+    """
+    measure = Measure.parse(quantity)
+    if not measure.is_binary:
+        raise ValueError(f'got "{quantity}", but a map of probability needs a P(…)')
+    if measure.kind == "probability" and measure.variable not in dataset:
+        raise ValueError(f'got "{quantity}", but the result has no {measure.variable}')
+    images = _local(dataset, measure.values(dataset), _covered(dataset), lambda near: share_of(near[1]))
+    labels = f"{measure.text}", "half width of its 95 % interval"
+    return _two_maps(dataset, images, labels, measure.text, "share of the {} nearest hits, Wilson's interval")
+
+
+def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
+    """The hit nearest to every pixel, of hits that cover the cell."""
     nearest = nearest_hits(dataset, _FINE)
     if nearest is None:
         raise ValueError("the hits do not cover the cell, so nothing is known between them")
-    value, half_width = _smoothed(dataset, column.values, nearest)
+    return nearest
+
+
+def _two_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], title: str, method: str) -> Figure:
+    """A local value beside half the width of its interval."""
     width, height = _map_size(dataset)
     figure = Figure(figsize=(2.0 * width + 4.0, height + 1.9), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get('title', '')}\n{column.title}")
-    labels = f"local mean of {column.label}", f"half width of its 95 % interval [{column.label.partition('[')[2]}"
+    figure.suptitle(f"{dataset.attrs.get('title', '')}\n{title}")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
-    for axes, image, label in zip(panels, (value, half_width), labels, strict=True):
+    for axes, image, label in zip(panels, images, labels, strict=True):
         figure.colorbar(paint_pixels(axes, dataset, image, scale_of([image.ravel()])), ax=axes, label=label)
         draw_holes(axes, dataset)
-    note = f"plane through the {NEIGHBOURS} nearest hits, Student's interval; {shots_text(dataset)}"
-    figure.supxlabel(note, fontsize="small", color="0.3")
+    figure.supxlabel(f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}", fontsize="small", color="0.3")
     return figure
 
 
-def _smoothed(dataset: xarray.Dataset, values: Array, nearest: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Local mean and half width of its interval at every pixel, NaN where the nearest hit has no value."""
+def _local(
+    dataset: xarray.Dataset,
+    values: Array,
+    nearest: NDArray[np.intp],
+    estimate: Callable[[tuple[Array, Array]], tuple[Array, Array]],
+) -> Array:
+    """What the hits near every pixel tell, shape [2, pixels_z, pixels_y]: an estimate from their offsets [m] and
+    values, and half the width of its interval; NaN where the nearest hit has no value."""
     images = np.full((2, *nearest.shape), np.nan)
     exists = np.isfinite(values)
     there = exists[nearest]
@@ -142,9 +181,8 @@ def _smoothed(dataset: xarray.Dataset, values: Array, nearest: NDArray[np.intp])
         points = pixels(dataset, _FINE)[there]
         _, near = tree_of(dataset, exists).query(points, k=NEIGHBOURS)
         offsets = (hit_points(dataset)[exists] + period / 2)[near] - points[:, None]
-        local = plane_fit(offsets - period * np.round(offsets / period), values[exists][near])
-        images[:, there] = local.value, local.half_width
-    return images[0], images[1]
+        images[:, there] = estimate((offsets - period * np.round(offsets / period), values[exists][near]))
+    return images
 
 
 def _map_size(dataset: xarray.Dataset) -> Array:

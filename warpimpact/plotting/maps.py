@@ -79,6 +79,9 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     }
     for standoff in dataset["standoff"].values:
         figures[f"tilt_{standoff * _MM:g}mm"] = hit_map(dataset, "tilt", standoff)
+    figures |= {
+        name: hit_map(dataset, name) for name in ("largest_bending_moment", "bending_stress") if name in dataset
+    }
     figures |= {"marginals": marginals(dataset, "residual_velocity"), "dispersion": dispersion(dataset)}
     if nearest_hits(dataset) is not None:
         figures["uncertainty"] = uncertainty(dataset, "residual_velocity")
