@@ -1,5 +1,6 @@
 """From a scene to arrays: numerics with every choice made, rings of the core, tile of the plate, filter."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from warpimpact.scene import (
     ConeCore,
     Core,
     Impact,
+    MaskPattern,
     Numerics,
     OgiveCore,
     Plate,
@@ -249,6 +251,19 @@ def test_tile_looks_closely_only_where_edges_are_and_misses_none() -> None:
     np.testing.assert_allclose(tile.material, shares, rtol=0, atol=1.5 / samples**2)  # rounding decides on edges
     assert (tile.material != shares).mean() < 1e-3
     assert 0.0 < 1.0 - tile.material.mean() < 0.01
+
+
+def test_tile_is_kept_for_the_next_shots_but_not_for_another_mask_of_the_same_name(tmp_path: Path) -> None:
+    def masked(hole: tuple[int, int]) -> Plate:
+        mask = np.ones((4, 4), dtype=np.uint8)
+        mask[hole] = 0
+        np.save(tmp_path / "mask.npy", mask)
+        pattern = MaskPattern(file=str(tmp_path / "mask.npy"), cell_size=1e-3)
+        return PLATE.model_copy(update={"pattern": pattern})
+
+    one, other = masked((0, 0)), masked((2, 1))
+    assert tile_of(one, 0.5e-3) is tile_of(one.model_copy(update={"thickness": 1.0}), 0.5e-3)
+    assert (tile_of(one, 0.5e-3).material != tile_of(other, 0.5e-3).material).any()
 
 
 def test_tile_tells_material_from_holes_by_area() -> None:
