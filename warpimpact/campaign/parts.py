@@ -25,7 +25,7 @@ from warpimpact.results import OutputError
 _MANIFEST = "manifest.json"
 _SHARDS = "hits_*.nc"
 _LOCK = "lock"
-FEWEST, MOST, SHARDS = 2**10, 2**16, 32
+FEWEST, MOST, SHARDS = 2**11, 2**16, 32
 """Shots per shard, and how many shards are aimed at between these. A shard costs some 40 ms beside its computing."""
 
 
