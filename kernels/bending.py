@@ -52,13 +52,15 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def mean_force(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
         """Force on a ring [N], mean over the step, if the velocities change by (dv, dw) more than foreseen."""
-        return sums.force - half * (contacts.damping_vv(ring, sums) * dv + contacts.damping_vw(ring, sums) * dw)
+        slopes = contacts.slopes_of(ring, sums)
+        return sums.force - half * (contacts.damping_vv(slopes) * dv + contacts.damping_vw(slopes) * dw)
 
     @wp.func
     def mean_moment(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
         """Its moment about the centre of mass [N m]."""
-        coupled = wp.transpose(contacts.damping_vw(ring, sums)) * dv
-        return sums.moment - half * (coupled + contacts.damping_ww(ring, sums) * dw)
+        slopes = contacts.slopes_of(ring, sums)
+        coupled = wp.transpose(contacts.damping_vw(slopes)) * dv
+        return sums.moment - half * (coupled + contacts.damping_ww(slopes) * dw)
 
     @wp.func
     def across(vector: vec3):

@@ -17,7 +17,7 @@ from .variant import Variant
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
-    real, vec3, mat33 = variant.real, variant.vec3, variant.mat33
+    real, vec2, vec3, mat33 = variant.real, variant.vec2, variant.vec3, variant.mat33
     zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     Surface, Pose, Ring, Patch = surfaces.Surface, surfaces.Pose, surfaces.Ring, surfaces.Patch
@@ -56,16 +56,29 @@ def build(variant: Variant) -> SimpleNamespace:
         slopes_cs: real
 
     @wp.struct
+    class Slopes:
+        """Σ slope × products of the normal's components along the axis (a) and outwards (r) and of its lever (l) about
+        the centre of mass; with the azimuth's cos and sin for each r or l: (cos, sin), or (cos², cos sin, sin²)."""
+
+        aa: real
+        ar: vec2
+        rr: vec3
+        al: vec2
+        rl: vec3
+        ll: vec3
+
+    @wp.struct
     class Touches:
-        """What the first pass finds, for every patch of every slot: area [m²] of material that it immerses, exposure
-        per node [s] that it is about to give, cells of the tile and of the grid with the place in them; the area of
-        every ring's patches together; and, where the core bends, what the second pass sums over each ring."""
+        """What the first pass finds, for every patch of every slot: the area [m²] with which it presses on material,
+        the derivative of that area by its closing speed [m s], the `shift` of its grip, exposure per node [s] that it
+        is about to give, cells of the tile and of the grid, and the place in the latter; the area of every ring's
+        patches together; and, where the core bends, what the second pass sums over each ring."""
 
         area: wp.array(dtype=real)
+        slope: wp.array(dtype=real)
+        shift: wp.array(dtype=real)
         gain: wp.array(dtype=real)
         tile: wp.array(dtype=wp.int32)
-        tile_y: wp.array(dtype=real)
-        tile_z: wp.array(dtype=real)
         cell: wp.array(dtype=wp.int32)
         y: wp.array(dtype=real)
         z: wp.array(dtype=real)
@@ -74,15 +87,22 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Grip:
-        """How a patch touches: the share of it in contact; the normal (axial, outwards, around) of that share and
-        its closing speed [m/s]; and the range of closing speeds over which contact sets in [m/s]."""
+        """How a patch touches: the share of it in contact, its derivative by the closing speed [s/m], and how far the
+        middle of that share is from the patch's own, in halves of the patch and per variation of the closing speed
+        over it [s/m]."""
 
         share: real
+        slope: real
+        shift: real
+
+    @wp.struct
+    class Face:
+        """The part of a patch in contact: its normal (axial, outwards, around) and its closing speed [m/s]."""
+
         axial: real
         outward: real
         around: real
         closing: real
-        width: real
 
     @wp.func
     def node_below(window: Window, place: real):
@@ -129,8 +149,8 @@ def build(variant: Variant) -> SimpleNamespace:
             found.box.y_high = home_y + y_high + 2
             found.box.z_low = home_z + z_low - 1
             found.box.z_high = home_z + z_high + 2
-            # The filter's second pass looks at rows twice its reach away, and at the next in any case.
-            rows = wp.max(2 * plate.reach, 1)
+            # The filter's first pass takes rows twice its reach away, and looks a little beyond them.
+            rows = 2 * plate.reach + 1
             found.inside = (
                 found.box.y_low >= rows
                 and found.box.z_low >= plate.reach
@@ -140,29 +160,40 @@ def build(variant: Variant) -> SimpleNamespace:
         return found
 
     @wp.func
+    def variations(ring: Ring, patch: Patch):
+        """Half of what the closing speed varies by over a patch, along the meridian and around [m/s]."""
+        meridian = ring.turn_axial * patch.velocity_axial + ring.turn_radial * patch.velocity_outward
+        return meridian, ring.sector * ring.normal_radial * patch.velocity_around
+
+    @wp.func
     def grip_of(law: Law, pose: Pose, ring: Ring, patch: Patch):
         """Contact of a curved patch: normal and closing speed vary linearly over it, and only the part that closes in
         touches. Without this, contact along a shank would come and go by whole patches."""
-        meridian = ring.turn_axial * patch.velocity_axial + ring.turn_radial * patch.velocity_outward
-        sideways = ring.sector * ring.normal_radial
-        around = sideways * patch.velocity_around
+        meridian, around = variations(ring, patch)
         variation = wp.sqrt(meridian * meridian + around * around)
-        # From the patch's centre to that of the part in contact, in halves of the patch: 0 if all of it touches.
-        per_speed = one / (variation + tiny)
-        beyond = wp.clamp(half - half * patch.closing * per_speed, zero, one)
-        shift = beyond * per_speed
+        per_variation = one / (variation + tiny)
+        rate = laws.onset_rate(law, per_variation)
         grip = Grip()
-        grip.width = laws.onset_width(law, variation)
-        grip.share = laws.contact_fraction(law, patch.closing, variation, pose.speed)
-        grip.axial = ring.normal_axial + shift * meridian * ring.turn_axial
-        grip.outward = ring.normal_radial + shift * meridian * ring.turn_radial
-        grip.around = shift * around * sideways
-        grip.closing = patch.closing + shift * variation * variation
+        grip.share = laws.contact_fraction(patch.closing, variation, rate, pose.speed)
+        grip.slope = wp.where(grip.share < one, rate, zero)
+        # 0 if all of it touches.
+        grip.shift = wp.clamp(half - half * patch.closing * per_variation, zero, one) * per_variation
         return grip
 
     @wp.func
-    def normal_along_x(pose: Pose, patch: Patch, grip: Grip):
-        return grip.axial * pose.axis[0] + grip.outward * patch.outward_x + grip.around * patch.around_x
+    def face_of(ring: Ring, patch: Patch, shift: real):
+        """The part of a patch in contact, from its grip's shift."""
+        meridian, around = variations(ring, patch)
+        face = Face()
+        face.axial = ring.normal_axial + shift * meridian * ring.turn_axial
+        face.outward = ring.normal_radial + shift * meridian * ring.turn_radial
+        face.around = shift * around * ring.sector * ring.normal_radial
+        face.closing = patch.closing + shift * (meridian * meridian + around * around)
+        return face
+
+    @wp.func
+    def normal_along_x(pose: Pose, patch: Patch, face: Face):
+        return face.axial * pose.axis[0] + face.outward * patch.outward_x + face.around * patch.around_x
 
     @wp.func
     def open_window(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
@@ -185,47 +216,41 @@ def build(variant: Variant) -> SimpleNamespace:
         first: wp.int32,
         dt: real,
     ):
-        """Fill in the patches of a ring, from index `first` on, as if the plate had no holes."""
+        """Fill in the patches of a ring, from index `first` on; the area [m²] with which they press on material."""
         per_node = dt * window.per_cell * window.per_cell
         j = int(0)
         while j < surface.around:
             patch = patch_at(pose, ring, read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j))
             grip = grip_of(law, pose, ring, patch)
-            area = surfaces.immersed_area(pose, ring, patch, plate.thickness, dt)
-            area = wp.where(grip.share > zero, area, zero)
+            face = face_of(ring, patch, grip.shift)
+            immersed = surfaces.immersed_area(pose, ring, patch, plate.thickness, dt)
             if wp.static(variant.rimmed):
-                area *= grid.on_plate(plate, window, patch.y, patch.z)
-            cell = grid.cell_at(fields, window, patch.y, patch.z)
+                immersed *= grid.on_plate(plate, window, patch.y, patch.z)
+            area = grip.share * immersed
             write(touches.area, first + j, area)
-            write(touches.gain, first + j, per_node * grip.share * area * wp.abs(normal_along_x(pose, patch, grip)))
-            tile = grid.tile_at(plate, window, patch.y, patch.z)
-            write_index(touches.tile, first + j, tile.index)
-            write(touches.tile_y, first + j, tile.y)
-            write(touches.tile_z, first + j, tile.z)
+            write(touches.slope, first + j, wp.where(grip.share > zero, grip.slope * immersed, zero))
+            write(touches.shift, first + j, grip.shift)
+            write(touches.gain, first + j, per_node * area * wp.abs(normal_along_x(pose, patch, face)))
+            write_index(touches.tile, first + j, grid.tile_at(plate, window, patch.y, patch.z))
+            cell = grid.cell_at(fields, window, patch.y, patch.z)
             write_index(touches.cell, first + j, cell.index)
             write(touches.y, first + j, cell.y)
             write(touches.z, first + j, cell.z)
             j += 1
+        return grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, surface.around)
 
     @wp.func
-    def meet_plate(surface: Surface, plate: Plate, fields: Fields, touches: Touches, first: wp.int32):
-        """Leave of a ring's touches what meets material, and give the plate its exposure; the area left [m²]."""
-        total = zero
+    def expose(surface: Surface, fields: Fields, touches: Touches, first: wp.int32):
+        """Give the plate the exposure of a ring's touches, from its four quarters in turn: neighbours share nodes, and
+        one would wait for the other. What does not touch gives nothing, which costs less than to leave it out."""
+        quarter = surface.around // 4
         j = int(first)
-        while j < first + surface.around:
-            area = read(touches.area, j)
-            if area > zero:
-                tile, tile_y, tile_z = read_index(touches.tile, j), read(touches.tile_y, j), read(touches.tile_z, j)
-                material = grid.gather(plate.tile, plate.tile_z + 1, tile, tile_y, tile_z)
-                write(touches.area, j, material * area)
-                total += material * area
-                if wp.static(variant.degrades):
-                    gain = material * read(touches.gain, j)
-                    if gain > zero:
-                        cell, y, z = read_index(touches.cell, j), read(touches.y, j), read(touches.z, j)
-                        grid.scatter(fields.gain, fields.cells_z, cell, y, z, gain)
+        while j < first + quarter:
+            for k in range(4):
+                i = j + k * quarter
+                cell, y, z = read_index(touches.cell, i), read(touches.y, i), read(touches.z, i)
+                grid.scatter(fields.gain, fields.cells_z, cell, y, z, read(touches.gain, i))
             j += 1
-        return total
 
     @wp.func
     def sum_ring(surface: Surface, law: Law, fields: Fields, touches: Touches, pose: Pose, ring: Ring, first: wp.int32):
@@ -237,28 +262,29 @@ def build(variant: Variant) -> SimpleNamespace:
         while j < surface.around:
             cosine, sine = read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j)
             patch = patch_at(pose, ring, cosine, sine)
-            grip = grip_of(law, pose, ring, patch)
-            area = read(touches.area, first + j)
+            face = face_of(ring, patch, read(touches.shift, first + j))
+            left = one
             if wp.static(variant.degrades):
                 cell = read_index(touches.cell, first + j)
                 y, z = read(touches.y, first + j), read(touches.z, first + j)
-                area *= laws.remaining(law, grid.gather(fields.exposure, fields.cells_z, cell, y, z))
-            static_slope = wp.where(grip.share < one, laws.normal_stress(law, grip.closing) / grip.width, zero)
-            slope = area * static_slope
+                left = laws.remaining(law, grid.gather(fields.exposure, fields.cells_z, cell, y, z))
+            area = left * read(touches.area, first + j)
+            stress = laws.normal_stress(law, face.closing)
+            slope = left * read(touches.slope, first + j) * stress
             if wp.static(variant.rate_dependent):
-                slope += area * grip.share * laws.stress_slope(law, grip.closing)
+                slope += area * laws.stress_slope(law, face.closing)
             # Traction = stress × (−n + η t), t against the sliding velocity.
-            f_axial, f_outward, f_around = -grip.axial, -grip.outward, -grip.around
+            f_axial, f_outward, f_around = -face.axial, -face.outward, -face.around
             if wp.static(variant.rubs):
-                s_axial = patch.velocity_axial - grip.closing * grip.axial
-                s_outward = patch.velocity_outward - grip.closing * grip.outward
-                s_around = patch.velocity_around - grip.closing * grip.around
+                s_axial = patch.velocity_axial - face.closing * face.axial
+                s_outward = patch.velocity_outward - face.closing * face.outward
+                s_around = patch.velocity_around - face.closing * face.around
                 sliding = wp.sqrt(s_axial * s_axial + s_outward * s_outward + s_around * s_around)
                 rubbing = laws.friction_per_speed(law, sliding, pose.speed)
                 f_axial -= rubbing * s_axial
                 f_outward -= rubbing * s_outward
                 f_around -= rubbing * s_around
-            force = area * grip.share * laws.normal_stress(law, grip.closing)
+            force = area * stress
             axial += force * f_axial
             axial_c += force * f_axial * cosine
             axial_s += force * f_axial * sine
@@ -286,36 +312,45 @@ def build(variant: Variant) -> SimpleNamespace:
         return sums
 
     @wp.func
-    def damping_vv(ring: Ring, s: Sums):
-        """Σ slope n nᵀ, n = (axial, radial cos, radial sin)."""
+    def slopes_of(ring: Ring, s: Sums):
+        """Of a ring; its normals are n = (a, r cos, r sin) and arm × n = l (0, −sin, cos)."""
         a, r = ring.normal_axial, ring.normal_radial
-        aa, ar, rr = a * a * s.slopes, a * r, r * r
+        lever = ring.station * r - ring.radius * a
+        once, twice = vec2(s.slopes_c, s.slopes_s), vec3(s.slopes_cc, s.slopes_cs, s.slopes - s.slopes_cc)
+        slopes = Slopes()
+        slopes.aa = a * a * s.slopes
+        slopes.ar = a * r * once
+        slopes.rr = r * r * twice
+        slopes.al = a * lever * once
+        slopes.rl = r * lever * twice
+        slopes.ll = lever * lever * twice
+        return slopes
+
+    @wp.func
+    def damping_vv(s: Slopes):
+        """Σ slope n nᵀ."""
         return mat33(
-            aa, ar * s.slopes_c, ar * s.slopes_s,
-            ar * s.slopes_c, rr * s.slopes_cc, rr * s.slopes_cs,
-            ar * s.slopes_s, rr * s.slopes_cs, rr * (s.slopes - s.slopes_cc),
+            s.aa, s.ar[0], s.ar[1],
+            s.ar[0], s.rr[0], s.rr[1],
+            s.ar[1], s.rr[1], s.rr[2],
         )  # fmt: skip
 
     @wp.func
-    def damping_vw(ring: Ring, s: Sums):
-        """Σ slope n (arm × n)ᵀ, arm × n = lever (0, −sin, cos)."""
-        lever = ring.station * ring.normal_radial - ring.radius * ring.normal_axial
-        a, r = lever * ring.normal_axial, lever * ring.normal_radial
+    def damping_vw(s: Slopes):
+        """Σ slope n (arm × n)ᵀ."""
         return mat33(
-            zero, -a * s.slopes_s, a * s.slopes_c,
-            zero, -r * s.slopes_cs, r * s.slopes_cc,
-            zero, -r * (s.slopes - s.slopes_cc), r * s.slopes_cs,
+            zero, -s.al[1], s.al[0],
+            zero, -s.rl[1], s.rl[0],
+            zero, -s.rl[2], s.rl[1],
         )  # fmt: skip
 
     @wp.func
-    def damping_ww(ring: Ring, s: Sums):
+    def damping_ww(s: Slopes):
         """Σ slope (arm × n)(arm × n)ᵀ."""
-        lever = ring.station * ring.normal_radial - ring.radius * ring.normal_axial
-        square = lever * lever
         return mat33(
             zero, zero, zero,
-            zero, square * (s.slopes - s.slopes_cc), -square * s.slopes_cs,
-            zero, -square * s.slopes_cs, square * s.slopes_cc,
+            zero, s.ll[2], -s.ll[1],
+            zero, -s.ll[1], s.ll[0],
         )  # fmt: skip
 
     @wp.func
@@ -343,13 +378,17 @@ def build(variant: Variant) -> SimpleNamespace:
             first = base + index * surface.around
             area = zero
             if surfaces.closes(pose, ring):
-                find_touches(surface, plate, law, fields, window, touches, pose, ring, first, dt)
-                area = meet_plate(surface, plate, fields, touches, first)
+                area = find_touches(surface, plate, law, fields, window, touches, pose, ring, first, dt)
             touches.ring_area[slot * surface.rings + index] = area
             load.touching = load.touching or area > zero
         if load.touching:
             if wp.static(variant.degrades):
+                # After all rings are found: what was just stored by vectors cannot be read one by one at once.
+                for index in range(found.first_ring, found.last_ring + 1):
+                    if touches.ring_area[slot * surface.rings + index] > zero:
+                        expose(surface, fields, touches, base + index * surface.around)
                 grid.spread(plate, fields, window, found.box)
+            slopes = Slopes()
             for index in range(found.first_ring, found.last_ring + 1):
                 if touches.ring_area[slot * surface.rings + index] > zero:
                     ring = ring_at(surface, pose, index)
@@ -358,11 +397,17 @@ def build(variant: Variant) -> SimpleNamespace:
                         touches.sums[slot * surface.rings + index] = sums
                     load.force += sums.force
                     load.moment += sums.moment
-                    if sums.slopes > zero:
-                        load.damped = True
-                        load.damping_vv += half * damping_vv(ring, sums)
-                        load.damping_vw += half * damping_vw(ring, sums)
-                        load.damping_ww += half * damping_ww(ring, sums)
+                    load.damped = load.damped or sums.slopes > zero
+                    here = slopes_of(ring, sums)
+                    slopes.aa += here.aa
+                    slopes.ar += here.ar
+                    slopes.rr += here.rr
+                    slopes.al += here.al
+                    slopes.rl += here.rl
+                    slopes.ll += here.ll
+            load.damping_vv = half * damping_vv(slopes)
+            load.damping_vw = half * damping_vw(slopes)
+            load.damping_ww = half * damping_ww(slopes)
             if wp.static(variant.degrades):
                 grid.settle(plate, fields, window, found.box)
         return load
@@ -372,11 +417,14 @@ def build(variant: Variant) -> SimpleNamespace:
         Touches=Touches,
         Sums=Sums,
         Grip=Grip,
+        Face=Face,
+        slopes_of=slopes_of,
         damping_vv=damping_vv,
         damping_vw=damping_vw,
         damping_ww=damping_ww,
         open_window=open_window,
         footprint_of=footprint_of,
         grip_of=grip_of,
+        face_of=face_of,
         load_on=load_on,
     )

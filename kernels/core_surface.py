@@ -26,8 +26,8 @@ def build(variant: Variant) -> SimpleNamespace:
         Per ring: station ahead of the centre of mass and radius [m], area of one patch [m²], its normal along
         the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of
         the change of the normal over it.
-        Cosine and sine of the patches' azimuths: those of even rings, then those of odd rings, half a patch on, so
-        that neighbours do not all miss the same edge.
+        Cosine and sine of the patches' azimuths, a multiple of 4 around a ring: those of even rings, then those of odd
+        rings, half a patch on, so that neighbours do not all miss the same edge.
         """
 
         station: wp.array(dtype=real)

@@ -12,7 +12,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the contact law for one variant."""
     real = variant.real
-    zero, one = real(0.0), real(1.0)
+    zero, half, one = real(0.0), real(0.5), real(1.0)
     # A wall sliding along itself has v_p·n = 0 up to rounding; below this share of |v_p| it does not touch.
     at_rest = real(1.0e-5)
     smallest_onset = real(1.0e-4)  # of the impact velocity: keeps the ramp's slope finite
@@ -41,15 +41,20 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.max(wp.min(law.onset_jump * dt, law.onset_limit * velocity), smallest_onset * impact_velocity)
 
     @wp.func
-    def onset_width(law: Law, variation: real):
-        """Range of closing speeds [m/s] over which a patch comes into contact: its own range, ±variation, or the
-        onset speed if that is wider. The law jumps at v_p·n = 0; a wall pressed sideways rests on the ramp."""
-        return wp.max(real(2.0) * variation, law.onset)
+    def onset_rate(law: Law, per_variation: real):
+        """Share of a patch that comes into contact per closing speed [s/m]: it does over its own range of closing
+        speeds, ±variation, or over the onset speed if that is wider. The law jumps at v_p·n = 0; a wall pressed
+        sideways rests on the ramp.
+
+        Args:
+            per_variation: 1/variation [s/m].
+        """
+        return wp.min(half * per_variation, one / law.onset)
 
     @wp.func
-    def contact_fraction(law: Law, closing: real, variation: real, speed: real):
+    def contact_fraction(closing: real, variation: real, onset_rate: real, speed: real):
         """Share of a patch in contact, its closing speeds spread evenly over closing ± variation."""
-        return wp.clamp((closing + variation - at_rest * speed) / onset_width(law, variation), zero, one)
+        return wp.clamp((closing + variation - at_rest * speed) * onset_rate, zero, one)
 
     @wp.func
     def normal_stress(law: Law, closing: real):
@@ -100,7 +105,7 @@ def build(variant: Variant) -> SimpleNamespace:
     return SimpleNamespace(
         Law=Law,
         onset_speed=onset_speed,
-        onset_width=onset_width,
+        onset_rate=onset_rate,
         contact_fraction=contact_fraction,
         normal_stress=normal_stress,
         stress_slope=stress_slope,

@@ -40,8 +40,8 @@ def build(variant: Variant) -> SimpleNamespace:
         window.z0 = real((wp.float64(home_z) + wp.float64(0.5)) * dz - hit_z)
         index = window.first
         for i in range(fields.cells_y):
-            row = grid.within(home_y % plate.tile_y + i - fields.cells_y // 2, plate.tile_y) * (plate.tile_z + 1)
-            column = grid.within(home_z % plate.tile_z - fields.cells_z // 2, plate.tile_z)
+            row = grid.within(real(home_y % plate.tile_y + i - fields.cells_y // 2), plate.tile_y) * plate.tile_z
+            column = grid.within(real(home_z % plate.tile_z - fields.cells_z // 2), plate.tile_z)
             y = window.y0 + real(i - fields.cells_y // 2) * real(dy)
             for j in range(fields.cells_z):
                 share = plate.tile[row + column]

@@ -1,7 +1,7 @@
 """The plate: the shared pristine pattern, and each shot's own window of exposure.
 
-The pattern is a periodic tile of material fractions, finer than the grid of the window. A window is the part of
-the plate that one core can reach, a grid about the hit; it remembers each node's exposure T [s].
+The pattern is a periodic tile of material fractions, so fine that the cell under a point is enough. A window is the
+part of the plate that one core can reach, a grid about the hit; it remembers each node's exposure T [s].
 """
 
 from functools import cache
@@ -22,10 +22,10 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Plate:
-        """Pristine plate: one period [m] as a tile [tile_y + 1 × tile_z + 1] of material fractions, corner at the
-        origin, the last row and column repeating the first; how far at least each of the tile_y × tile_z cells is from
-        any material [m]; the half extents [m] of a finite plate (infinite if there is no rim); the spacing [m] of the
-        exposure's grid and half of the tent filter on it."""
+        """Pristine plate: one period [m] as a tile [tile_y × tile_z] of material fractions, corner at the origin; how
+        far at least each of its cells is from any material [m]; the half extents [m] of a finite plate (infinite if
+        there is no rim); the spacing [m] of the exposure's grid, and half of the tent filter on it, which reaches at
+        least one node far."""
 
         tile: wp.array(dtype=real)
         clear: wp.array(dtype=real)
@@ -54,8 +54,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Window:
         """One slot's part of the fields, and how to find the tile. The hit is the node of index `home`: a shot
-        computes the same bits in a window of any size. The cell of the tile whose centre precedes the hit, the hit's
-        place from there, and cells per metre; the rims of a finite plate [m], seen from the hit. (y0, z0): where the
+        computes the same bits in a window of any size. The cell of the tile that holds the hit, the hit's place in it,
+        and cells per metre; the rims of a finite plate [m], seen from the hit. (y0, z0): where the
         literal scheme has its node `home` [m]."""
 
         first: wp.int32
@@ -98,10 +98,10 @@ def build(variant: Variant) -> SimpleNamespace:
         window.first = slot * fields.cells_y * fields.cells_z
         window.home = window.first + (fields.cells_y // 2) * fields.cells_z + fields.cells_z // 2
         window.per_cell = one / plate.spacing
-        # In cells of the tile, between whose centres a point lies; whole cells and the rest apart, so that hits a
-        # lattice vector of whole cells apart compute the same bits.
-        across = hit_y * wp.float64(plate.tile_y) / plate.period_y - wp.float64(0.5)
-        along = hit_z * wp.float64(plate.tile_z) / plate.period_z - wp.float64(0.5)
+        # Whole cells of the tile and the rest apart, so that hits a lattice vector of whole cells apart compute the
+        # same bits.
+        across = hit_y * wp.float64(plate.tile_y) / plate.period_y
+        along = hit_z * wp.float64(plate.tile_z) / plate.period_z
         window.row = wp.int32(wp.floor(across)) % plate.tile_y
         window.column = wp.int32(wp.floor(along)) % plate.tile_z
         window.tile_y = real(across - wp.floor(across))
@@ -115,34 +115,55 @@ def build(variant: Variant) -> SimpleNamespace:
         return window
 
     @wp.func
-    def within(index: wp.int32, period: wp.int32):
-        """The index, of a few periods, brought into 0 … period − 1; a CPU vectorises floor, but no remainder."""
-        return index - period * wp.int32(wp.floor((real(index) + half) / real(period)))
+    def within(place: real, period: wp.int32):
+        """A whole number, of a few periods, brought into 0 … period − 1; a CPU vectorises floor, but no remainder."""
+        return wp.int32(place - real(period) * wp.floor((place + half) / real(period)))
 
     @wp.func
     def tile_at(plate: Plate, window: Window, y: real, z: real):
-        """The cells of the tile whose centres enclose a point: index of the first, and the point's place."""
-        across = window.tile_y + y * window.per_row
-        along = window.tile_z + z * window.per_column
-        row, column = wp.floor(across), wp.floor(along)
-        cell = Cell()
-        cell.index = within(window.row + wp.int32(row), plate.tile_y) * (plate.tile_z + 1) + within(
-            window.column + wp.int32(column), plate.tile_z
-        )
-        cell.y = across - row
-        cell.z = along - column
-        return cell
+        """Index of the tile's cell that holds a point."""
+        row = real(window.row) + wp.floor(window.tile_y + y * window.per_row)
+        column = real(window.column) + wp.floor(window.tile_z + z * window.per_column)
+        return within(row, plate.tile_y) * plate.tile_z + within(column, plate.tile_z)
+
+    # Native, because only of pointers that do not alias does a CPU read so many cells at a time.
+    @wp.func_native("""
+    assert(start >= 0 && start + count <= area.shape[0]);
+    const auto scale = [count](auto* __restrict__ area, auto* __restrict__ slope, auto* __restrict__ gain,
+                               const int* __restrict__ at, const auto* __restrict__ tile, int cells) {
+        auto total = 0 * area[0];
+        for (int j = 0; j < count; ++j) {
+            assert(at[j] >= 0 && at[j] < cells);
+            const auto share = tile[at[j]];
+            area[j] *= share;
+            slope[j] *= share;
+            gain[j] *= share;
+            total += area[j];
+        }
+        return total;
+    };
+    return scale(area.data + start, slope.data + start, gain.data + start, at.data + start, tile.data, tile.shape[0]);
+    """)
+    def meet(
+        area: wp.array(dtype=real),
+        slope: wp.array(dtype=real),
+        gain: wp.array(dtype=real),
+        at: wp.array(dtype=wp.int32),
+        tile: wp.array(dtype=real),
+        start: wp.int32,
+        count: wp.int32,
+    ) -> real:
+        """Scale three lists by tile[at], from `start` on, and return the sum of what is left of the first."""
+        ...
 
     @wp.func
     def clearance(plate: Plate, window: Window):
         """How far at least the hit is from any material [m]."""
-        row = within(window.row + wp.int32(window.tile_y + half), plate.tile_y)
-        column = within(window.column + wp.int32(window.tile_z + half), plate.tile_z)
-        return plate.clear[row * plate.tile_z + column]
+        return plate.clear[tile_at(plate, window, zero, zero)]
 
     @wp.func
     def on_plate(plate: Plate, window: Window, y: real, z: real):
-        """Share of half a grid cell, as wide as a cell of the tile, about a point that lies on a finite plate."""
+        """Share of half a grid cell about a point that lies on a finite plate."""
         width = half * plate.spacing
         inside_y = wp.min(y - window.low_y, window.high_y - y) / width + half
         inside_z = wp.min(z - window.low_z, window.high_z - z) / width + half
@@ -160,7 +181,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return cell
 
     @wp.func
-    def gather_plain(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
+    def gather(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
         """Bilinear interpolation between the four nodes from `index` on."""
         next = index + stride
         low, high = read(field, index), read(field, next)
@@ -168,46 +189,41 @@ def build(variant: Variant) -> SimpleNamespace:
         high += z * (read(field, next + 1) - high)
         return low + y * (high - low)
 
-    # Native, because a CPU reads two neighbours for the price of one, which no compiler finds out.
+    @wp.func
+    def scatter_plain(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real, amount: real):
+        """Share an amount out over the four nodes, by the weights of the interpolation."""
+        high = amount * y
+        low = amount - high
+        next = index + stride
+        write(field, index, read(field, index) + (low - low * z))
+        write(field, index + 1, read(field, index + 1) + low * z)
+        write(field, next, read(field, next) + (high - high * z))
+        write(field, next + 1, read(field, next + 1) + high * z)
+
+    # Native and volatile, because a compiler would store neighbours in pairs, and the next patch, whose pair overlaps
+    # this one, would wait for the memory.
     @wp.func_native("""
     assert(index >= 0 && index + stride + 1 < field.shape[0]);
-    const float* const at = field.data + index;
-    #if defined(__CUDA_ARCH__)
-        const float a = at[0], b = at[1], c = at[stride], d = at[stride + 1];
-    #else
-        unsigned long long first, second;
-        __builtin_memcpy(&first, at, 8);
-        __builtin_memcpy(&second, at + stride, 8);
-        const float a = __builtin_bit_cast(float, (unsigned int)first);
-        const float b = __builtin_bit_cast(float, (unsigned int)(first >> 32));
-        const float c = __builtin_bit_cast(float, (unsigned int)second);
-        const float d = __builtin_bit_cast(float, (unsigned int)(second >> 32));
-    #endif
-    const float low = a + z * (b - a), high = c + z * (d - c);
-    return low + y * (high - low);
+    volatile float* const at = field.data + index;
+    const float a = at[0], b = at[1], c = at[stride], d = at[stride + 1];
+    const float high = amount * y, low = amount - high;
+    at[0] = a + (low - low * z);
+    at[1] = b + low * z;
+    at[stride] = c + (high - high * z);
+    at[stride + 1] = d + high * z;
     """)
-    def gather_single(
+    def scatter_single(
         field: wp.array(dtype=wp.float32),
         stride: wp.int32,
         index: wp.int32,
         y: wp.float32,
         z: wp.float32,
-    ) -> wp.float32:
-        """The same in float32, on a machine that has the lower of two bytes first."""
+        amount: wp.float32,
+    ):
+        """The same in float32."""
         ...
 
-    gather = gather_plain if variant.double else gather_single
-
-    @wp.func
-    def scatter(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real, amount: real):
-        """Share an amount out over the four nodes, by the weights of the interpolation."""
-        high = amount * y
-        low = amount - high
-        next = index + stride
-        write(field, index, read(field, index) + low * (one - z))
-        write(field, index + 1, read(field, index + 1) + low * z)
-        write(field, next, read(field, next) + high * (one - z))
-        write(field, next + 1, read(field, next + 1) + high * z)
+    scatter = scatter_plain if variant.double else scatter_single
 
     # Native, because only with pointers that do not alias does a CPU run these loops in vector registers.
     @wp.func_native("""
@@ -261,6 +277,18 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func_native("""
+    assert(start >= 0 && start + count <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    auto* __restrict__ from = source.data + start;
+    for (int j = 0; j < count; ++j) { into[j] += factor * from[j]; from[j] = 0; }
+    """)
+    def take_scaled(
+        target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
+    ):
+        """The same, and source[j] = 0."""
+        ...
+
+    @wp.func_native("""
     auto* __restrict__ into = target.data + start;
     for (int j = 0; j < count; ++j) into[j] = 0;
     """)
@@ -274,7 +302,6 @@ def build(variant: Variant) -> SimpleNamespace:
         nodes = fields.cells_y * fields.cells_z
         clear(fields.exposure, window.first, nodes)
         clear(fields.gain, window.first, nodes)
-        clear(fields.filtered, window.first, nodes)
 
     @wp.func
     def filter_(
@@ -299,22 +326,19 @@ def build(variant: Variant) -> SimpleNamespace:
         reach away from the window's edge.
         """
         stride = fields.cells_z
+        above = plate.reach * stride
         start = window.first + box.y_low * stride
         count = (box.y_high - box.y_low + 1) * stride
-        filter_(fields.filtered, fields.gain, plate, start, count, 1)
-        start -= plate.reach * stride
-        count += 2 * plate.reach * stride
-        filter_(fields.gain, fields.filtered, plate, start, count, stride)
-        add_scaled(fields.exposure, fields.gain, start, count, half)
+        filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
+        filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
+        add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
 
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
-        """Add the other half of the gained exposure and clear both for the next step."""
+        """Add the other half of the gained exposure and clear it for the next step."""
         start = window.first + (box.y_low - plate.reach) * fields.cells_z
         count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * fields.cells_z
-        add_scaled(fields.exposure, fields.gain, start, count, half)
-        clear(fields.gain, start, count)
-        clear(fields.filtered, start, count)
+        take_scaled(fields.exposure, fields.gain, start, count, half)
 
     return SimpleNamespace(
         Plate=Plate,
@@ -325,12 +349,13 @@ def build(variant: Variant) -> SimpleNamespace:
         window_at=window_at,
         within=within,
         tile_at=tile_at,
+        meet=meet,
         clearance=clearance,
         on_plate=on_plate,
         cell_at=cell_at,
         gather=gather,
-        gather_plain=gather_plain,
         scatter=scatter,
+        scatter_plain=scatter_plain,
         blank=blank,
         spread=spread,
         settle=settle,

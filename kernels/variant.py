@@ -8,7 +8,8 @@ from typing import Any
 import warp as wp
 
 CPU_FLAGS = (
-    "-march=native -mllvm=-inline-threshold=9000 -mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
+    "-march=native -mllvm=-inline-threshold=9000 -mstackrealign "
+    "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )
 """What lets a CPU sum and divide in vector registers; NaN and infinity keep their meaning."""
 
@@ -41,6 +42,10 @@ class Variant:
     def real(self) -> Any:
         """The floating-point type of positions, velocities and fields."""
         return wp.float64 if self.double else wp.float32
+
+    @cached_property
+    def vec2(self) -> Any:
+        return wp.types.vector(2, self.real)
 
     @cached_property
     def vec3(self) -> Any:

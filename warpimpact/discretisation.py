@@ -11,18 +11,20 @@ from typing import Any
 import numpy as np
 import psutil
 from numpy.typing import ArrayLike, NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import correlate1d, distance_transform_edt
 from scipy.optimize import brentq, minimize_scalar
 
 from warpimpact.scene import Core, Impact, Numerics, Pattern, Plate
 
 Array = NDArray[np.float64]
 
-FINER = 2
-"""Cells of the tile per cell of the exposure's grid, in each direction: edges of holes are sharp, exposure is not."""
+FINER = 5
+"""Cells of the tile per cell of the exposure's grid, in each direction: a patch takes the one under its centre."""
+BLUR = 3
+"""Cells of the tile over which its material is averaged, in each direction: edges pass patches gradually. Odd."""
 BLOCKS = 96
 """Most blocks, in each direction, in which a period is searched for room that no core fills."""
-SUBSAMPLES = 8
+SUBSAMPLES = 6
 """Points per cell of the tile and direction behind a material fraction."""
 AT_A_TIME = 2**13
 """Cells of the tile that are looked at together."""
@@ -304,7 +306,7 @@ def _disc_rings(station: float, radius: float, widest: float, *, facing: float) 
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tile:
     """One period of the pristine plate: material fractions, shape [cells_y, cells_z], cells of dy × dz [m]."""
 
@@ -332,10 +334,10 @@ class Tile:
 
 
 def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
-    """Material fraction of every cell of one period; cell (0, 0) has its corner at the origin.
+    """Material fraction about every cell of one period; cell (0, 0) has its corner at the origin.
 
-    Cells are at most `spacing` wide and fit the period. `sharp` takes each cell's centre alone, as the
-    literal scheme does.
+    Cells are at most `spacing` wide and fit the period; fractions are means over BLUR × BLUR cells. `sharp` takes each
+    cell's centre alone, as the literal scheme does.
 
     Raises:
         MemoryError: the tile does not fit; the message is for a person.
@@ -365,7 +367,7 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
     step = 1 if sharp else 2
     count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
     dy, dz = period_y / count_y, period_z / count_z
-    needed, free = 2 * 8 * count_y * count_z, psutil.virtual_memory().available
+    needed, free = 3 * 8 * count_y * count_z, psutil.virtual_memory().available
     if needed > free:
         raise MemoryError(
             f"numerics.grid_spacing: got {spacing:g} m, but the plate's period of {period_y:g} m x {period_z:g} m "
@@ -382,6 +384,9 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
         row, column = np.nonzero(pattern.has_edge(middle_y, middle_z, half_diagonal))
         y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
         part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
+    if not sharp:  # no running sum, whose rounding leaves material in the middle of a hole
+        for axis in range(2):
+            material = correlate1d(material, np.full(BLUR, 1.0 / BLUR), axis, mode="wrap")
     return Tile(material, dy, dz)
 
 

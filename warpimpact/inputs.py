@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -154,8 +155,7 @@ class Inputs:
         finer = 1 if nodal else discretisation.FINER
         tile = discretisation.tile_of(plate, self.spacing / finer, sharp=nodal)
         struct = self.stage.Plate()
-        struct.tile = self.array(np.pad(tile.material, (0, 1), mode="wrap").reshape(-1))
-        struct.clear = self.array(tile.clearance.reshape(-1))
+        struct.tile, struct.clear = _on_device(tile, self.variant.real, self._device.alias)
         struct.tile_y, struct.tile_z = tile.material.shape
         struct.period_y, struct.period_z = plate.pattern.period
         if nodal:  # nodes are the tile's cells, which fit the period
@@ -164,8 +164,8 @@ class Inputs:
         size = plate.size or (math.inf, math.inf)
         struct.half_y, struct.half_z = 0.5 * size[0], 0.5 * size[1]
         taps = discretisation.tent_taps(0.0 if nodal else plate.degradation_length, self.spacing)
-        struct.reach = len(taps) // 2
-        struct.taps = self.array(np.append(taps[struct.reach :], 0.0))
+        struct.reach = max(1, len(taps) // 2)
+        struct.taps = self.array(np.append(taps[len(taps) // 2 :], 0.0))
         return struct
 
     def _each(self, core: Core, plate: Plate, interaction: Interaction, shots: Shots) -> dict[str, Array]:
@@ -192,3 +192,12 @@ class Inputs:
             "longest_step": passage,
             "longest_way": STEP_ALLOWANCE * (thickness + 2.0 * core.bounding_radius),
         }
+
+
+@lru_cache(maxsize=4)
+def _on_device(tile: discretisation.Tile, real: Any, device: str) -> tuple[Any, Any]:
+    """Material and clearance of a tile, which no kernel changes: kept for the next shots at the same plate."""
+    material, clearance = (
+        wp.array(values.reshape(-1), dtype=real, device=device) for values in (tile.material, tile.clearance)
+    )
+    return material, clearance

@@ -30,8 +30,9 @@ Scratch = TypeVar("Scratch")
 CPU_CHUNK = 32
 """Shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
 CUDA_CHUNK = 65536
-WINDOW_SLACK = 1.2
-"""Half the width of a first window in radii of the core, for a straight shot."""
+WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
+"""Half the width of a first window in radii of the core, for a straight shot; less on the literal scheme's fine grid,
+which takes longer to lay than some shots to compute again."""
 MAX_DOUBLINGS = 6
 """How often a shot that leaves its window is computed again in one twice as wide."""
 MEMORY_SHARE = 0.5
@@ -162,10 +163,11 @@ class March:
     def _window_cells(self) -> tuple[int, int]:
         """Cells of a window that holds the footprint of a core that keeps its attitude through the plate."""
         shots, inputs = self.shots, self.inputs
+        slack = NODAL_SLACK if self.variant.nodal else WINDOW_SLACK
         steepest = float(shots.obliquity.max())
         turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
         half = (
-            WINDOW_SLACK * self.core.max_radius / math.cos(steepest)
+            slack * self.core.max_radius / math.cos(steepest)
             + float(inputs.each["thickness"].max()) * math.tan(steepest)
             + self.core.bounding_radius * turned
         )
@@ -205,7 +207,7 @@ class March:
         for name in ("exposure", "gain", "filtered")[: self._field_count()]:
             setattr(scratch, name, empty(slots * cells_y * cells_z))
         patches = slots * self._patches()
-        for name in ("area", "gain", "tile_y", "tile_z", "y", "z"):
+        for name in ("area", "slope", "shift", "gain", "y", "z"):
             setattr(touches, name, empty(patches))
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))

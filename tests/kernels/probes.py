@@ -86,14 +86,14 @@ def plate_of(
 ) -> Any:
     """The Plate of a tile of material fractions, with the filter of a degradation length on a grid of some spacing."""
     plate = struct()
-    plate.tile = wp.array(np.pad(tile, (0, 1), mode="wrap").reshape(-1), dtype=real, device=device)
+    plate.tile = wp.array(np.ascontiguousarray(tile).reshape(-1), dtype=real, device=device)
     plate.tile_y, plate.tile_z = tile.shape
     plate.period_y, plate.period_z = period
     plate.half_y, plate.half_z = size[0] / 2, size[1] / 2
     plate.thickness, plate.spacing = thickness, spacing
     taps = tent_taps(length, spacing)
-    plate.reach = len(taps) // 2
-    plate.taps = wp.array(np.append(taps[plate.reach :], 0.0), dtype=real, device=device)
+    plate.reach = max(1, len(taps) // 2)
+    plate.taps = wp.array(np.append(taps[len(taps) // 2 :], 0.0), dtype=real, device=device)
     return plate
 
 

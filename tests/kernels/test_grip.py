@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
 surfaces, laws, contacts = (part.build(VARIANT) for part in (core_surface, interaction, contact))
-Ring, Patch, Law, Grip = surfaces.Ring, surfaces.Patch, laws.Law, contacts.Grip
+Ring, Patch, Law, Grip, Face = surfaces.Ring, surfaces.Patch, laws.Law, contacts.Grip, contacts.Face
 
 SLIDING = 100.0  # [m/s]
 
@@ -28,27 +28,30 @@ def grips(
     rings: wp.array(dtype=Ring),
     patches: wp.array(dtype=Patch),
     grips: wp.array(dtype=Grip),
+    faces: wp.array(dtype=Face),
 ) -> None:
     i = wp.tid()
     pose = surfaces.Pose()
     pose.speed = speed
     grips[i] = contacts.grip_of(law, pose, rings[i], patches[i])
+    faces[i] = contacts.face_of(rings[i], patches[i], grips[i].shift)
 
 
 GRIPS = VARIANT.kernel(grips)
 
 
 def gripped(device: str, *, speed: float, onset: float = 1e-9, **columns: Any) -> Any:
-    """Grips of patches, from members of rings and patches of shape [n]; the onset far below their speeds."""
+    """Grips of patches and the parts that touch, from members of rings and patches of shape [n]; the onset far below
+    their speeds."""
     members = {struct: struct.numpy_dtype()["names"] for struct in (Ring, Patch)}
     rings, patches = (
         records(struct, device, **{name: value for name, value in columns.items() if name in names})
         for struct, names in members.items()
     )
-    law, found = Law(), poisoned(len(rings), Grip, device)
+    law, found = Law(), [poisoned(len(rings), struct, device) for struct in (Grip, Face)]
     law.onset = onset
-    wp.launch(GRIPS, len(rings), inputs=[law, speed, rings, patches], outputs=[found], device=device)
-    return found.numpy()
+    wp.launch(GRIPS, len(rings), inputs=[law, speed, rings, patches], outputs=found, device=device)
+    return {name: array.numpy()[name] for array in found for name in array.numpy().dtype.names}
 
 
 def bent(slant: Array, bend: Any, sector: Any, velocity: Array) -> dict[str, Any]:

@@ -43,7 +43,8 @@ def law(
     remaining: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
-    fractions[i] = laws.contact_fraction(law, closing[i], variation[i], speed[i])
+    rate = laws.onset_rate(law, real(1.0) / (variation[i] + real(1.0e-30)))
+    fractions[i] = laws.contact_fraction(closing[i], variation[i], rate, speed[i])
     stresses[i] = laws.normal_stress(law, closing[i])
     slopes[i] = laws.stress_slope(law, closing[i])
     frictions[i] = laws.friction_per_speed(law, sliding[i], speed[i])

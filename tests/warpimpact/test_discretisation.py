@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from warpimpact import discretisation
 from warpimpact.discretisation import (
@@ -247,9 +248,10 @@ def test_tile_looks_closely_only_where_edges_are_and_misses_none() -> None:
         for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True)
     )
     solid = ~hairlines.is_hole(y[:, None], z)
-    shares = solid.reshape(tile.material.shape[0], samples, -1, samples).mean(axis=(1, 3))
+    sharp = solid.reshape(tile.material.shape[0], samples, -1, samples).mean(axis=(1, 3))
+    shares = ndimage.uniform_filter(sharp, discretisation.BLUR, mode="wrap")
     np.testing.assert_allclose(tile.material, shares, rtol=0, atol=1.5 / samples**2)  # rounding decides on edges
-    assert (tile.material != shares).mean() < 1e-3
+    assert (~np.isclose(tile.material, shares)).mean() < 1e-2
     assert 0.0 < 1.0 - tile.material.mean() < 0.01
 
 
@@ -267,12 +269,12 @@ def test_tile_is_kept_for_the_next_shots_but_not_for_another_mask_of_the_same_na
 
 
 def test_tile_tells_material_from_holes_by_area() -> None:
-    # A 5 mm hole on the origin, which is a corner of cell (0, 0); cells on the edge are fractions.
+    # A 5 mm hole on the origin, which is a corner of cell (0, 0); cells near the edge are fractions.
     plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 10e-3))})
     tile = tile_of(plate, 0.5e-3)
     y, z = ((np.arange(n) + 0.5) * 0.5e-3 for n in tile.material.shape)
     distance = np.hypot(np.minimum(y, 8e-3 - y)[:, None], np.minimum(z, 10e-3 - z))
-    diagonal = 0.5e-3 / np.sqrt(2)
+    diagonal = discretisation.BLUR * 0.5e-3 / np.sqrt(2)
     assert (tile.material[distance < 2.5e-3 - diagonal] == 0).all()
     assert (tile.material[distance > 2.5e-3 + diagonal] == 1).all()
     assert ((tile.material > 0) & (tile.material < 1)).sum() > 8
