@@ -56,14 +56,18 @@ ALONG = 1.6
 """Way of a step in the plane of the plate, in degradation lengths and per unit of `travel`: contact that sweeps
 sideways by more than that leaves gaps in the exposure."""
 
-WEAKENING = 2.8
+WEAKENING = 2.7
 """ln of what a step may take off the resistance where it acts all the time, per unit of `travel`: exposure counts as
 it is in mid-step, and a longer step leaves too little of a plate that weakens at once."""
 
+BEHIND = 0.57
+"""Length of the rings behind the core's widest station, in those ahead of it: they touch where the core swings, and
+turn it by the longest levers."""
+
 FIDELITIES = {
-    "draft": Fidelity(16, 16, 1.0, 0.5),
-    "standard": Fidelity(32, 32, 1.5, 0.36),
-    "reference": Fidelity(72, 56, 5.0, 0.05),
+    "draft": Fidelity(14, 16, 1.0, 0.5),
+    "standard": Fidelity(23, 32, 1.5, 0.37),
+    "reference": Fidelity(64, 56, 5.0, 0.05),
 }
 NODAL: dict[str, Any] = {
     "patches_axial": 36,
@@ -192,7 +196,8 @@ def azimuths_of(around: int) -> Array:
 
 
 def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, discs: bool = True) -> Rings:
-    """Divide a core's surface into `axial` rings of the profile, and rings of the discs that close it.
+    """Divide a core's surface into rings of the profile, `axial` of them per its length ahead of the widest station
+    and more behind it, and rings of the discs that close it.
 
     Rings wider than `widest` [m] radially are divided. Without `discs` it is the literal scheme's: the profile
     alone, evenly divided.
@@ -228,14 +233,14 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
 
 
 def _stations(core: Core, count: int) -> Array:
-    """Edges of the profile's rings: even, with the widest station and, unless they outnumber the rings, the jumps
-    of the slope on edges."""
-    breaks = core.breaks if len(core.breaks) < count else ()
-    inner = np.unique([*breaks, _widest_station(core)])
+    """Edges of the profile's rings: a length/count apart, BEHIND of that behind the widest station, which is one of
+    them, as are the jumps of the slope unless they outnumber the rings."""
+    breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
+    inner = np.unique([*breaks, widest])
     apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
     knots = np.array([0.0, *inner[apart[:-1] & apart[1:]], core.length])
-    spans = np.diff(knots)
-    shares = np.maximum(1, np.round(count * spans / core.length)).astype(int)
+    apiece = np.where(knots[:-1] < widest - 1e-6 * core.length, 1.0, BEHIND) * core.length / count
+    shares = np.maximum(1, np.round(np.diff(knots) / apiece)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
     return np.append(np.concatenate(edges), core.length)
 

@@ -41,8 +41,8 @@ class Numerics(_AsGiven):
         fidelity: "draft", "standard" or "reference".
         scheme: "consistent", or "nodal" for the paper's literal scheme (MODEL §4).
         time_step: [s].
-        patches_axial, patches_around: surface patches along the core and around it; a multiple of 4 around it
-            makes mirrored shots mirror exactly.
+        patches_axial, patches_around: surface patches per length of the core (the consistent scheme takes shorter ones
+            behind the widest station), and around it; a multiple of 4 around it makes mirrored shots mirror exactly.
         grid_spacing: spacing of the plate grid [m].
         precision: of the arithmetic.
         tolerance: instead of a fidelity: each hit is refined until its estimated error meets it.
