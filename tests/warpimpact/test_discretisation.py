@@ -221,6 +221,21 @@ def test_turns_are_half_the_change_of_the_normal_over_a_ring(core: Core) -> None
     np.testing.assert_array_equal(np.stack([rings.turn_axial, rings.turn_radial])[:, ~lateral], 0.0)
 
 
+@CORES
+def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
+    count = 40
+    rings = rings_of(core, count, 16, discs=True)
+    lateral = rings.half_axial != 0
+    station = core.mass_properties.centre_of_mass - rings.station[lateral]
+    length = -2 * rings.half_axial[lateral]
+    stations = np.linspace(0.0, core.length, 100_001)
+    widest = stations[np.argmax(core.radius(stations) >= (1 - 1e-9) * core.max_radius)]
+    assert length.sum() == pytest.approx(core.length)
+    for part, longest in ((station < widest, 1.0), (station > widest, discretisation.BEHIND)):
+        if part.any():
+            assert length[part].mean() == pytest.approx(longest * core.length / count, rel=0.15)
+
+
 # --- Tile ---
 
 
