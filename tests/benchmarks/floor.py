@@ -15,9 +15,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from warpimpact import Campaign, Numerics, Shots
-from warpimpact.discretisation import resolve, rings_of
-from warpimpact.history import History
-from warpimpact.simulate import trace
+from warpimpact.solver.history import History
+from warpimpact.solver.resolution import resolve
+from warpimpact.solver.rings import rings_of
+from warpimpact.solver.simulate import trace
 
 LOOK = 30
 # Closing speed from what its ring and its azimuth share, 5; depth, 2; extents along the meridian, around and by motion,

@@ -23,9 +23,9 @@ from floor import work_of
 from matplotlib.figure import Figure
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.device import DeviceError, find_device
 from warpimpact.scene import Numerics, Shots
-from warpimpact.simulate import Outcomes, simulate
+from warpimpact.solver.device import DeviceError, find_device
+from warpimpact.solver.simulate import Outcomes, simulate
 
 FIDELITIES = ("draft", "standard", "reference")
 SMALLEST, GROWTH = 1024, 4

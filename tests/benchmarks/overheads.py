@@ -22,9 +22,10 @@ import numpy as np
 from bench import CAMPAIGN, machine, seconds, shots_of, store
 from matplotlib.figure import Figure
 
-from warpimpact import Campaign, Plate, Shots, SlotPattern, results
+from warpimpact import Campaign, Plate, Shots, SlotPattern
 from warpimpact.campaign.run import run
-from warpimpact.simulate import simulate
+from warpimpact.results import files
+from warpimpact.solver.simulate import simulate
 
 COMMAND = [sys.executable, "-c", "import sys; from warpimpact.cli import main; sys.exit(main())"]
 TARGETS = {"help_seconds": 0.3, "warm_run_seconds": 2.0, "compilation_seconds": 5.0, "file_share": 0.1}
@@ -114,7 +115,7 @@ def _hits(folder: Path, largest: int) -> list[dict[str, float]]:
         int
     ):
         usage = _run(folder, int(count))
-        with results.read(folder / "result.nc") as dataset:
+        with files.read(folder / "result.nc") as dataset:
             computing = dataset.attrs["compute_time"]
         rows.append(
             {
@@ -131,10 +132,10 @@ def _hits(folder: Path, largest: int) -> list[dict[str, float]]:
 def _file_share(campaign: Campaign, folder: Path, count: int) -> float:
     """Share of a run that writing its file takes, beside the imports at a first file."""
     campaign = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
-    results.write(run(campaign, device="cpu"), folder / "first.nc")
+    files.write(run(campaign, device="cpu"), folder / "first.nc")
     begin = time.perf_counter()
     dataset = run(campaign, device="cpu")
-    writing = seconds(lambda: results.write(dataset, folder / "share.nc"))
+    writing = seconds(lambda: files.write(dataset, folder / "share.nc"))
     return writing / (time.perf_counter() - begin)
 
 

@@ -26,8 +26,8 @@ from matplotlib.figure import Figure
 
 from warpimpact import Campaign, Numerics, Shots
 from warpimpact.analysis.study import LEVELS, QUOTED, study
-from warpimpact.discretisation import Fidelity, spelt_out
-from warpimpact.simulate import simulate
+from warpimpact.solver.resolution import Fidelity, spelt_out
+from warpimpact.solver.simulate import simulate
 
 STATED = {"draft": (2.0, 5.0), "standard": (1.0, 1.0), "reference": (0.1, 0.3)}
 """What warpimpact's fidelities stand for: 90 % errors in m/s and degrees of tilt at the last stand-off."""

@@ -15,7 +15,7 @@ from bench import CAMPAIGN, copied, shots_of
 
 from warpimpact import Campaign
 from warpimpact.scene import CirclePattern, Interaction, Plate, Shots
-from warpimpact.simulate import simulate, trace
+from warpimpact.solver.simulate import simulate, trace
 
 ROUNDS = 9
 COPIES = 4

@@ -13,8 +13,8 @@ import numpy as np
 
 from warpimpact import Campaign, make_shots
 from warpimpact.scene import symmetries_used
-from warpimpact.simulate import simulate
-from warpimpact.unfold import unfolded
+from warpimpact.solver.simulate import simulate
+from warpimpact.solver.unfold import unfolded
 
 ROUNDS = 7
 CAMPAIGNS = [f"campaigns/{name}.toml" for name in ("slotted_plate", "round_holes", "oblique_shot")]

@@ -14,9 +14,9 @@ import numpy as np
 
 from warpimpact import Campaign, Hits, Numerics, make_shots
 from warpimpact.analysis.study import QUOTED, study
-from warpimpact.refine import LADDER, simulate_to_tolerance
 from warpimpact.scene import Tolerance
-from warpimpact.simulate import simulate
+from warpimpact.solver.refinement import LADDER, simulate_to_tolerance
+from warpimpact.solver.simulate import simulate
 
 ROUNDS = 3
 

@@ -7,8 +7,9 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.discretisation import azimuths_of, rings_of, tent_taps
 from warpimpact.scene import Core
+from warpimpact.solver.rings import azimuths_of, rings_of
+from warpimpact.solver.tile import tent_taps
 
 
 def records(struct: Any, device: str, **columns: Any) -> wp.array:

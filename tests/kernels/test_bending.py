@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.bending import sections_of
-from warpimpact.discretisation import rings_of
 from warpimpact.kernels import bending, contact, core_surface, rigid_body
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ProfileCore
+from warpimpact.solver.bending import sections_of
+from warpimpact.solver.rings import rings_of
 
 from .probes import poisoned_touches, surface_of
 

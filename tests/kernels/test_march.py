@@ -8,9 +8,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact import inputs, marching, simulate
 from warpimpact.kernels.status import Status
 from warpimpact.scene import CirclePattern, ConeCore, Core, Impact, Numerics, OgiveCore, Plate, PolynomialCore, Shots
+from warpimpact.solver import inputs, marching, simulate
 
 Array = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from warpimpact.discretisation import tent_taps
 from warpimpact.kernels import plate_grid
 from warpimpact.kernels.variant import Variant
+from warpimpact.solver.tile import tent_taps
 
 from .probes import plate_of, poisoned, poisoned_fields
 

@@ -12,7 +12,7 @@ import numpy as np
 from warpimpact import Campaign
 from warpimpact.analysis.paper import PUBLISHED, STANDOFFS, Row
 from warpimpact.scene import Plate, Shots, SlotPattern
-from warpimpact.simulate import simulate
+from warpimpact.solver.simulate import simulate
 
 LATTICES = [(7.0e-3, 16e-3), (7.05e-3, 16e-3), (7.1e-3, 16e-3)]
 TIME_STEPS = [1.0e-6, 1.1e-6]

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact import simulate as simulation
 from warpimpact.scene import (
     Core,
     Interaction,
@@ -18,6 +17,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
+from warpimpact.solver import simulate as simulation
 
 from . import references
 
@@ -81,7 +81,7 @@ def simulate(
     device: str = "cpu",
     **numerics: Any,
 ) -> simulation.Outcomes:
-    """`warpimpact.simulate` with the numerics spelt out."""
+    """`warpimpact.solver.simulate` with the numerics spelt out."""
     return simulation.simulate(
         core,
         plate,
@@ -133,7 +133,7 @@ def histories(
     interaction: Interaction | None = None,
     **numerics: Any,
 ) -> list[History]:
-    """`warpimpact.simulate.trace`, its columns named."""
+    """`warpimpact.solver.simulate.trace`, its columns named."""
     traced = simulation.trace(core, plate, shots, interaction=interaction, numerics=Numerics(**numerics))
     return [_history(core, rows.astype(float)) for rows in traced]
 

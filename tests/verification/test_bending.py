@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import inputs
-from warpimpact import simulate as simulation
-from warpimpact.bending import Sections, sections_of
-from warpimpact.discretisation import Rings
 from warpimpact.scene import CirclePattern, Core, Numerics, Plate, Shots
-from warpimpact.simulate import BentOutcomes, Outcomes
+from warpimpact.solver import inputs
+from warpimpact.solver import simulate as simulation
+from warpimpact.solver.bending import Sections, sections_of
+from warpimpact.solver.rings import Rings
+from warpimpact.solver.simulate import BentOutcomes, Outcomes
 
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate
 

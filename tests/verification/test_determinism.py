@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import marching
 from warpimpact.scene import Shots
-from warpimpact.simulate import Outcomes
+from warpimpact.solver import marching
+from warpimpact.solver.simulate import Outcomes
 
 from .scenes import paper_plate, scattered_hits, shots_at, simulate
 

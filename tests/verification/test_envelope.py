@@ -14,7 +14,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from warpimpact.history import History
 from warpimpact.kernels.status import Status
 from warpimpact.scene import (
     AnyPattern,
@@ -28,7 +27,8 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.simulate import Outcomes, simulate, trace
+from warpimpact.solver.history import History
+from warpimpact.solver.simulate import Outcomes, simulate, trace
 
 from .scenes import shots_at
 

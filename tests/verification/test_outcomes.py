@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import marching
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Plate, ProfileCore
+from warpimpact.solver import marching
 
 from . import references
 from .scenes import paper_plate, scattered_hits, shots_at, simulate, solid_plate

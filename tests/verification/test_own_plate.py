@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import simulate as simulation
 from warpimpact.scene import Core, Interaction, Numerics, Plate, PolynomialCore, Shots
-from warpimpact.simulate import Outcomes
+from warpimpact.solver import simulate as simulation
+from warpimpact.solver.simulate import Outcomes
 
 from . import references
 from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, solid_plate

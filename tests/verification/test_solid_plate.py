@@ -5,9 +5,10 @@ from math import pi
 import numpy as np
 import pytest
 
-from warpimpact import discretisation
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Impact, Numerics, ProfileCore
+from warpimpact.solver import inputs
+from warpimpact.solver.resolution import resolve
 
 from . import references
 from .scenes import PAPER_CORE, shots_at, simulate, solid_plate
@@ -28,10 +29,10 @@ def shoulder_tolerance(fidelity: str, shear_coefficient: float, residual: float)
     of the work and the pressure Y h 2πR |c2| l².
     """
     plate = solid_plate()
-    resolution = discretisation.resolve(Numerics(fidelity=fidelity), PAPER_CORE, plate)
+    resolution = resolve(Numerics(fidelity=fidelity), PAPER_CORE, plate)
     velocity, curvature = PAPER_SHOT["velocity"], 2 * abs(references.PAPER_COEFFICIENTS[2])
     step = resolution.step_of(Impact(velocity=velocity), plate)
-    onset = step * discretisation.onset_jump(PAPER_CORE, plate.thickness, references.PAPER_MASS, plate.resistance)
+    onset = step * inputs.onset_jump(PAPER_CORE, plate.thickness, references.PAPER_MASS, plate.resistance)
     ring, ramp = PAPER_CORE.length / resolution.patches_axial, onset / (velocity * curvature)
     length = ring / 2 + ramp / 2
     projected = curvature * ((ring / 2) ** 2 / 2 + ramp**2 / 6)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from warpimpact.scene import MaskPattern, Shots, SlotPattern
-from warpimpact.simulate import Outcomes
+from warpimpact.solver.simulate import Outcomes
 
 from .scenes import paper_plate, scattered_hits, shots_at, simulate
 

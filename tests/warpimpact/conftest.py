@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import ConeCore, results
+from warpimpact import ConeCore
 from warpimpact.campaign import parts
 from warpimpact.kernels.status import Status
+from warpimpact.results.dataset import to_dataset
+from warpimpact.results.variables import SHOT_VARIABLES
 from warpimpact.scene import Shots
-from warpimpact.variables import SHOT_VARIABLES
 
 STANDOFFS = np.array([0.05, 0.13])
 PERIOD = (16e-3, 8e-3)
@@ -70,7 +71,7 @@ def make_result() -> ResultMaker:
     def make(status: Any = 4, hits: np.ndarray | None = None, outlines: Any = (SQUARE_HOLE,)) -> xarray.Dataset:
         status = np.zeros(status, np.int8) if np.ndim(status) == 0 else np.asarray(status)
         hits = scattered_hits(len(status)) if hits is None else hits
-        return results.to_dataset(
+        return to_dataset(
             shots_at(hits),
             outcomes_of(status),
             standoffs=STANDOFFS,

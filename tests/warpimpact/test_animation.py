@@ -10,11 +10,12 @@ from matplotlib.animation import FFMpegWriter
 from matplotlib.patches import Polygon
 from PIL import Image
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.plotting import animation as film
 from warpimpact.plotting import trajectory
+from warpimpact.results import files
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 
@@ -32,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("film")
     text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
     campaign = Campaign.from_text(text, name="a", folder=folder, count=2)
-    results.write(run(campaign, device="cpu"), folder / "a.nc")
+    files.write(run(campaign, device="cpu"), folder / "a.nc")
     command = ["replay", str(folder / "a.nc"), "--hit", "1", "--animation", str(folder / "a.gif")]
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(trajectory, "save_figures", lambda *_: [])
@@ -76,5 +77,5 @@ def test_other_names_are_refused_before_computing(folder: Path, capsys: pytest.C
 
 def test_mp4_needs_ffmpeg(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with pytest.raises(results.OutputError, match=r"a\.mp4: a MP4 needs the program ffmpeg"):
+    with pytest.raises(files.OutputError, match=r"a\.mp4: a MP4 needs the program ffmpeg"):
         film.writer_for(Path("a.mp4"))

@@ -4,13 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.replay import replay
 from warpimpact.cli import main
 from warpimpact.plotting.cell import MAPPED
 from warpimpact.plotting.maps import hit_map
-from warpimpact.variables import BENDING_VARIABLES
+from warpimpact.results import files
+from warpimpact.results.variables import BENDING_VARIABLES
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 STOP = """
@@ -37,7 +38,7 @@ def written(tmp_path: Path, tail: str, *changes: tuple[str, str]) -> Path:
 def test_from_a_campaign_to_its_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, output = written(tmp_path, STOP, ("seed = 1", "seed = 1\nirreducible = true")), tmp_path / "a.nc"
     assert main(["run", str(path), "-o", str(output), "--device", "cpu"]) == 0
-    dataset = results.read(output)
+    dataset = files.read(output)
     assert {dataset[name].attrs["units"] for name in BENDING_VARIABLES} == {"N m", "m", "Pa"}
     stress = dataset["bending_stress"].values
     assert dataset.attrs["estimate"] == pytest.approx((stress > 1.5e9).mean())

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 import xarray
 
-from warpimpact import results
 from warpimpact.cli import main
+from warpimpact.results import files
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 
@@ -134,7 +134,7 @@ def test_results_are_drawn_beside_each_other(
 ) -> None:
     Path("b").mkdir()
     for path in ("a.nc", "b/a.nc"):
-        results.write(make_result(100), Path(path))
+        files.write(make_result(100), Path(path))
     assert main(["plot", "a.nc", "b/a.nc"]) == 0
     assert capsys.readouterr().out.split() == [
         f"a_a_{name}.png" for name in ("residual_velocity", "deflection", "tilt")

@@ -11,7 +11,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.run import Standing, run_to_file
 from warpimpact.campaign.team import _compute_alike, cluster_team
 from warpimpact.cli import main
-from warpimpact.device import DeviceError
+from warpimpact.solver.device import DeviceError
 
 distributed = pytest.importorskip("distributed")
 

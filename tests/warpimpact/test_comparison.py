@@ -11,17 +11,18 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.analysis.comparison import Comparison, Difference, compare, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.intervals import estimate_of
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Standing
 from warpimpact.cli import main
 from warpimpact.plotting import comparison_figure
-from warpimpact.results import ResultError
+from warpimpact.results import files
+from warpimpact.results.files import ResultError
+from warpimpact.statistics.intervals import estimate_of
 
 pytestmark = pytest.mark.usefixtures("small_shards")
 TWO_PLATES = Path(__file__).parents[2] / "campaigns" / "two_plates.toml"
@@ -217,7 +218,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert Path("slots.nc").stat() == before
     assert main(["compare", "slots.nc", "round holes.nc"]) == 0
     assert capsys.readouterr().out == shown.replace("two.png", "comparison.png")
-    stored = results.read(Path("slots.nc"))
+    stored = files.read(Path("slots.nc"))
     assert stored.attrs["title"].endswith(": slots")
     assert replay(stored, 3, folder=folder).attrs["agreement"] == "bit-identical"
     assert effectiveness(stored)[0].ratio > 0.0

@@ -2,8 +2,8 @@
 
 import warp as wp
 
-from warpimpact.device import find_device, load
 from warpimpact.kernels.variant import Variant
+from warpimpact.solver.device import find_device, load
 
 
 def test_kernel_is_compiled_for_the_launches_to_come_and_for_nothing_else() -> None:

@@ -7,17 +7,6 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from warpimpact import discretisation
-from warpimpact.discretisation import (
-    FIDELITIES,
-    NODAL,
-    azimuths_of,
-    onset_jump,
-    resolve,
-    rings_of,
-    tent_taps,
-    tile_of,
-)
 from warpimpact.scene import (
     CirclePattern,
     ConeCore,
@@ -32,6 +21,11 @@ from warpimpact.scene import (
     SlotPattern,
     TrianglePattern,
 )
+from warpimpact.solver import inputs
+from warpimpact.solver.inputs import onset_jump
+from warpimpact.solver.resolution import FASTEST_DECAY, FIDELITIES, NODAL, SLENDER, WEAKENING, decay_rate, resolve
+from warpimpact.solver.rings import BEHIND, azimuths_of, rings_of
+from warpimpact.solver.tile import BLUR, FINER, SUBSAMPLES, tent_taps, tile_of
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, density=7850.0)
@@ -94,7 +88,7 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(fidelity: str) -> None:
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
     way = 800.0 * resolve(Numerics(), PAPER, PLATE).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
     standard = FIDELITIES["standard"].travel
-    np.testing.assert_allclose(way, [standard * 1e-3, standard * discretisation.SLENDER * PAPER.length])
+    np.testing.assert_allclose(way, [standard * 1e-3, standard * SLENDER * PAPER.length])
 
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
@@ -105,7 +99,7 @@ def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
         step = resolution.step_of(Impact(velocity=velocity), plate)
         bound = np.inf if degradation == 1.0 else 0.0
         if 0.0 < degradation < 1.0:
-            bound = discretisation.WEAKENING * FIDELITIES["standard"].travel * interval / -np.log(degradation)
+            bound = WEAKENING * FIDELITIES["standard"].travel * interval / -np.log(degradation)
         assert step == pytest.approx(min(free, max(bound, 0.25 * free)))
 
 
@@ -115,16 +109,16 @@ def test_onset_is_a_share_of_what_a_wall_does_in_one_step() -> None:
     wall = 2 * PAPER.max_radius * 4e-3
     longest = 2 * PAPER.max_radius * PAPER.length
     jumps = onset_jump(PAPER, np.array([4e-3, 1.0]), mass * np.array([1.0, 2.0]), np.array([2.6e9, 1e9]))
-    share = discretisation.ONSET / mass
+    share = inputs.ONSET / mass
     np.testing.assert_allclose(jumps, [share * 2.6e9 * wall, share * 0.5e9 * longest])
     assert onset_jump(PAPER, 4e-3, mass, 0.0) > 0.0
 
 
 def test_decay_rate_is_that_of_an_interval_of_contact() -> None:
-    rates = discretisation.decay_rate(np.array([0.8, 1.0, 0.0]), 2e-6)
+    rates = decay_rate(np.array([0.8, 1.0, 0.0]), 2e-6)
     np.testing.assert_allclose(0.8, np.exp(rates[0] * 2e-6), rtol=1e-15)
     assert rates[1] == 0.0
-    assert rates[2] == -discretisation.FASTEST_DECAY
+    assert rates[2] == -FASTEST_DECAY
 
 
 # --- Rings ---
@@ -231,7 +225,7 @@ def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
     stations = np.linspace(0.0, core.length, 100_001)
     widest = stations[np.argmax(core.radius(stations) >= (1 - 1e-9) * core.max_radius)]
     assert length.sum() == pytest.approx(core.length)
-    for part, longest in ((station < widest, 1.0), (station > widest, discretisation.BEHIND)):
+    for part, longest in ((station < widest, 1.0), (station > widest, BEHIND)):
         if part.any():
             assert length[part].mean() == pytest.approx(longest * core.length / count, rel=0.15)
 
@@ -242,7 +236,7 @@ def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
 @pytest.mark.parametrize("pattern", PATTERNS, ids=lambda pattern: pattern.shape)
 def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
     plate = PLATE.model_copy(update={"pattern": pattern})
-    spacing = 0.25e-3 / discretisation.FINER  # the tile's, where the grid's is 0.25 mm
+    spacing = 0.25e-3 / FINER  # the tile's, where the grid's is 0.25 mm
     tile = tile_of(plate, spacing)
     assert tile.material.mean() == pytest.approx(1 - pattern.open_area, abs=5e-4)
     assert tile.material.min() == 0.0
@@ -257,14 +251,14 @@ def test_tile_looks_closely_only_where_edges_are_and_misses_none() -> None:
     hairlines = SlotPattern(length="6 mm", width="0.05 mm", spacing=["12 mm", "8 mm"], holes=holes)
     plate = PLATE.model_copy(update={"pattern": hairlines})
     tile = tile_of(plate, 0.25e-3)
-    samples = discretisation.SUBSAMPLES
+    samples = SUBSAMPLES
     y, z = (
         (np.arange(samples * n) + 0.5) * d / samples
         for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True)
     )
     solid = ~hairlines.is_hole(y[:, None], z)
     sharp = solid.reshape(tile.material.shape[0], samples, -1, samples).mean(axis=(1, 3))
-    shares = ndimage.uniform_filter(sharp, discretisation.BLUR, mode="wrap")
+    shares = ndimage.uniform_filter(sharp, BLUR, mode="wrap")
     np.testing.assert_allclose(tile.material, shares, rtol=0, atol=1.5 / samples**2)  # rounding decides on edges
     assert (~np.isclose(tile.material, shares)).mean() < 1e-2
     assert 0.0 < 1.0 - tile.material.mean() < 0.01
@@ -289,7 +283,7 @@ def test_tile_tells_material_from_holes_by_area() -> None:
     tile = tile_of(plate, 0.5e-3)
     y, z = ((np.arange(n) + 0.5) * 0.5e-3 for n in tile.material.shape)
     distance = np.hypot(np.minimum(y, 8e-3 - y)[:, None], np.minimum(z, 10e-3 - z))
-    diagonal = discretisation.BLUR * 0.5e-3 / np.sqrt(2)
+    diagonal = BLUR * 0.5e-3 / np.sqrt(2)
     assert (tile.material[distance < 2.5e-3 - diagonal] == 0).all()
     assert (tile.material[distance > 2.5e-3 + diagonal] == 1).all()
     assert ((tile.material > 0) & (tile.material < 1)).sum() > 8

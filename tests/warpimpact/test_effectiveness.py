@@ -9,9 +9,9 @@ import xarray
 
 from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiveness_text, worst_tenth
 from warpimpact.analysis.inspect import inspect_text
-from warpimpact.campaign.intervals import estimate_of
 from warpimpact.kernels.status import Status
-from warpimpact.results import ResultError
+from warpimpact.results.files import ResultError
+from warpimpact.statistics.intervals import estimate_of
 
 TRIALS = 100
 LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.analysis.summary import summary_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.estimates import Measure, Tally, looks
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
 from warpimpact.kernels.status import Status
+from warpimpact.results import files
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -208,7 +209,7 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
         run_to_file(scene, resumed, device="cpu", progress=interrupt)
     run_to_file(scene, resumed, device="cpu", resume=True)
     assert_same_bits(straight, resumed)
-    stored = results.read(resumed)
+    stored = files.read(resumed)
     assert stored.sizes == dataset.sizes
     assert stored.attrs["estimate"] == told["estimate"]
     assert "P(tilt@130mm > 30 deg) = 0." in summary_text(stored)

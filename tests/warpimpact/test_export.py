@@ -10,13 +10,14 @@ import pandas as pd
 import pytest
 import xarray
 
-from warpimpact import Campaign, results, to_dataframe
+from warpimpact import Campaign, to_dataframe
 from warpimpact.analysis import summary
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.export.paraview import AROUND, write_vtk
 from warpimpact.kernels.status import Status
+from warpimpact.results import files
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
@@ -41,7 +42,7 @@ def test_csv_holds_every_bit_whatever_the_slices(
     make_result: ResultMaker, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dataset = make_result(np.tile(MIXED, 5))
-    results.write(dataset, tmp_path / "a.nc")
+    files.write(dataset, tmp_path / "a.nc")
     assert main(["export", str(tmp_path / "a.nc")]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'a.csv'}\n"
     read = pd.read_csv(tmp_path / "a.csv", index_col="hit", engine="python")
@@ -98,7 +99,7 @@ def test_command_writes_a_new_folder_for_a_hit(
     history: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("pyvista")
-    results.write(history, tmp_path / "hit.nc")
+    files.write(history, tmp_path / "hit.nc")
     assert main(["export", str(tmp_path / "hit.nc")]) == 0
     assert capsys.readouterr().out == "".join(f"{tmp_path / 'hit_vtk' / name}.pvd\n" for name in ("core", "plate"))
     assert main(["export", str(tmp_path / "hit.nc")]) == 2
@@ -110,6 +111,6 @@ def test_without_pyvista_the_way_to_it_is_told(
     history: xarray.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyvista", None)
-    with pytest.raises(results.OutputError, match=r"hit: VTK needs PyVista: pip install 'warpimpact\[vtk\]'"):
+    with pytest.raises(files.OutputError, match=r"hit: VTK needs PyVista: pip install 'warpimpact\[vtk\]'"):
         write_vtk(history, tmp_path / "hit")
     assert not list(tmp_path.iterdir())

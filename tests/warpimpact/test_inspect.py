@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.analysis.inspect import failures, inspect_text
 from warpimpact.campaign.run import run_to_file
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
+from warpimpact.results import files
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 512")
@@ -32,7 +33,7 @@ def test_it_tells_origin_and_numbers_with_intervals(result: Path, capsys: pytest
     assert plate.split() in lines
     assert next(line for line in lines if line[:1] == ["perforated"])[1] == "100.00%"
     # Eight replicates of 64 hits: Student's interval over their means, by hand.
-    velocity = results.read(result)["residual_velocity"].values
+    velocity = files.read(result)["residual_velocity"].values
     means = np.array([velocity[replicate::8].mean() for replicate in range(8)])
     half = 2.364624 * means.std(ddof=1) / np.sqrt(8)  # t of 7 degrees of freedom, 97.5 %
     row = next(line for line in lines if line[:4] == ["residual", "velocity,", "m/s", "mean"])
@@ -47,7 +48,7 @@ def test_it_gives_the_campaign_back(result: Path, capsys: pytest.CaptureFixture[
 
 
 def test_slices_change_nothing(result: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    dataset = results.read(result)
+    dataset = files.read(result)
     whole = inspect_text(dataset)
     monkeypatch.setattr("warpimpact.analysis.summary.SLICE", 100)
     assert inspect_text(dataset) == whole
@@ -76,7 +77,7 @@ def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_r
 def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
     allowed: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("warpimpact.inputs.STEP_ALLOWANCE", 0.01)  # no shot ends so soon
+    monkeypatch.setattr("warpimpact.solver.inputs.STEP_ALLOWANCE", 0.01)  # no shot ends so soon
     text = DRAFT.replace("count = 512", "count = 300") + f"failed_share = {allowed}\n"
     (tmp_path / "a.toml").write_text(text, encoding="utf-8")
     output = tmp_path / "a.nc"
@@ -85,7 +86,7 @@ def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
     assert "300 failed" in shown.err
     told = "1 of the shots failed, more than output.failed_share = 0.5" in shown.err
     assert told == (code == 3)
-    assert (results.read(output)["status"] == Status.UNFINISHED).all()
+    assert (files.read(output)["status"] == Status.UNFINISHED).all()
     assert main(["inspect", str(output)]) == 0
     shown = capsys.readouterr().out
     assert "300 of 300 shots failed" in shown

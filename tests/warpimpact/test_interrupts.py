@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from warpimpact.interrupts import uninterrupted
+from warpimpact.results.interrupts import uninterrupted
 
 
 @pytest.fixture

@@ -7,11 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, marching, results, simulate
+from warpimpact import Campaign
 from warpimpact.campaign.run import run_to_file
 from warpimpact.kernels.status import Status
+from warpimpact.results import files
 from warpimpact.scene import Shots
-from warpimpact.simulate import Outcomes
+from warpimpact.solver import marching, simulate
+from warpimpact.solver.simulate import Outcomes
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -49,9 +51,9 @@ def test_memory_does_not_grow_with_the_count(
     finally:
         tracemalloc.stop()
     numbers = 8 + 7 + 4 * 2  # of a shot, and of its outcome at two stand-offs
-    with results.opened(output) as dataset:
+    with files.opened(output) as dataset:
         assert dataset.sizes["hit"] == count
-        assert dataset["tilt"].encoding["chunksizes"] == (results.CHUNK, 2)
+        assert dataset["tilt"].encoding["chunksizes"] == (files.CHUNK, 2)
         assert (dataset["status"] == Status.PERFORATED).all()
     assert peak < count * numbers * 8 / 3  # bytes; a third of what the result takes
 

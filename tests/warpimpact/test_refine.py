@@ -8,10 +8,11 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.campaign.replay import replay
-from warpimpact.discretisation import resolve, rings_of
-from warpimpact.refine import LADDER, simulate_to_tolerance
 from warpimpact.scene import Core, Hits, Impact, Numerics, Plate, PolynomialCore, Shots, SlotPattern, make_shots
-from warpimpact.simulate import Outcomes, simulate
+from warpimpact.solver.refinement import LADDER, simulate_to_tolerance
+from warpimpact.solver.resolution import resolve
+from warpimpact.solver.rings import rings_of
+from warpimpact.solver.simulate import Outcomes, simulate
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 PLATE = Plate(
@@ -67,7 +68,7 @@ def test_costs_less_than_every_hit_on_the_finest_level_used(monkeypatch: pytest.
         work.append(patch_steps(shots, how["numerics"], outcomes))
         return outcomes
 
-    monkeypatch.setattr("warpimpact.refine.simulate", counted)
+    monkeypatch.setattr("warpimpact.solver.refinement.simulate", counted)
     _, estimates = simulate_to_tolerance(
         CORE, PLATE, shots(64), numerics=Numerics(tolerance=TOLERANCE), standoffs=STANDOFFS, device="cpu"
     )
@@ -88,7 +89,7 @@ def test_a_hit_does_not_depend_on_its_company() -> None:
 
 
 def test_what_no_level_meets_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.refine.LADDER", LADDER[:2])
+    monkeypatch.setattr("warpimpact.solver.refinement.LADDER", LADDER[:2])
     numerics = Numerics(tolerance={"residual_velocity": 1e-6})
     _, estimates = simulate_to_tolerance(CORE, PLATE, shots(4), numerics=numerics, standoffs=STANDOFFS, device="cpu")
     assert not estimates.converged.any()

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, CirclePattern, Hits, Impact, NoPattern, Numerics, Plate, PolynomialCore, results
+from warpimpact import Campaign, CirclePattern, Hits, Impact, NoPattern, Numerics, Plate, PolynomialCore
 from warpimpact.campaign.campaign import CampaignError, Output
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.results import ResultError
+from warpimpact.results import files
+from warpimpact.results.files import ResultError
+from warpimpact.results.variables import HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.scene import Interaction
-from warpimpact.variables import HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 NOWHERE = Path("nowhere")
@@ -40,8 +41,8 @@ def campaign(**changes: Any) -> Campaign:
 
 def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
     """The result as a file gives it back."""
-    results.write(result, path)
-    return results.read(path)
+    files.write(result, path)
+    return files.read(path)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +185,7 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
 def test_command_writes_history_and_figures(
     result: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    results.write(result, tmp_path / "a.nc")
+    files.write(result, tmp_path / "a.nc")
     command = ["replay", str(tmp_path / "a.nc"), "--hit", "2"]
     assert main(command) == 0
     shown = capsys.readouterr().out

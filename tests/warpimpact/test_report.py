@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness, number_text
 from warpimpact.campaign.campaign import CampaignError
@@ -21,6 +21,7 @@ from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.trajectory import poses_behind, poses_in_plate, silhouette
 from warpimpact.report import hits, report
+from warpimpact.results import files
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 TRAJECTORIES = 6
@@ -40,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
     for name, width in (("narrow", "4 mm"), ("<b>wide", "5 mm")):
         changed = text.replace('width = "4 mm"', f'width = "{width}"').replace("7.62 mm", f"{name} </script>")
-        results.write(
+        files.write(
             run(Campaign.from_text(changed, name=name, folder=folder, count=400), device="cpu"), folder / f"{name}.nc"
         )
     command = ["report", *(str(folder / f"{name}.nc") for name in ("narrow", "<b>wide")), "-o", str(folder / "a.html")]
@@ -51,7 +52,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
     page = data_of(folder / "a.html")
     for name, shown in zip(("narrow", "<b>wide"), page["results"], strict=True):
-        dataset = results.read(folder / f"{name}.nc")
+        dataset = files.read(folder / f"{name}.nc")
         assert shown["number"] == list(range(400))
         np.testing.assert_allclose(shown["y"], dataset["hit_y"] * 1e3, rtol=1e-4)
         np.testing.assert_allclose(shown["columns"]["tilt at 130 mm"], dataset["tilt"][:, 1], rtol=1e-4)
@@ -67,7 +68,7 @@ def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
 
 
 def test_outlines_keep_the_shape_with_few_points(folder: Path) -> None:
-    history = replay(results.read(folder / "narrow.nc"), 3, folder=folder)
+    history = replay(files.read(folder / "narrow.nc"), 3, folder=folder)
     drawn = hits.trajectory_data(history)
     for part, poses in (("inside", poses_in_plate(history)), ("behind", poses_behind(history))):
         for core, pose in zip(drawn[part], poses.values(), strict=True):
@@ -86,7 +87,7 @@ def area(polygon: np.ndarray) -> float:
 def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
     text = html.unescape(re.sub(r"<[^>]*>", " ", (folder / "a.html").read_text()))
     for name in ("narrow", "<b>wide"):
-        for measure in effectiveness(results.read(folder / f"{name}.nc")):
+        for measure in effectiveness(files.read(folder / f"{name}.nc")):
             numbers = (measure.value, measure.solid, measure.ratio)
             row = r"\s+.*\s+".join(re.escape(number_text(number)) for number in numbers)
             assert re.search(rf"{re.escape(measure.label)}.*\s+{row}", text)
@@ -96,10 +97,10 @@ def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
 def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_path: Path) -> None:
     text = html.unescape((folder / "a.html").read_text())
     names = ["narrow", "<b>wide"]
-    with results.opened(folder / "narrow.nc") as narrow, results.opened(folder / "<b>wide.nc") as wide:
+    with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
         assert comparison_text(compare([narrow, wide], names)) in text
     assert text.count('<img src="data:image/png;base64,') == 1
-    results.write(make_result(100), tmp_path / "other.nc")
+    files.write(make_result(100), tmp_path / "other.nc")
     page = tmp_path / "a.html"
     command = ["report", str(folder / "narrow.nc"), str(tmp_path / "other.nc"), "-o", str(page), "--trajectories", "0"]
     assert main(command) == 0
@@ -121,7 +122,7 @@ def test_large_results_are_thinned_evenly_and_it_is_said(
     make_result: ResultMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dataset = make_result(5000)
-    results.write(dataset, tmp_path / "a.nc")
+    files.write(dataset, tmp_path / "a.nc")
     monkeypatch.setattr(report, "MOST_HITS", 1000)
     assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
     assert "the map shows 1000 of the 5000 hits" in (tmp_path / "a.html").read_text()
@@ -160,7 +161,7 @@ def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: Re
 
 @pytest.mark.parametrize("status", [Status.ARRESTED, Status.MISSED])
 def test_hits_without_values_or_cover_are_reported(make_result: ResultMaker, tmp_path: Path, status: Status) -> None:
-    results.write(make_result([status] * 8), tmp_path / "a.nc")
+    files.write(make_result([status] * 8), tmp_path / "a.nc")
     assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
     (shown,) = data_of(tmp_path / "a.html")["results"]
     assert shown["nearest"] is None
@@ -246,7 +247,7 @@ class Browser:
 
 @pytest.mark.parametrize("width", [1280, 390])
 def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Browser, folder: Path, width: int) -> None:
-    dataset = results.read(folder / "narrow.nc")
+    dataset = files.read(folder / "narrow.nc")
     points = np.stack([dataset["hit_y"], dataset["hit_z"]], axis=-1)
     place = np.array([-3e-3, 2.5e-3])
     near = np.argsort(np.linalg.norm(points - place, axis=1))[:6].tolist()
@@ -289,7 +290,7 @@ def test_browser_changes_the_map_and_keeps_one_scale(browser: Browser, folder: P
         )
         assert scales[0] == scales[1]
         if key == "tilt at 130 mm":
-            largest = max(float(results.read(folder / f"{name}.nc")["tilt"].max()) for name in ("narrow", "<b>wide"))
+            largest = max(float(files.read(folder / f"{name}.nc")["tilt"].max()) for name in ("narrow", "<b>wide"))
             assert scales[0][1] == pytest.approx(largest, rel=1e-4)
         if key == "pitch at 50 mm":
             assert scales[0][0] == -scales[0][1]

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import results
 from warpimpact.kernels.status import Status
+from warpimpact.results import files
+from warpimpact.results.dataset import status_codes
+from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SCATTER_VARIABLES, SHOT_VARIABLES
 from warpimpact.scene import Shots
-from warpimpact.simulate import BentOutcomes, Outcomes
-from warpimpact.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SCATTER_VARIABLES, SHOT_VARIABLES
+from warpimpact.solver.simulate import BentOutcomes, Outcomes
 
 CONTRACT = {
     "hit_y": (("hit",), "m"),
@@ -71,7 +72,7 @@ def test_angles_become_degrees_and_the_rest_stays_si(make_result):
 
 def test_what_does_not_exist_stays_nan_in_the_file(make_result, tmp_path):
     path = tmp_path / "out.nc"
-    results.write(make_result([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]), path)
+    files.write(make_result([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]), path)
     with xarray.open_dataset(path) as file:
         for name in ("tilt", "pitch", "yaw", "total_yaw"):
             assert np.isnan(file[name].values).all(axis=1).tolist() == [False, True, True, False]
@@ -80,7 +81,7 @@ def test_what_does_not_exist_stays_nan_in_the_file(make_result, tmp_path):
 
 def test_status_carries_its_flags(make_result, tmp_path):
     path = tmp_path / "out.nc"
-    results.write(make_result(), path)
+    files.write(make_result(), path)
     with netCDF4.Dataset(path) as file:
         attributes = file["status"].__dict__
     assert attributes["flag_values"].dtype == np.int8
@@ -91,7 +92,7 @@ def test_status_carries_its_flags(make_result, tmp_path):
 
 
 def test_status_codes_reads_the_flags(make_result):
-    codes = results.status_codes(make_result())
+    codes = status_codes(make_result())
     assert codes["arrested"] == Status.ARRESTED
     assert codes["not_finite"] == Status.NOT_FINITE
     assert len(codes) == len(Status)
@@ -117,15 +118,15 @@ def test_outlines_are_separated_by_nan(make_result):
 def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, outlines):
     dataset = make_result([Status.PERFORATED, Status.ARRESTED], outlines=outlines)
     path = tmp_path / "out.nc"
-    results.write(dataset, path)
+    files.write(dataset, path)
     with xarray.open_dataset(path) as file:
         xarray.testing.assert_identical(file.load(), dataset)
-    xarray.testing.assert_identical(results.read(path), dataset)
+    xarray.testing.assert_identical(files.read(path), dataset)
 
 
 def test_coordinates_have_no_fill_value(make_result, tmp_path):
     path = tmp_path / "out.nc"
-    results.write(make_result(), path)
+    files.write(make_result(), path)
     with netCDF4.Dataset(path) as file:
         assert not any("_FillValue" in file[name].ncattrs() for name in ("hit_y", "hit_z", "standoff", "axis"))
 
@@ -133,8 +134,8 @@ def test_coordinates_have_no_fill_value(make_result, tmp_path):
 def test_write_replaces_an_existing_file(make_result, tmp_path):
     path = tmp_path / "out.nc"
     path.write_text("old")
-    results.write(make_result(3), path)
-    assert results.read(path).sizes["hit"] == 3
+    files.write(make_result(3), path)
+    assert files.read(path).sizes["hit"] == 3
     assert os.listdir(tmp_path) == ["out.nc"]
 
 
@@ -151,8 +152,8 @@ def break_off(error: BaseException):
 @pytest.mark.parametrize(
     ("error", "raised"),
     [
-        (OSError("disk full"), results.OutputError),
-        (RuntimeError("NetCDF: HDF error"), results.OutputError),
+        (OSError("disk full"), files.OutputError),
+        (RuntimeError("NetCDF: HDF error"), files.OutputError),
         (KeyboardInterrupt(), KeyboardInterrupt),
     ],
 )
@@ -162,47 +163,47 @@ def test_breaking_off_leaves_the_folder_as_it_was(make_result, tmp_path, monkeyp
         (tmp_path / name).write_text(text)
     monkeypatch.setattr(xarray.Dataset, "to_netcdf", break_off(error))
     with pytest.raises(raised):
-        results.write(make_result(), tmp_path / "out.nc")
+        files.write(make_result(), tmp_path / "out.nc")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before
 
 
 def test_failure_inside_netcdf_leaves_nothing_behind(make_result, tmp_path):
     dataset = make_result().assign_attrs(campaign={"not": "an attribute"})
     with pytest.raises(TypeError):
-        results.write(dataset, tmp_path / "out.nc")
+        files.write(dataset, tmp_path / "out.nc")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_failing_rename_keeps_the_existing_file(make_result, tmp_path):
     path = tmp_path / "out.nc"
     path.mkdir()
-    with pytest.raises(results.OutputError, match=r"out\.nc: cannot be written"):
-        results.write(make_result(), path)
+    with pytest.raises(files.OutputError, match=r"out\.nc: cannot be written"):
+        files.write(make_result(), path)
     assert os.listdir(tmp_path) == ["out.nc"]
 
 
 def test_absent_folder_is_an_output_error(make_result, tmp_path):
-    with pytest.raises(results.OutputError, match="cannot be written"):
-        results.write(make_result(), tmp_path / "absent" / "out.nc")
+    with pytest.raises(files.OutputError, match="cannot be written"):
+        files.write(make_result(), tmp_path / "absent" / "out.nc")
 
 
 def test_reading_an_absent_file_says_so(tmp_path):
-    with pytest.raises(results.ResultError, match=r"absent\.nc: cannot be read"):
-        results.read(tmp_path / "absent.nc")
+    with pytest.raises(files.ResultError, match=r"absent\.nc: cannot be read"):
+        files.read(tmp_path / "absent.nc")
 
 
 def test_reading_a_text_file_says_so(tmp_path):
     path = tmp_path / "notes.nc"
     path.write_text("not netCDF")
-    with pytest.raises(results.ResultError, match=r"notes\.nc: cannot be read"):
-        results.read(path)
+    with pytest.raises(files.ResultError, match=r"notes\.nc: cannot be read"):
+        files.read(path)
 
 
 def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
     path = tmp_path / "other.nc"
     make_result().drop_vars("tilt").to_netcdf(path)
-    with pytest.raises(results.ResultError, match='not a warpimpact result, it has no variable "tilt"'):
-        results.read(path)
+    with pytest.raises(files.ResultError, match='not a warpimpact result, it has no variable "tilt"'):
+        files.read(path)
 
 
 def test_every_field_of_shots_and_outcomes_has_a_variable():

@@ -17,11 +17,12 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.campaign import parts
 from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
-from warpimpact.results import OutputError
+from warpimpact.results import files
+from warpimpact.results.files import OutputError
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -162,7 +163,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
 
 
 def test_a_result_in_memory_has_the_same_bits(campaign: Campaign, undisturbed: Path) -> None:
-    dataset, stored = run(campaign, device="cpu"), results.read(undisturbed)
+    dataset, stored = run(campaign, device="cpu"), files.read(undisturbed)
     assert dataset.sizes == stored.sizes
     for name in stored.variables:
         assert np.array_equal(dataset[name], stored[name], equal_nan=dataset[name].dtype.kind == "f")
@@ -276,7 +277,7 @@ def test_a_damaged_shard_is_computed_again(
 def test_shards_are_results_that_xarray_opens_together(broken_off: Path, undisturbed: Path) -> None:
     pytest.importorskip("dask")
     paths = sorted(broken_off.with_name("a.nc.parts").glob("hits_*.nc"))
-    whole = results.read(undisturbed)
+    whole = files.read(undisturbed)
     with xarray.open_mfdataset(
         paths, combine="nested", concat_dim="hit", data_vars="minimal", coords="minimal", compat="override"
     ) as together:

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from warpimpact import Campaign, Impact, Plate, results
+from warpimpact import Campaign, Impact, Plate
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.compute import compute
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
+from warpimpact.results import files
+from warpimpact.results.variables import OUTCOME_VARIABLES
 from warpimpact.scene import Hits, NoPattern, Numerics, Sampler, Scatter, Shots
 from warpimpact.scene.scatter import QUANTITIES
-from warpimpact.variables import OUTCOME_VARIABLES
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())
@@ -201,7 +202,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     run_to_file(campaign, tmp_path / "straight.nc", device="cpu")
     assert_same_bits(tmp_path / "a.nc", tmp_path / "straight.nc")
 
-    dataset, shots = results.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
+    dataset, shots = files.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
     for name in OWN:
         assert np.array_equal(dataset[name], shots.columns[name])
         assert len(np.unique(dataset[name])) == count

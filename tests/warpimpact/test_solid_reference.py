@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, results
+from warpimpact import Campaign
 from warpimpact.campaign import run as run_module
 from warpimpact.campaign import team
 from warpimpact.campaign.run import run, run_to_file
 from warpimpact.kernels.status import Status
+from warpimpact.results import files
 
 SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 SMALL = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 600")
@@ -74,7 +75,7 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_as
 def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_module, "_MOST_SOLID", 100)
     dataset = computed(tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '))
-    solid = results.solid_reference(dataset)
+    solid = dataset.solid_reference(dataset)
     assert solid.sizes["hit"] == 100
     np.testing.assert_array_equal(solid["impact_velocity"], dataset["impact_velocity"][:100])
     order = np.argsort(solid["impact_velocity"].values)
@@ -88,4 +89,4 @@ def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(team, "_task_size", lambda kind: 2**17)
     run_to_file(campaign, tmp_path / "many.nc", device="cpu")
     assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
-    assert solids(results.read(tmp_path / "many.nc"))
+    assert solids(files.read(tmp_path / "many.nc"))

@@ -25,12 +25,12 @@ from warpimpact.analysis.study import (
 )
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
-from warpimpact.discretisation import FIDELITIES, Fidelity, resolve, spelt_out
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import study_figure
-from warpimpact.results import write
+from warpimpact.results.files import write
+from warpimpact.results.variables import STUDY_COORDINATES, STUDY_VARIABLES
 from warpimpact.scene import Numerics, Shots
-from warpimpact.variables import STUDY_COORDINATES, STUDY_VARIABLES
+from warpimpact.solver.resolution import FIDELITIES, Fidelity, resolve, spelt_out
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 LADDER = {"coarse": Fidelity(8, 16, 1.0, 0.8), "middle": Fidelity(16, 32, 2.0, 0.4), "fine": Fidelity(32, 64, 4.0, 0.2)}

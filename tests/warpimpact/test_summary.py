@@ -5,7 +5,7 @@ import pytest
 
 from warpimpact.analysis.summary import summary, summary_text
 from warpimpact.kernels.status import Status
-from warpimpact.results import passed
+from warpimpact.results.dataset import passed
 
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED, Status.UNFINISHED]
 

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign, Hits, Impact, MaskPattern, Numerics, Plate, PolynomialCore, SlotPattern, results, run
-from warpimpact import simulate as simulation
+from warpimpact import Campaign, Hits, Impact, MaskPattern, Numerics, Plate, PolynomialCore, SlotPattern, run
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.summary import estimated
 from warpimpact.campaign import compute as computing
@@ -19,11 +18,13 @@ from warpimpact.campaign.estimates import Measure, Stop, Tally
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, run_to_file
 from warpimpact.cli import main
-from warpimpact.history import History
-from warpimpact.refine import LADDER
+from warpimpact.results import files
+from warpimpact.results.variables import ESTIMATE_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
-from warpimpact.unfold import image_of
-from warpimpact.variables import ESTIMATE_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
+from warpimpact.solver import simulate as simulation
+from warpimpact.solver.history import History
+from warpimpact.solver.refinement import LADDER
+from warpimpact.solver.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
@@ -138,8 +139,8 @@ def test_a_tolerance_run_is_unfolded_with_its_estimates(tmp_path: Path) -> None:
 @pytest.mark.parametrize("impact", [STRAIGHT, PITCHED], ids=["straight", "pitched"])
 def test_every_image_replays_to_the_bits_of_its_outcome(impact: Impact, tmp_path: Path) -> None:
     scene = campaign(impact=impact, count=16, numerics=Numerics(fidelity="draft"))
-    results.write(run(scene, device="cpu"), tmp_path / "a.nc")
-    stored = results.read(tmp_path / "a.nc")
+    files.write(run(scene, device="cpu"), tmp_path / "a.nc")
+    stored = files.read(tmp_path / "a.nc")
     for hit in range(8, 16):
         history = replay(stored, hit, folder=tmp_path)
         assert history.attrs["agreement"] == "bit-identical"
@@ -221,11 +222,11 @@ def test_an_unfolded_run_is_streamed_resumed_and_replayed(
     with pytest.raises(Interrupted):
         run_to_file(scene, resumed, device="cpu", progress=interrupt)
     for path in resumed.with_name("resumed.nc.parts").glob("*.nc"):
-        shard = results.read(path)
+        shard = files.read(path)
         assert shard.attrs["computed_hits"] == shard.sizes["hit"] // 8
     run_to_file(scene, resumed, device="cpu", resume=True)
     assert_same_bits(straight, resumed)
-    stored = results.read(resumed)
+    stored = files.read(resumed)
     assert stored.sizes["hit"] == 1096
     assert stored.attrs["computed_hits"] == 137
     assert stored.attrs["hits_per_second"] == pytest.approx(137 / stored.attrs["compute_time"])

@@ -2,7 +2,7 @@
 
 Shot k hits every plate at the same place of its unit cell under the same conditions. What the shots have in common
 then drops out of the differences (common random numbers), which are means of differences shot by shot and have their
-intervals (campaign/intervals.py). Plates that were hit by other shots are compared as independent, by G. Y. Zou and
+intervals (statistics/intervals.py). Plates that were hit by other shots are compared as independent, by G. Y. Zou and
 A. Donner's interval of a difference from the intervals of its two parts (Statistics in Medicine 27 (2008) 1693).
 
 The intervals of all pairs of plates hold together, for each measure on its own: each has its share of the error
@@ -24,10 +24,10 @@ import xarray
 from warpimpact.analysis.effectiveness import ANGLE, SHOWN_UNITS, Evidence, Measure, dealing, gather, interval_text
 from warpimpact.analysis.effectiveness import number_text as number
 from warpimpact.analysis.summary import sampling_note
-from warpimpact.campaign.intervals import estimate_of
 from warpimpact.campaign.parts import first_difference
-from warpimpact.results import ResultError
-from warpimpact.variables import SHOT_VARIABLES
+from warpimpact.results.files import ResultError
+from warpimpact.results.variables import SHOT_VARIABLES
+from warpimpact.statistics.intervals import estimate_of
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""

@@ -1,7 +1,7 @@
 """How well a plate protects, as numbers that are defined, cited, and certain to a stated degree.
 
 Every number but the worst point is a mean, over hits that cover the cell evenly, of something that each shot says; so
-all have the intervals of campaign/intervals.py. The mean of the worst tenth of the area is one, too: Rockafellar and
+all have the intervals of statistics/intervals.py. The mean of the worst tenth of the area is one, too: Rockafellar and
 Uryasev write it as the smallest mean of q + (x − q)₊ / 0.1 over q, where q is the quantile of 0.9. At a minimum an
 error of q does nothing to first order, so the interval is that of this mean at the q of the sample. A ratio to the
 solid plate is linearised likewise (the delta method).
@@ -19,8 +19,8 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.effects import Effect, effects
-from warpimpact.campaign.intervals import Estimate, estimate_of
-from warpimpact.results import images, solid_reference
+from warpimpact.results.dataset import images, solid_reference
+from warpimpact.statistics.intervals import Estimate, estimate_of
 
 Array = NDArray[np.float64]
 

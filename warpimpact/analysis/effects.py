@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from warpimpact.analysis.summary import slices
-from warpimpact.results import ResultError, failed, passed
+from warpimpact.results.dataset import failed, passed
+from warpimpact.results.files import ResultError
 from warpimpact.scene import AnyCore, Core
 
 Array = NDArray[np.float64]

@@ -20,10 +20,10 @@ from warpimpact.analysis.summary import (
     symmetry_text,
 )
 from warpimpact.campaign.estimates import STATUSES, Measure
-from warpimpact.campaign.intervals import Estimate
 from warpimpact.kernels.status import Status
-from warpimpact.results import failed
-from warpimpact.variables import shot_variables
+from warpimpact.results.dataset import failed
+from warpimpact.results.variables import shot_variables
+from warpimpact.statistics.intervals import Estimate
 
 _QUANTILES = (0.05, 0.5, 0.95)
 _SHOWN = {"Pa": ("GPa", 1e-9)}

@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 
 import warpimpact
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.device import find_device
-from warpimpact.discretisation import FIDELITIES, Fidelity, Resolution, resolve, spelt_out
-from warpimpact.marching import Progress
-from warpimpact.results import study_dataset
+from warpimpact.results.dataset import study_dataset
 from warpimpact.scene import Hits, Numerics, Shots, make_shots
-from warpimpact.simulate import Outcomes, simulate
+from warpimpact.solver.device import find_device
+from warpimpact.solver.marching import Progress
+from warpimpact.solver.resolution import FIDELITIES, Fidelity, Resolution, resolve, spelt_out
+from warpimpact.solver.simulate import Outcomes, simulate
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.estimates import MEASURED, Measure, Tally
-from warpimpact.campaign.intervals import Estimate
-from warpimpact.results import images, status_codes
+from warpimpact.results.dataset import images, status_codes
+from warpimpact.statistics.intervals import Estimate
 
 SLICE = 2**18
 """Hits in memory at a time."""

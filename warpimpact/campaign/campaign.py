@@ -11,13 +11,13 @@ import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
 from pydantic_core import ErrorDetails
 
-from ..bending import check_bending
+from ..results.variables import BENDING_VARIABLES
 from ..scene import AnyCore, Hits, Impact, Interaction, Numerics, Plate, Sampler, Scatter, Symmetry, symmetries_used
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_scatter
 from ..scene.units import Number, PositiveLength, quoted
-from ..variables import BENDING_VARIABLES
+from ..solver.bending import check_bending
 from .estimates import Stop
 
 

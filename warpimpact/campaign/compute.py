@@ -16,15 +16,15 @@ import xarray
 
 import warpimpact
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.device import find_device
-from warpimpact.discretisation import resolve
-from warpimpact.marching import Progress
-from warpimpact.refine import LADDER, Estimates, simulate_to_tolerance
-from warpimpact.results import solid_dataset, to_dataset
+from warpimpact.results.dataset import solid_dataset, to_dataset
 from warpimpact.scene import Numerics, Plate, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
-from warpimpact.simulate import Outcomes, build, simulate
-from warpimpact.unfold import unfolded, unfolded_estimates
+from warpimpact.solver.device import find_device
+from warpimpact.solver.marching import Progress
+from warpimpact.solver.refinement import LADDER, Estimates, simulate_to_tolerance
+from warpimpact.solver.resolution import resolve
+from warpimpact.solver.simulate import Outcomes, build, simulate
+from warpimpact.solver.unfold import unfolded, unfolded_estimates
 
 
 def compute(

@@ -13,12 +13,12 @@ import xarray
 from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
-from warpimpact.campaign.intervals import Dealt, Estimate
 from warpimpact.kernels.status import Status
-from warpimpact.results import failed, passed
+from warpimpact.results.dataset import failed, passed
+from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
-from warpimpact.variables import BENDING_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.statistics.intervals import Dealt, Estimate
 
 Array = NDArray[np.float64]
 

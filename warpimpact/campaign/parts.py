@@ -18,9 +18,9 @@ from typing import Any
 import xarray
 from filelock import FileLock, Timeout
 
-from warpimpact import results
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.results import OutputError
+from warpimpact.results import files
+from warpimpact.results.files import OutputError
 
 _MANIFEST = "manifest.json"
 _SHARDS = "hits_*.nc"
@@ -195,7 +195,7 @@ class Parts:
     def _start_anew(self, *, overwrite: bool) -> None:
         try:
             self.discard()
-            with results.aside(self.folder / _MANIFEST) as file:
+            with files.aside(self.folder / _MANIFEST) as file:
                 file.write_text(json.dumps({**self.content, "replaces": overwrite}, indent=1), encoding="utf-8")
         except OutputError:
             self.discard()
@@ -213,7 +213,7 @@ class Parts:
         Raises:
             OutputError: it cannot be written.
         """
-        results.write(dataset, self._path(index))
+        files.write(dataset, self._path(index))
         self.saved.add(index)
 
     def kept(self) -> int:
@@ -222,7 +222,7 @@ class Parts:
 
     def load(self, index: int) -> xarray.Dataset:
         """A shard that is there."""
-        return results.read(self._path(index))
+        return files.read(self._path(index))
 
     def finish(self, count: int, attributes: Callable[[xarray.Dataset], Mapping[str, Any]]) -> None:
         """Join the first `count` shards into the result file, and remove them.
@@ -234,7 +234,7 @@ class Parts:
             OutputError: the file cannot be written; the shards are still there.
         """
         paths = [self._path(index) for index in range(count)]
-        results.join(paths, self.output, {**attributes(self.load(0)), "fingerprint": fingerprint(self.content)})
+        files.join(paths, self.output, {**attributes(self.load(0)), "fingerprint": fingerprint(self.content)})
         self.discard()
 
     def discard(self) -> None:

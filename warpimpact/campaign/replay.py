@@ -10,14 +10,15 @@ import warp
 import xarray
 
 import warpimpact
-from warpimpact import simulate
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.discretisation import Fidelity
-from warpimpact.refine import level
-from warpimpact.results import ResultError, history_dataset, to_dataset
+from warpimpact.results.dataset import history_dataset, to_dataset
+from warpimpact.results.files import ResultError
+from warpimpact.results.variables import outcome_variables, shot_variables
 from warpimpact.scene import Numerics
-from warpimpact.unfold import image_of
-from warpimpact.variables import outcome_variables, shot_variables
+from warpimpact.solver import simulate
+from warpimpact.solver.refinement import level
+from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.unfold import image_of
 
 ROUNDING = {"residual_velocity": 0.1, "deflection": 0.5, "tilt": 0.5}
 """How far another device's rounding may move an outcome [m/s, degree]. Between single and double precision, 6144

@@ -15,11 +15,12 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.estimates import Measure, Tally, looks
-from warpimpact.campaign.intervals import Estimate
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
-from warpimpact.results import OutputError, failed, images
+from warpimpact.results.dataset import failed, images
+from warpimpact.results.files import OutputError
 from warpimpact.scene import Shots
+from warpimpact.statistics.intervals import Estimate
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""

@@ -16,8 +16,8 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import compute, made_by
-from warpimpact.device import DeviceError, cores, find_device
 from warpimpact.scene import Shots
+from warpimpact.solver.device import DeviceError, cores, find_device
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""

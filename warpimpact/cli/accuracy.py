@@ -33,17 +33,17 @@ def add_study(commands: Commands) -> None:
 
 
 def _study(arguments: argparse.Namespace) -> None:
-    from warpimpact import results
     from warpimpact.analysis.study import study, study_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting import study_figure
+    from warpimpact.results import files
 
     campaign = Campaign.from_toml(arguments.campaign)
     output = arguments.output or Path(arguments.campaign.stem + "_study.nc")
     check_output(output, overwrite=arguments.overwrite)
     with memory_told(arguments.campaign), show_count() as progress:
         dataset = study(campaign, hits=arguments.hits, device=arguments.device, progress=progress)
-    results.write(dataset, output)
+    files.write(dataset, output)
     print(study_text(dataset))
     picture = output.with_suffix(".png")
     study_figure(dataset).savefig(picture, dpi=150)

@@ -6,7 +6,7 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
-from warpimpact.interrupts import terminated_as_interrupted
+from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_command, add_count, add_device, add_output
@@ -52,9 +52,9 @@ def add_compare(commands: Commands) -> None:
 
 
 def _compare(arguments: argparse.Namespace) -> int:
-    from warpimpact import results
     from warpimpact.analysis.comparison import compare, comparison_text
     from warpimpact.plotting import comparison_figure
+    from warpimpact.results import files
 
     is_campaign = arguments.files[0].suffix == ".toml"
     default = arguments.files[0].stem if is_campaign else "comparison"
@@ -63,11 +63,11 @@ def _compare(arguments: argparse.Namespace) -> int:
     angle, standoff = _quantities(arguments)
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
     if len(paths) < 2:
-        raise results.ResultError(
+        raise files.ResultError(
             f"{arguments.files[0]}: is one result, but two or more, or one campaign, are needed to compare"
         )
     with ExitStack() as stack:
-        datasets = [stack.enter_context(results.opened(path)) for path in paths.values()]
+        datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
         comparison = compare(datasets, list(paths), angle=angle, standoff=standoff)
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
     print(comparison_text(comparison))
@@ -78,7 +78,7 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
     """Angle [rad] and stand-off [m] that a person wrote."""
-    from warpimpact.results import ResultError
+    from warpimpact.results.files import ResultError
     from warpimpact.scene.units import Angle, Length, quantity
 
     try:

@@ -32,17 +32,17 @@ def add_export(commands: Commands) -> None:
 
 
 def _export(arguments: argparse.Namespace) -> None:
-    from warpimpact import results
     from warpimpact.export.paraview import write_vtk
     from warpimpact.export.table import write_csv
+    from warpimpact.results import files
 
     path, output = arguments.file, arguments.output
-    with results.opened_either(path) as dataset:
-        if results.is_history(dataset):
+    with files.opened_either(path) as dataset:
+        if files.is_history(dataset):
             output = output or path.with_name(f"{path.stem}_vtk")
             check_folder(output.parent)
             if output.exists():
-                raise results.OutputError(f"{output}: exists already; name a new folder")
+                raise files.OutputError(f"{output}: exists already; name a new folder")
             written = write_vtk(dataset.load(), output)
         else:
             output = output or path.with_suffix(".csv")
@@ -78,16 +78,16 @@ def add_report(commands: Commands) -> None:
 
 
 def _report(arguments: argparse.Namespace) -> None:
-    from warpimpact import results
     from warpimpact.report.report import write_report
+    from warpimpact.results import files
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
     check_output(output, overwrite=arguments.overwrite)
     by_name = named(paths)
     with ExitStack() as stack:
-        datasets = {name: stack.enter_context(results.opened(path)) for name, path in by_name.items()}
-        study = results.read_study(arguments.study) if arguments.study else None
+        datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
+        study = files.read_study(arguments.study) if arguments.study else None
         progress = stack.enter_context(show_count())
         with folder_told(", --trajectories 0 needs none"):
             write_report(

@@ -9,8 +9,8 @@ def mistakes() -> tuple[type[Exception], ...]:
     """Errors whose message is for the user."""
     from warpimpact.campaign.campaign import CampaignError
     from warpimpact.campaign.team import ClusterError
-    from warpimpact.device import DeviceError
-    from warpimpact.results import OutputError, ResultError
+    from warpimpact.results.files import OutputError, ResultError
+    from warpimpact.solver.device import DeviceError
 
     return CampaignError, ClusterError, OutputError, ResultError, DeviceError
 

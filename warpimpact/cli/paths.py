@@ -8,7 +8,7 @@ from pathlib import Path
 
 def named(paths: Sequence[Path]) -> dict[str, Path]:
     """Results under names that tell them apart."""
-    from warpimpact.results import ResultError
+    from warpimpact.results.files import ResultError
 
     if len(set(paths)) < len(paths):
         raise ResultError("the same result is given twice")
@@ -18,7 +18,7 @@ def named(paths: Sequence[Path]) -> dict[str, Path]:
 
 def check_output(path: Path, *, overwrite: bool) -> None:
     """Refuse a file that cannot be written, and one that is there unless it may be replaced."""
-    from warpimpact.results import OutputError
+    from warpimpact.results.files import OutputError
 
     check_place(path)
     if path.exists() and not overwrite:
@@ -27,7 +27,7 @@ def check_output(path: Path, *, overwrite: bool) -> None:
 
 def check_picture(path: Path) -> None:
     """Refuse a picture that cannot be written; one that is there is replaced."""
-    from warpimpact.results import OutputError
+    from warpimpact.results.files import OutputError
 
     if path.suffix not in (".png", ".pdf", ".svg"):
         raise OutputError(f"{path}: must end with .png, .pdf or .svg")
@@ -36,7 +36,7 @@ def check_picture(path: Path) -> None:
 
 def check_place(path: Path) -> None:
     """Refuse a file that cannot be written."""
-    from warpimpact.results import OutputError
+    from warpimpact.results.files import OutputError
 
     if path.is_dir():
         raise OutputError(f"{path}: is a folder, but the result is one file")
@@ -45,7 +45,7 @@ def check_place(path: Path) -> None:
 
 def check_folder(folder: Path) -> None:
     """Refuse a folder that cannot be written into."""
-    from warpimpact.results import OutputError
+    from warpimpact.results.files import OutputError
 
     try:
         with tempfile.TemporaryFile(dir=folder):

@@ -32,13 +32,13 @@ def add_replay(commands: Commands) -> None:
 
 
 def _replay(arguments: argparse.Namespace) -> None:
-    from warpimpact import results
     from warpimpact.analysis.hit import hit_text
     from warpimpact.campaign.replay import replay
     from warpimpact.plotting.animation import save_animation, writer_for
     from warpimpact.plotting.trajectory import save_figures
+    from warpimpact.results import files
 
-    result, path, film = results.read(arguments.result), arguments.result, arguments.animation
+    result, path, film = files.read(arguments.result), arguments.result, arguments.animation
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
     check_output(output, overwrite=arguments.overwrite)
     if film:
@@ -46,7 +46,7 @@ def _replay(arguments: argparse.Namespace) -> None:
         check_output(film, overwrite=arguments.overwrite)
     with folder_told():
         history = replay(result, arguments.hit, folder=arguments.campaign_folder or path.parent)
-    results.write(history, output)
+    files.write(history, output)
     print(hit_text(history))
     for written in (output, *save_figures(history, output.parent, output.stem)):
         print(written)

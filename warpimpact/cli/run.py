@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warpimpact.interrupts import terminated_as_interrupted
+from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
@@ -39,11 +39,11 @@ def add_run(commands: Commands) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from warpimpact import results
     from warpimpact.analysis.summary import summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.campaign.run import run_to_file
     from warpimpact.campaign.team import cluster_team
+    from warpimpact.results import files
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
@@ -61,7 +61,7 @@ def _run(arguments: argparse.Namespace) -> int:
             overwrite=arguments.overwrite,
             progress=progress,
         )
-    with results.opened(output) as dataset:
+    with files.opened(output) as dataset:
         print(summary_text(dataset))
         if "symmetries" in dataset.attrs:
             print(symmetry_text(dataset))
@@ -72,9 +72,9 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def failure_code(dataset: "xarray.Dataset", path: Path) -> int:
     """3, and a line, when more shots failed than the campaign allows."""
-    from warpimpact import results
+    from warpimpact.results.dataset import failed
 
-    share = float(results.failed(dataset).mean())
+    share = float(failed(dataset).mean())
     allowed = dataset.attrs["failed_share"]
     if share <= allowed:
         return 0

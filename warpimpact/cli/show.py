@@ -22,10 +22,10 @@ def add_inspect(commands: Commands) -> None:
 
 
 def _inspect(arguments: argparse.Namespace) -> None:
-    from warpimpact import results
     from warpimpact.analysis.inspect import inspect_text
+    from warpimpact.results import files
 
-    with results.opened(arguments.result) as dataset:
+    with files.opened(arguments.result) as dataset:
         print(dataset.attrs["campaign"] if arguments.campaign else inspect_text(dataset))
 
 
@@ -49,21 +49,21 @@ def add_plot(commands: Commands) -> None:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
-    from warpimpact import results
     from warpimpact.plotting import probability_map, save_beside, save_maps
+    from warpimpact.results import files
 
-    datasets = {name: results.read(path) for name, path in named(arguments.results).items()}
+    datasets = {name: files.read(path) for name, path in named(arguments.results).items()}
     folder = arguments.output or arguments.results[0].parent
     check_folder(folder)
     stem = "_".join(path.stem for path in arguments.results)
     dataset, *others = datasets.values()
     if arguments.probability is not None:
         if others:
-            raise results.ResultError("--probability: got several results, but it draws the map of one")
+            raise files.ResultError("--probability: got several results, but it draws the map of one")
         try:
             figure = probability_map(dataset, arguments.probability)
         except ValueError as error:
-            raise results.ResultError(f"--probability: {error}") from None
+            raise files.ResultError(f"--probability: {error}") from None
         picture = folder / f"{stem}_probability.png"
         figure.savefig(picture, dpi=150)
         print(picture)

@@ -16,7 +16,7 @@ import numpy as np
 import xarray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.results import OutputError
+from warpimpact.results.files import OutputError
 
 if TYPE_CHECKING:
     import pyvista

@@ -8,7 +8,8 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.summary import slices
-from warpimpact.results import aside, status_codes
+from warpimpact.results.dataset import status_codes
+from warpimpact.results.files import aside
 
 
 def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Polygon
 
 from warpimpact.plotting.trajectory import Pose, pose_at_step, silhouette, two_views
-from warpimpact.results import OutputError
+from warpimpact.results.files import OutputError
 
 FRAMES = 50
 _PER_SECOND = 20

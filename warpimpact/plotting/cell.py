@@ -20,8 +20,8 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
-from warpimpact.results import passed, status_codes
-from warpimpact.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
+from warpimpact.results.dataset import passed, status_codes
+from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

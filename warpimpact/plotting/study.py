@@ -9,7 +9,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.study import QUOTED
-from warpimpact.discretisation import FIDELITIES
+from warpimpact.solver.resolution import FIDELITIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

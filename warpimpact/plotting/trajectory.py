@@ -19,7 +19,7 @@ from matplotlib.patheffects import Normal, Stroke
 from scipy.spatial import ConvexHull
 
 from warpimpact.plotting.pressure import pressure
-from warpimpact.results import passed
+from warpimpact.results.dataset import passed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

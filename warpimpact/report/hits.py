@@ -13,7 +13,7 @@ from matplotlib.colors import to_hex
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import MAPPED, STATUS_COLOURS, Shown, hit_points, limits, nearest_hits, shown, words
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
-from warpimpact.variables import SHOT_VARIABLES
+from warpimpact.results.variables import SHOT_VARIABLES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -22,7 +22,7 @@ from warpimpact.analysis.study import study_text
 from warpimpact.campaign.replay import replay
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import compared, told
-from warpimpact.results import aside
+from warpimpact.results.files import aside
 
 Progress = Callable[[int, int], None]
 _PLATE_WIDTH = 240.0  # of the widest plate on the page [px]

@@ -18,7 +18,7 @@ from warpimpact.analysis.summary import UNITS, estimated, main_measures
 from warpimpact.campaign.estimates import STATUSES, Measure
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
-from warpimpact.results import ResultError
+from warpimpact.results.files import ResultError
 
 _MM = 1e3
 _PROVENANCE = (

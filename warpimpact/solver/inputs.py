@@ -10,14 +10,29 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact import discretisation
-from warpimpact.bending import check_bending, sections_of
-from warpimpact.discretisation import Fidelity, Resolution
 from warpimpact.kernels import march
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import OF_THE_SCENE, Core, Interaction, Numerics, Plate, Shots
+from warpimpact.solver import inputs
+from warpimpact.solver.bending import check_bending, sections_of
+from warpimpact.solver.resolution import Fidelity, Resolution, decay_rate, resolve
+from warpimpact.solver.rings import azimuths_of, rings_of
+from warpimpact.solver.tile import FINER, Tile, tent_taps, tile_of
 
 Array = NDArray[np.float64]
+
+ONSET = 0.05
+"""Onset speed of contact in units of what full contact of a wall as deep as the plate does in one step."""
+LARGEST_ONSET = 0.02
+"""Bound of the onset speed, as a share of the impact velocity."""
+
+
+def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) -> Array:
+    """Onset speed of contact per time step [m/s²] of cores of some masses [kg] in plates of some thicknesses [m] and
+    static stresses [Pa], of their shape; positive, also for a plate without resistance."""
+    wall = 2.0 * core.max_radius * np.minimum(thickness, core.length)
+    return np.maximum(ONSET * static_stress * wall / mass, 1.0)
+
 
 STEP_ALLOWANCE = 200
 """How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
@@ -66,11 +81,11 @@ class Inputs:
         if bending:
             check_bending(core, numerics)
         self._device = device
-        self.resolution = discretisation.resolve(numerics, core, plate, shots.columns)
+        self.resolution = resolve(numerics, core, plate, shots.columns)
         self.variant = variant_of(self.resolution, plate, interaction, shots, bending=bending)
         self.stage = march.build(self.variant)
         self.spacing = self.resolution.grid_spacing
-        self._rings = discretisation.rings_of(
+        self._rings = rings_of(
             core,
             self.resolution.patches_axial,
             self.resolution.patches_around,
@@ -81,7 +96,7 @@ class Inputs:
         self.sections = self._sections(core)
         self.plate = self._plate(plate)
         self.law = self.stage.Law()
-        self.law.a2, self.law.onset_limit = interaction.quadratic * plate.density, discretisation.LARGEST_ONSET
+        self.law.a2, self.law.onset_limit = interaction.quadratic * plate.density, inputs.LARGEST_ONSET
         self.body, self.shots, self.own = self.stage.Body(), self.stage.Shots(), self.stage.Own()
         self.each = self._each(core, plate, interaction, shots)
         self.pace = self._pace(shots, traced)
@@ -117,7 +132,7 @@ class Inputs:
 
     def _surface(self, core: Core) -> Any:
         rings, around = self._rings, self.resolution.patches_around
-        azimuths = discretisation.azimuths_of(around)
+        azimuths = azimuths_of(around)
         surface = self.stage.Surface()
         for name in ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial"):
             setattr(surface, name, self.array(getattr(rings, name)))
@@ -152,8 +167,8 @@ class Inputs:
 
     def _plate(self, plate: Plate) -> Any:
         nodal = self.resolution.nodal
-        finer = 1 if nodal else discretisation.FINER
-        tile = discretisation.tile_of(plate, self.spacing / finer, sharp=nodal)
+        finer = 1 if nodal else FINER
+        tile = tile_of(plate, self.spacing / finer, sharp=nodal)
         struct = self.stage.Plate()
         struct.tile, struct.clear = _on_device(tile, self.variant.real, self._device.alias)
         struct.tile_y, struct.tile_z = tile.material.shape
@@ -163,7 +178,7 @@ class Inputs:
         struct.spacing = self.spacing
         size = plate.size or (math.inf, math.inf)
         struct.half_y, struct.half_z = 0.5 * size[0], 0.5 * size[1]
-        taps = discretisation.tent_taps(0.0 if nodal else plate.degradation_length, self.spacing)
+        taps = tent_taps(0.0 if nodal else plate.degradation_length, self.spacing)
         struct.reach = max(1, len(taps) // 2)
         struct.taps = self.array(np.append(taps[len(taps) // 2 :], 0.0))
         return struct
@@ -176,7 +191,7 @@ class Inputs:
         a0, a1, _ = interaction.coefficients(shots.own("resistance", plate.resistance), plate.density)
         longest_time = self.resolution.longest_time(degradation, plate.degradation_interval)
         if not self.resolution.nodal:  # the literal scheme takes β itself, once a step
-            degradation = discretisation.decay_rate(degradation, plate.degradation_interval)
+            degradation = decay_rate(degradation, plate.degradation_interval)
         return shots.columns | {
             "thickness": thickness,
             "mass": mass,
@@ -186,7 +201,7 @@ class Inputs:
             "a1": a1,
             "friction": shots.own("shear_coefficient", plate.shear_coefficient),
             "decay_rate": degradation,
-            "onset_jump": discretisation.onset_jump(core, thickness, mass, a0),
+            "onset_jump": inputs.onset_jump(core, thickness, mass, a0),
             "way": self.resolution.travel * passage,
             "longest_time": longest_time,
             "longest_step": passage,
@@ -195,7 +210,7 @@ class Inputs:
 
 
 @lru_cache(maxsize=4)
-def _on_device(tile: discretisation.Tile, real: Any, device: str) -> tuple[Any, Any]:
+def _on_device(tile: Tile, real: Any, device: str) -> tuple[Any, Any]:
     """Material and clearance of a tile, which no kernel changes: kept for the next shots at the same plate."""
     material, clearance = (
         wp.array(values.reshape(-1), dtype=real, device=device) for values in (tile.material, tile.clearance)

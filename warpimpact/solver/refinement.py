@@ -8,10 +8,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.discretisation import Fidelity
-from warpimpact.marching import Progress
 from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots, Tolerance
-from warpimpact.simulate import Outcomes, simulate
+from warpimpact.solver.marching import Progress
+from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.simulate import Outcomes, simulate
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,8 @@ import numpy as np
 from warpimpact.scene import Core, Numerics
 
 if TYPE_CHECKING:
-    from warpimpact.discretisation import Array, Fidelity, Rings
+    from warpimpact.solver.resolution import Fidelity
+    from warpimpact.solver.rings import Array, Rings
 
 THINNEST = 0.5
 """Sections thinner than this share of the largest radius are left out of the nominal stress: at a pointed nose 4M/(πr³)

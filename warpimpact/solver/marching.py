@@ -14,13 +14,13 @@ import psutil
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.device import cores, load
-from warpimpact.discretisation import Fidelity
-from warpimpact.inputs import Inputs
 from warpimpact.kernels import free_flight
 from warpimpact.kernels.march import TRACE_COLUMNS
 from warpimpact.kernels.status import Status
 from warpimpact.scene import Core, Interaction, MassProperties, Numerics, Plate, Shots
+from warpimpact.solver.device import cores, load
+from warpimpact.solver.inputs import Inputs
+from warpimpact.solver.resolution import Fidelity
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]

@@ -8,9 +8,9 @@ from typing import TypeVar
 
 import numpy as np
 
-from warpimpact.refine import Estimates
 from warpimpact.scene import Symmetry
-from warpimpact.simulate import Outcomes, Replay
+from warpimpact.solver.refinement import Estimates
+from warpimpact.solver.simulate import Outcomes, Replay
 
 
 def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:

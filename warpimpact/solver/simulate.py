@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.device import find_device, load
-from warpimpact.discretisation import Fidelity, resolve
-from warpimpact.history import History
-from warpimpact.inputs import variant_of
 from warpimpact.kernels import free_flight
 from warpimpact.kernels import march as marching
-from warpimpact.marching import March, Progress
 from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots
+from warpimpact.solver.device import find_device, load
+from warpimpact.solver.history import History
+from warpimpact.solver.inputs import variant_of
+from warpimpact.solver.marching import March, Progress
+from warpimpact.solver.resolution import Fidelity, resolve
 
 Array = NDArray[np.float64]
 

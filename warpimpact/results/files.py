@@ -1,0 +1,200 @@
+"""Result files: written whole or not at all, joined from parts, read and checked."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import xarray
+
+from warpimpact.results.interrupts import uninterrupted
+from warpimpact.results.variables import COORDINATES, STUDY_COORDINATES, STUDY_VARIABLES, VARIABLES
+
+
+class OutputError(OSError):
+    """A result file that cannot be written; the message is one sentence for the user."""
+
+
+class ResultError(ValueError):
+    """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
+
+
+def write(dataset: xarray.Dataset, path: Path) -> None:
+    """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
+
+    Raises:
+        OutputError: The file cannot be written; what was there before is untouched.
+    """
+    with uninterrupted(), aside(path) as file:
+        dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=_encoding(dataset))
+
+
+CHUNK = 2**15
+"""Hits per chunk of a joined file: 256 KiB of one variable."""
+
+
+def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> None:
+    """Write results one after the other into one file, whole or not at all, with one of them in memory at a time.
+
+    Args:
+        parts: results of the same campaign, in the order of their hits, on the disk of `path`.
+        path: the file; an existing one is replaced.
+        attributes: global attributes over those of the first part.
+
+    Raises:
+        OutputError: The file cannot be written; what was there before is untouched.
+    """
+    hits = 0
+    for part in parts:
+        with netCDF4.Dataset(part) as source:
+            hits += len(source.dimensions["hit"])
+    with aside(path, parts[0].parent) as file:
+        with uninterrupted():
+            dataset = read(parts[0]).assign_attrs(attributes).drop_encoding()
+            encoding = _encoding(dataset, chunk=min(hits, CHUNK))
+            dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=encoding, unlimited_dims=["hit"])
+        at = dataset.sizes["hit"]
+        with netCDF4.Dataset(file, "a") as joined:
+            joined.set_auto_maskandscale(False)
+            for variable in joined.variables.values():
+                if variable.chunking() != "contiguous":  # of the megabytes that a variable may keep, two chunks will do
+                    variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
+            for part in parts[1:]:
+                at = _append(joined, part, at)
+
+
+def _append(joined: Any, part: Path, at: int) -> int:
+    """Copy the hits of a part behind those that are there; returns how many there are then."""
+    with netCDF4.Dataset(part) as source:
+        source.set_auto_maskandscale(False)
+        end = at + len(source.dimensions["hit"])
+        for name, variable in joined.variables.items():
+            if "hit" in variable.dimensions:
+                variable[at:end] = source[name][:]
+    return end
+
+
+def _encoding(dataset: xarray.Dataset, *, chunk: int | None = None) -> dict[str, dict[str, Any]]:
+    """How variables are stored: compressed, and with `chunk` hits per chunk if that is given."""
+    encoding: dict[str, dict[str, Any]] = {
+        str(name): {"zlib": True, "complevel": 1}
+        for name, array in dataset.variables.items()
+        if array.dtype.kind in "if"  # netCDF compresses no strings
+    }
+    for name in dataset.coords:
+        encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
+    for name, array in dataset.variables.items():
+        if chunk and "hit" in array.dims:
+            encoding[str(name)]["chunksizes"] = (chunk, *array.shape[1:])
+    return encoding
+
+
+@contextmanager
+def aside(path: Path, folder: Path | None = None) -> Iterator[Path]:
+    """A name in a folder of the same disk, if not given that of `path`, to write to; what was written there is on the
+    disk before it gets its own name.
+
+    Raises:
+        OutputError: The file cannot be written; what was there before is untouched.
+    """
+    written = (folder or path.parent) / f".{path.name}.{os.getpid()}.part"
+    try:
+        yield written
+        _flush(written, os.O_RDWR)
+        os.replace(written, path)
+        if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
+            _flush(path.parent, os.O_RDONLY)
+    except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
+        raise OutputError(f"{path}: cannot be written ({_cause(error, path)})") from error
+    finally:
+        with suppress(OSError):
+            written.unlink()
+
+
+def _flush(path: Path, mode: int) -> None:
+    descriptor = os.open(path, mode)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _cause(error: Exception, path: Path) -> str:
+    """What an error of the disk means: netCDF does not say that the disk is full."""
+    with suppress(OSError):
+        if isinstance(error, RuntimeError) and shutil.disk_usage(path.parent).free < 2**20:
+            return "the disk is full"
+    return str(error)
+
+
+def read(path: Path) -> xarray.Dataset:
+    """Read a result file into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not a warpimpact result.
+    """
+    with uninterrupted(), opened(path) as file:
+        return file.load()
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[xarray.Dataset]:
+    """A result file of which only what is used is read.
+
+    Raises:
+        ResultError: as in `read`.
+    """
+    with opened_either(path) as dataset:
+        if is_history(dataset):
+            raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
+        yield dataset
+
+
+@contextmanager
+def opened_either(path: Path) -> Iterator[xarray.Dataset]:
+    """A result file, or the history of one of its hits, of which only what is used is read.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is neither.
+    """
+    with _netcdf(path) as dataset:
+        missing = (COORDINATES.keys() | VARIABLES.keys()) - dataset.variables.keys()
+        if missing:
+            raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
+        yield dataset
+
+
+def read_study(path: Path) -> xarray.Dataset:
+    """Read a study of speed and accuracy into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not a study.
+    """
+    with _netcdf(path) as dataset:
+        missing = (STUDY_COORDINATES.keys() | STUDY_VARIABLES.keys()) - dataset.variables.keys()
+        if missing:
+            raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
+        return dataset.load()
+
+
+def is_history(dataset: xarray.Dataset) -> bool:
+    """Whether a Dataset is the history of one hit, not a map of hits."""
+    return "hit" not in dataset.sizes
+
+
+def _netcdf(path: Path) -> xarray.Dataset:
+    """An open netCDF file, with room for some chunks of a variable instead of for tens of megabytes."""
+    _, slots, preemption = kept = netCDF4.get_chunk_cache()
+    netCDF4.set_chunk_cache(4 * 8 * CHUNK, slots, preemption)
+    try:
+        return xarray.open_dataset(path, engine="netcdf4")
+    except (OSError, RuntimeError) as error:
+        raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error
+    finally:
+        netCDF4.set_chunk_cache(*kept)

@@ -1,0 +1,166 @@
+"""From a scene to the arrays that the kernels read: rings of the core, tile of the plate, filter, time step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpimpact.scene import Core, Impact, Numerics, Plate
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """Numbers behind a named fidelity; lengths scale with the scene (MODEL.md §4's table)."""
+
+    patches_axial: int
+    patches_around: int
+    cells_per_length: float
+    """Cells per degradation length ℓ."""
+    travel: float
+    """Way per time step at impact velocity, as a share of the thickness of the plate, or of SLENDER times the
+    core's length where the plate is thicker than that."""
+    double: bool = False
+
+    @property
+    def patch_width(self) -> float:
+        """Widest patch as the plate sees it, in degradation lengths: wider ones leave gaps in the exposure, and
+        weaken the plate under themselves too much. It is that of the paper's core (R = 3.02 mm, ℓ = 0.5 mm), for
+        which the patches of two neighbouring rings together go round."""
+        return 19.0 / self.patches_around
+
+
+SLENDER = 1.0 / 7.0
+ALONG = 1.6
+"""Way of a step in the plane of the plate, in degradation lengths and per unit of `travel`: contact that sweeps
+sideways by more than that leaves gaps in the exposure."""
+
+WEAKENING = 2.7
+"""ln of what a step may take off the resistance where it acts all the time, per unit of `travel`: exposure counts as
+it is in mid-step, and a longer step leaves too little of a plate that weakens at once."""
+
+FIDELITIES = {
+    "draft": Fidelity(14, 16, 1.0, 0.5),
+    "standard": Fidelity(23, 32, 1.5, 0.37),
+    "reference": Fidelity(64, 56, 5.0, 0.05),
+}
+NODAL: dict[str, Any] = {
+    "patches_axial": 36,
+    "patches_around": 36,
+    "grid_spacing": 1.0e-5,
+    "time_step": 1.0e-6,
+}
+"""The paper's own resolution; its time step is the one that meets its rows (MODEL.md §4)."""
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Numerics with every choice made: SI. The time step is fixed, or follows from the way per step."""
+
+    nodal: bool
+    time_step: float | None
+    travel: float
+    """Way per step at impact velocity, as a share of the passage: the thickness of the plate, or `slender` [m] where
+    that is less. A step, also a given one, that is longer than the passage jumps over what happens in the plate."""
+    slender: float
+    way_along: float
+    """The most of a step's way that may lie in the plane of the plate [m], if a quarter of it is enough for that."""
+    weakening: float
+    """The most that contact may take off ln of the resistance in a step, likewise."""
+    patches_axial: int
+    patches_around: int
+    grid_spacing: float
+    double: bool
+    patch_width: float
+    """No ring is wider than this radially [m]."""
+
+    def passage(self, thickness: ArrayLike) -> Array:
+        """Way [m] on which the plate acts on a core, for some thicknesses [m], of their shape."""
+        return np.minimum(thickness, self.slender)
+
+    def longest_time(self, degradation: Array, interval: float) -> Array:
+        """Time [s] in which contact weakens a plate by as much as a step may, for some β, of their shape."""
+        return np.asarray(self.weakening / np.maximum(-decay_rate(degradation, interval), SLOWEST_DECAY))
+
+    def step_at(
+        self, velocity: ArrayLike, obliquity: ArrayLike, thickness: ArrayLike, longest_time: ArrayLike
+    ) -> Array:
+        """Time steps [s] at impact velocities [m/s], obliquities [rad], thicknesses of the plate [m] and `longest_time`
+        [s], of their shape."""
+        passage = self.passage(thickness)
+        longest = self.travel * passage
+        aslant = self.way_along / np.maximum(np.sin(obliquity), 1e-9)
+        way = np.clip(np.minimum(aslant, np.multiply(longest_time, velocity)), 0.25 * longest, longest)
+        if self.time_step is not None:
+            way = self.time_step * np.asarray(velocity)
+        return np.asarray(np.minimum(way, passage) / velocity)
+
+    def step_of(self, impact: Impact, plate: Plate) -> float:
+        """Time step [s] of a scene, or where it scatters, of its means."""
+        longest_time = self.longest_time(np.array(plate.degradation), plate.degradation_interval)
+        return float(self.step_at(impact.velocity, impact.obliquity, plate.thickness, longest_time))
+
+
+def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate, scattered: Collection[str] = ()) -> Resolution:
+    """Fill in what the numerics leave to fidelity and scheme; a fidelity need not have a name.
+
+    Args:
+        scattered: names of the quantities of the scene that differ from shot to shot.
+    """
+    if isinstance(numerics, Fidelity):
+        fidelity, numerics = numerics, Numerics()
+    else:
+        fidelity = FIDELITIES[numerics.fidelity]
+    if numerics.tolerance is not None:
+        raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
+    degrades = plate.degradation < 1.0 or "degradation" in scattered
+    width = fidelity.patch_width * plate.degradation_length if degrades else math.inf
+    defaults: dict[str, Any] = {
+        "time_step": None,
+        "patches_axial": fidelity.patches_axial,
+        "patches_around": max(fidelity.patches_around, 4 * math.ceil(0.25 * math.pi * core.max_radius / width)),
+        "grid_spacing": plate.degradation_length / fidelity.cells_per_length,
+    }
+    if numerics.scheme == "nodal":
+        defaults = NODAL
+    given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
+    return Resolution(
+        nodal=numerics.scheme == "nodal",
+        double=fidelity.double if numerics.precision is None else numerics.precision == "double",
+        travel=fidelity.travel,
+        slender=SLENDER * core.length,
+        way_along=ALONG * fidelity.travel * plate.degradation_length,
+        weakening=WEAKENING * fidelity.travel,
+        patch_width=math.inf if numerics.scheme == "nodal" else width,
+        **(defaults | given),
+    )
+
+
+def spelt_out(fidelity: Fidelity, core: Core, plate: Plate, impact: Impact) -> Numerics:
+    """Numerics that give, for one impact, what `resolve` would make of the fidelity if it had a name."""
+    return Numerics(
+        time_step=resolve(fidelity, core, plate).step_of(impact, plate),
+        patches_axial=fidelity.patches_axial,
+        patches_around=fidelity.patches_around,
+        grid_spacing=plate.degradation_length / fidelity.cells_per_length,
+        precision="double" if fidelity.double else "single",
+    )
+
+
+FASTEST_DECAY = 1.0e30
+"""Of the resistance [1/s]: β = 0 takes all of it at the first touch, a rate beyond any exposure, yet finite (0 × it
+is 0)."""
+SLOWEST_DECAY = 1.0e-30
+"""Below which nothing weakens [1/s]."""
+
+
+def decay_rate(degradation: Array, interval: float) -> Array:
+    """ln(β)/Δt_β [1/s] for some β, of their shape."""
+    log = np.log(degradation, where=degradation > 0.0, out=np.full_like(degradation, -np.inf))
+    return np.maximum(log / interval, -FASTEST_DECAY)

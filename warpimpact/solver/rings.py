@@ -1,0 +1,157 @@
+"""The surface of a core as rings of patches."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from warpimpact.scene import Core
+
+Array = NDArray[np.float64]
+
+BEHIND = 0.57
+"""Length of the rings behind the core's widest station, in those ahead of it: they touch where the core swings, and
+turn it by the longest levers."""
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Rings of patches from nose to base; arrays of shape [rings], SI (see kernels/core_surface.py)."""
+
+    station: Array
+    radius: Array
+    area_axial: Array
+    area_radial: Array
+    half_axial: Array
+    half_radial: Array
+    turn_axial: Array
+    turn_radial: Array
+
+
+def azimuths_of(around: int) -> Array:
+    """Azimuths [rad] of the patches of even rings, then of odd rings, half a patch on; shape [2 around].
+
+    Both sets are their own mirror images, as the core is.
+    """
+    even = np.arange(around) + 0.5
+    return np.asarray(np.concatenate([even, even - 0.5]) * (2.0 * np.pi / around))
+
+
+def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, discs: bool = True) -> Rings:
+    """Divide a core's surface into rings of the profile, `axial` of them per its length ahead of the widest station
+    and more behind it, and rings of the discs that close it.
+
+    Rings wider than `widest` [m] radially are divided. Without `discs` it is the literal scheme's: the profile
+    alone, evenly divided.
+
+    Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the
+    closed surface sum to zero and the work of a straight shot is exact (MODEL.md §6.1).
+    """
+    if discs:
+        nose, base = (float(r) for r in core.radius(np.array([0.0, core.length])))
+        across = min(widest, core.length / axial)
+        parts = [
+            _disc_rings(0.0, nose, across, facing=1.0),
+            _profile_rings(core, _divided(core, _stations(core, axial), widest)),
+            _disc_rings(core.length, base, across, facing=-1.0),
+        ]
+    else:
+        parts = [_profile_rings(core, np.linspace(0.0, core.length, axial + 1))]
+    s, r, axial_area, radial_area, half_s, half_r, turn_s, turn_r = (
+        np.concatenate(column) for column in zip(*parts, strict=True)
+    )
+    sector = 2.0 * np.pi / around
+    chord = 2.0 * np.sin(0.5 * sector)
+    return Rings(
+        station=core.mass_properties.centre_of_mass - s,
+        radius=r,
+        area_axial=axial_area * sector,
+        area_radial=radial_area * chord,
+        half_axial=-half_s,
+        half_radial=half_r,
+        turn_axial=turn_s,
+        turn_radial=turn_r,
+    )
+
+
+def _stations(core: Core, count: int) -> Array:
+    """Edges of the profile's rings: a length/count apart, BEHIND of that behind the widest station, which is one of
+    them, as are the jumps of the slope unless they outnumber the rings."""
+    breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
+    inner = np.unique([*breaks, widest])
+    apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
+    knots = np.array([0.0, *inner[apart[:-1] & apart[1:]], core.length])
+    apiece = np.where(knots[:-1] < widest - 1e-6 * core.length, 1.0, BEHIND) * core.length / count
+    shares = np.maximum(1, np.round(np.diff(knots) / apiece)).astype(int)
+    edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
+    return np.append(np.concatenate(edges), core.length)
+
+
+def _divided(core: Core, edges: Array, widest: float) -> Array:
+    """The edges, with more of them where the radius changes by more than `widest` [m] from one to the next."""
+    counts = np.maximum(1, np.ceil(np.abs(np.diff(core.radius(edges))) / widest - 1e-9)).astype(int)
+    finer = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
+    return np.append(np.concatenate(finer), core.length)
+
+
+def _widest_station(core: Core) -> float:
+    """First station of the largest radius [m]: a ring astride it would partly cancel itself."""
+    stations = np.linspace(0.0, core.length, 1001)
+    peak = int(core.radius(stations).argmax())
+    low, high = stations[max(peak - 1, 0)], stations[min(peak + 1, len(stations) - 1)]
+    found = minimize_scalar(lambda s: -core.radius(np.array(s)), bounds=(low, high), method="bounded")
+    candidates = np.array([*(b for b in core.breaks if low <= b <= high), found.x, stations[peak]])
+    return float(candidates[core.radius(candidates).argmax()])
+
+
+def _profile_rings(core: Core, edges: Array) -> tuple[Array, ...]:
+    """Station, radius, ∫ r dr and ∫ r ds (per radian), half extents and half turns of the normal, of the rings
+    between edges."""
+    low, high = edges[:-1], edges[1:]
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    inside = core.radius(middle[:, None] + half[:, None] * nodes)
+    r_low, r_high = core.radius(low), core.radius(high)
+    lateral = (inside * weights).sum(axis=1) * half
+    at_low, at_high = _normals(core, low, 1e-3 * half), _normals(core, high, -1e-3 * half)
+    turn_axial, turn_radial = 0.5 * (at_high - at_low)
+    half_radial = 0.5 * (r_high - r_low)
+    return (
+        middle,
+        core.radius(middle),
+        half_radial * (r_high + r_low),
+        lateral,
+        half,
+        half_radial,
+        turn_axial,
+        turn_radial,
+    )
+
+
+def _normals(core: Core, stations: Array, step: Array) -> Array:
+    """Outward unit normals (axial, radial) of the profile, seen from the side of `step`; shape [2, stations]."""
+    here, next_, beyond = (core.radius(stations + k * step) for k in range(3))
+    slope = (4.0 * next_ - 3.0 * here - beyond) / (2.0 * step)
+    return np.stack([slope, np.ones_like(slope)]) / np.hypot(slope, 1.0)
+
+
+def _disc_rings(station: float, radius: float, widest: float, *, facing: float) -> tuple[Array, ...]:
+    """The same of a disc that faces along the axis (+1 towards the nose)."""
+    count = int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # below that it is a point
+    edges = np.linspace(0.0, radius, count + 1)
+    low, high = edges[:-1], edges[1:]
+    nothing = np.zeros(count)
+    return (
+        np.full(count, station),
+        0.5 * (low + high),
+        facing * 0.5 * (high**2 - low**2),
+        nothing,
+        nothing,
+        0.5 * (high - low),
+        nothing,
+        nothing,
+    )

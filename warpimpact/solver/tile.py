@@ -1,0 +1,135 @@
+"""The pristine plate as one period of material fractions, and the filter of its exposure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+import psutil
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d, distance_transform_edt
+from scipy.optimize import brentq
+
+from warpimpact.scene import Pattern, Plate
+
+Array = NDArray[np.float64]
+
+FINER = 5
+"""Cells of the tile per cell of the exposure's grid, in each direction: a patch takes the one under its centre."""
+BLUR = 3
+"""Cells of the tile over which its material is averaged, in each direction: edges pass patches gradually. Odd."""
+BLOCKS = 96
+"""Most blocks, in each direction, in which a period is searched for room that no core fills."""
+SUBSAMPLES = 6
+"""Points per cell of the tile and direction behind a material fraction."""
+AT_A_TIME = 2**13
+"""Cells of the tile that are looked at together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """One period of the pristine plate: material fractions, shape [cells_y, cells_z], cells of dy × dz [m]."""
+
+    material: Array
+    dy: float
+    dz: float
+
+    @cached_property
+    def clearance(self) -> Array:
+        """Distance [m] that every cell keeps at least from the material of the whole lattice, shape of `material`."""
+        # In blocks of cells, of which any material makes a wall; seen from one period amid eight others: no hole is
+        # wider than the period, so the nearest wall is among them.
+        rows, columns = self.material.shape
+        block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
+        starts = [np.arange(0, count, size) for count, size in zip(self.material.shape, block, strict=True)]
+        wall = np.maximum.reduceat(np.maximum.reduceat(self.material > 0.0, starts[0], axis=0), starts[1], axis=1)
+        if not wall.any():
+            return np.full((rows, columns), math.inf)
+        widths = (self.dy * rows / len(starts[0]), self.dz * columns / len(starts[1]))
+        free = distance_transform_edt(~np.tile(wall, (3, 3)), sampling=widths)
+        own = free[len(starts[0]) : 2 * len(starts[0]), len(starts[1]) : 2 * len(starts[1])]
+        # Two blocks less: distances are from centre to centre, and the last block of a period may be narrower.
+        kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
+        return np.asarray(np.repeat(np.repeat(kept, block[0], axis=0), block[1], axis=1)[:rows, :columns])
+
+
+def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
+    """Material fraction about every cell of one period; cell (0, 0) has its corner at the origin.
+
+    Cells are at most `spacing` wide and fit the period; fractions are means over BLUR × BLUR cells. `sharp` takes each
+    cell's centre alone, as the literal scheme does.
+
+    Raises:
+        MemoryError: the tile does not fit; the message is for a person.
+    """
+    return _tile(_Itself(plate.pattern), spacing, sharp)
+
+
+@dataclass(frozen=True, eq=False)
+class _Itself:
+    """A pattern that is the same only as itself: a mask of the same name may have changed on the disk."""
+
+    pattern: Pattern
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Itself) and self.pattern is other.pattern
+
+    def __hash__(self) -> int:
+        return id(self.pattern)
+
+
+@lru_cache(maxsize=4)
+def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
+    """Kept for the next shots at the same plate."""
+    pattern = itself.pattern
+    period_y, period_z = pattern.period
+    # An even number, so that a row staggered by half a period sees the same cells.
+    step = 1 if sharp else 2
+    count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
+    dy, dz = period_y / count_y, period_z / count_z
+    needed, free = 3 * 8 * count_y * count_z, psutil.virtual_memory().available
+    if needed > free:
+        raise MemoryError(
+            f"numerics.grid_spacing: got {spacing:g} m, but the plate's period of {period_y:g} m x {period_z:g} m "
+            f"would take {needed / 2**30:.3g} GiB at that spacing, of {free / 2**30:.3g} GiB free"
+        )
+    samples = 1 if sharp else SUBSAMPLES
+    within = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
+    half_diagonal, middle_z = 0.501 * math.hypot(dy, dz), (np.arange(count_z, dtype=np.float64) + 0.5) * dz
+    material, rows = np.empty((count_y, count_z)), max(1, AT_A_TIME // count_z)
+    for first in range(0, count_y, rows):
+        part = material[first : first + rows]
+        middle_y = (np.arange(first, first + len(part), dtype=np.float64)[:, None] + 0.5) * dy
+        part[:] = ~pattern.is_hole(middle_y, middle_z)
+        row, column = np.nonzero(pattern.has_edge(middle_y, middle_z, half_diagonal))
+        y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
+        part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
+    if not sharp:  # no running sum, whose rounding leaves material in the middle of a hole
+        for axis in range(2):
+            material = correlate1d(material, np.full(BLUR, 1.0 / BLUR), axis, mode="wrap")
+    return Tile(material, dy, dz)
+
+
+def tent_taps(length: float, cell: float) -> Array:
+    """Weights of the discrete filter that, between bilinear scattering and bilinear reading, acts as the tent K of
+    half-width ℓ.
+
+    Its half-width is adjusted so that mass and second moment, ℓ²/6, are exact: scattering and reading each add
+    cell²/6 on average. With ℓ below √2 cells nothing is left to filter.
+    """
+    if length <= math.sqrt(2.0) * cell:
+        return np.ones(1)
+
+    def taps(half_width: float) -> tuple[Array, Array]:
+        reach = int(np.ceil(half_width / cell - 1e-9)) - 1
+        offsets = cell * np.arange(-reach, reach + 1, dtype=np.float64)
+        weights: Array = np.asarray(1.0 - np.abs(offsets) / half_width)
+        return weights / weights.sum(), offsets
+
+    def excess(half_width: float) -> float:
+        weights, offsets = taps(half_width)
+        return float(weights @ offsets**2 + cell**2 / 3.0 - length**2 / 6.0)
+
+    return taps(brentq(excess, cell, length + cell))[0]
