@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, rigid_body
+from . import contact, core_surface, damping, footprint, rigid_body
 from .variant import Variant
 
 
@@ -19,10 +19,10 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the bending for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, motion, contacts = core_surface.build(variant), rigid_body.build(variant), contact.build(variant)
+    surfaces, motion, resistances = core_surface.build(variant), rigid_body.build(variant), damping.build(variant)
     Surface, Pose, Ring = surfaces.Surface, surfaces.Pose, surfaces.Ring
     Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
-    Touches, Footprint, Sums = contacts.Touches, contacts.Footprint, contacts.Sums
+    Touches, Footprint, Sums = contact.build(variant).Touches, footprint.build(variant).Footprint, resistances.Sums
 
     @wp.struct
     class Sections:
@@ -52,15 +52,15 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def mean_force(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
         """Force on a ring [N], mean over the step, if the velocities change by (dv, dw) more than foreseen."""
-        slopes = contacts.slopes_of(ring, sums)
-        return sums.force - half * (contacts.damping_vv(slopes) * dv + contacts.damping_vw(slopes) * dw)
+        slopes = resistances.slopes_of(ring, sums)
+        return sums.force - half * (resistances.damping_vv(slopes) * dv + resistances.damping_vw(slopes) * dw)
 
     @wp.func
     def mean_moment(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
         """Its moment about the centre of mass [N m]."""
-        slopes = contacts.slopes_of(ring, sums)
-        coupled = wp.transpose(contacts.damping_vw(slopes)) * dv
-        return sums.moment - half * (coupled + contacts.damping_ww(slopes) * dw)
+        slopes = resistances.slopes_of(ring, sums)
+        coupled = wp.transpose(resistances.damping_vw(slopes)) * dv
+        return sums.moment - half * (coupled + resistances.damping_ww(slopes) * dw)
 
     @wp.func
     def across(vector: vec3):

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import march as march_stage
-from . import rigid_body
+from . import march, rigid_body
+from . import shots as conditions
 from .status import Status
 from .variant import Variant
 
@@ -17,9 +17,8 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, undefined = real(0.0), real(wp.nan)
     motion = rigid_body.build(variant)
-    marching = march_stage.build(variant)
-    Body, Shots, Own, Contact = motion.Body, marching.Shots, marching.Own, marching.Outcomes
-    line_of_flight, own_body = marching.line_of_flight, marching.own_body
+    launch = conditions.build(variant)
+    Body, Shots, Contact = motion.Body, launch.Shots, march.build(variant).Outcomes
     angular_velocity = motion.angular_velocity
     turned = motion.turned
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
@@ -68,25 +67,22 @@ def build(variant: Variant) -> SimpleNamespace:
 
     def free_flight(
         # inputs
-        body: Body,
         shots: Shots,
-        own: Own,
         contact: Contact,
-        planes: wp.array(dtype=real),
+        standoffs: wp.array(dtype=wp.float64),
         ahead: real,
         # outputs
         report: Report,
     ):
         """Report one shot per thread.
 
-        `planes` are x [m] of the stand-offs, from the rear face where the thickness is each shot's own; `ahead` [m]
-        tells which point of the axis has to pass them, from the centre of mass towards the nose.
+        `standoffs` are distances behind the rear face [m]; `ahead` [m] tells which point of the axis has to pass them,
+        from the centre of mass towards the nose.
         """
         shot = wp.tid()
-        if wp.static(variant.scattered):
-            body = own_body(body, own, shot)
+        body = launch.body_of(shots, shot)
         status = contact.status[shot]
-        direction = line_of_flight(shots.obliquity[shot], shots.azimuth[shot])
+        direction = launch.line_of_flight(shots, shot)
         flight = vec3(real(direction[0]), real(direction[1]), real(direction[2]))
         velocity, axis = contact.velocity[shot], contact.axis[shot]
         momentum = contact.angular_momentum[shot]
@@ -101,11 +97,9 @@ def build(variant: Variant) -> SimpleNamespace:
         report.angular_velocity[shot] = wp.where(moves, omega, wp.where(failed, nothing, vec3()))
         report.energy_loss[shot] = wp.where(failed, undefined, contact.energy_loss[shot])
         report.contact_duration[shot] = wp.where(failed, undefined, contact.contact_duration[shot])
-        for k in range(planes.shape[0]):
+        for k in range(standoffs.shape[0]):
             if passes:
-                distance = planes[k] - contact.position[shot][0]
-                if wp.static(variant.scattered):
-                    distance += own.thickness[shot]
+                distance = real(standoffs[k] + launch.own(shots.thickness, shot)) - contact.position[shot][0]
                 then = axis_at(body, axis, momentum, ahead, velocity[0], distance)
                 report_standoff(report, shot, k, then, flight, velocity)
             else:

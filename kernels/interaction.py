@@ -19,7 +19,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Law:
-        """Normal stress a0 + a1 v_n + a2 v_n² [Pa], friction η and ln(β)/Δt_β [1/s].
+        """Normal stress a0 + a1 v_n + a2 v_n² [Pa], friction η and ln(β)/Δt_β [1/s]; β itself, which the literal scheme
+        takes once a step.
 
         `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): a multiple, `onset_jump`
         [m/s²], of the time step, and at most the share `onset_limit` of the core's velocity.
@@ -30,6 +31,7 @@ def build(variant: Variant) -> SimpleNamespace:
         a2: real
         friction: real
         decay_rate: real
+        degradation: real
         onset_jump: real
         onset_limit: real
         onset: real

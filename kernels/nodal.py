@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, interaction, plate_grid, rigid_body
+from . import contact, core_surface, footprint, interaction, plate_grid, rigid_body
 from .variant import Variant
 
 
@@ -20,20 +20,31 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    Surface, Pose, Plate, Fields = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Fields
+    Surface, Pose, Plate = surfaces.Surface, surfaces.Pose, grid.Plate
     Window, Law, Load = grid.Window, laws.Law, motion.Load
-    contacts = contact.build(variant)
-    Footprint, Touches = contacts.Footprint, contacts.Touches
+    Footprint, Touches = footprint.build(variant).Footprint, contact.build(variant).Touches
+
+    @wp.struct
+    class Fields:
+        """Scratch of all slots, each cells_y × cells_z: each node's share of the resistance Y, 0 in holes; and 1 where
+        the step touched the node."""
+
+        share: wp.array(dtype=real)
+        touched: wp.array(dtype=real)
+        cells_y: wp.int32
+        cells_z: wp.int32
 
     @wp.func
     def outward_of(surface: Surface, pose: Pose, index: wp.int32):
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func
-    def open_window(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
+    def open_window(
+        plate: Plate, thickness: real, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64
+    ):
         """A slot's window about a hit: nodes at the centres of the tile's cells, each with its share of the resistance;
         nothing touched."""
-        window = grid.window_at(plate, fields, slot, hit_y, hit_z)
+        window = grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
         dy, dz = plate.period_y / wp.float64(plate.tile_y), plate.period_z / wp.float64(plate.tile_z)
         home_y, home_z = wp.int32(wp.floor(hit_y / dy)), wp.int32(wp.floor(hit_z / dz))
         window.y0 = real((wp.float64(home_y) + wp.float64(0.5)) * dy - hit_y)
@@ -47,8 +58,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 share = plate.tile[row + column]
                 if wp.static(variant.rimmed):
                     share *= grid.on_plate(plate, window, y, window.z0 + real(j - fields.cells_z // 2) * real(dz))
-                fields.exposure[index] = share
-                fields.gain[index] = zero
+                fields.share[index] = share
+                fields.touched[index] = zero
                 index += 1
                 column += 1
                 if column == plate.tile_z:
@@ -56,16 +67,14 @@ def build(variant: Variant) -> SimpleNamespace:
         return window
 
     @wp.func
-    def node_under(fields: Fields, window: Window, point: vec3):
+    def node_under(window: Window, point: vec3):
         """Index of the nearest node."""
         row = wp.int32(wp.floor((point[1] - window.y0) * window.per_row + half))
         column = wp.int32(wp.floor((point[2] - window.z0) * window.per_column + half))
-        return window.home + row * fields.cells_z + column
+        return window.home + row * window.cells_z + column
 
     @wp.func
-    def total_load(
-        surface: Surface, plate: Plate, law: Law, fields: Fields, window: Window, found: Footprint, pose: Pose
-    ):
+    def total_load(surface: Surface, law: Law, fields: Fields, window: Window, found: Footprint, pose: Pose):
         """Σ Y (−n + η t) dS over the points in the slab, t the meridian tangent towards the base."""
         load = Load()
         for index in range(found.first_ring, found.last_ring + 1):
@@ -74,43 +83,35 @@ def build(variant: Variant) -> SimpleNamespace:
                 outward = outward_of(surface, pose, j)
                 arm = ring.station * pose.axis + ring.radius * outward
                 point = pose.position + arm
-                if point[0] >= zero and point[0] <= plate.thickness:
-                    node = node_under(fields, window, point)
+                if point[0] >= zero and point[0] <= window.thickness:
+                    node = node_under(window, point)
                     normal = ring.normal_axial * pose.axis + ring.normal_radial * outward
                     tangent = ring.normal_axial * outward - ring.normal_radial * pose.axis
-                    resistance = law.a0 * fields.exposure[node]
+                    resistance = law.a0 * fields.share[node]
                     force = (resistance * ring.area) * (law.friction * tangent - normal)
-                    load.touching = load.touching or fields.exposure[node] > zero
+                    load.touching = load.touching or fields.share[node] > zero
                     load.force += force
                     load.moment += wp.cross(arm, force)
                     if wp.static(variant.degrades):
-                        fields.gain[node] = one
+                        fields.touched[node] = one
         to_body = wp.transpose(wp.matrix_from_cols(pose.axis, pose.right, pose.up))
         load.force = to_body * load.force
         load.moment = to_body * load.moment
         return load
 
     @wp.func
-    def degrade(
-        surface: Surface,
-        plate: Plate,
-        fields: Fields,
-        window: Window,
-        found: Footprint,
-        pose: Pose,
-        factor: real,
-    ):
+    def degrade(surface: Surface, fields: Fields, window: Window, found: Footprint, pose: Pose, factor: real):
         """Multiply every node that was touched in this step by β, once however many points share it (eq. 6)."""
         for index in range(found.first_ring, found.last_ring + 1):
             ring = surfaces.ring_at(surface, pose, index)
             for j in range(surface.around):
                 arm = ring.station * pose.axis + ring.radius * outward_of(surface, pose, j)
                 point = pose.position + arm
-                if point[0] >= zero and point[0] <= plate.thickness:
-                    node = node_under(fields, window, point)
-                    if fields.gain[node] > zero:
-                        fields.exposure[node] = fields.exposure[node] * factor
-                        fields.gain[node] = zero
+                if point[0] >= zero and point[0] <= window.thickness:
+                    node = node_under(window, point)
+                    if fields.touched[node] > zero:
+                        fields.share[node] = fields.share[node] * factor
+                        fields.touched[node] = zero
 
     @wp.func
     def load_on(
@@ -125,10 +126,10 @@ def build(variant: Variant) -> SimpleNamespace:
         pose: Pose,
         dt: real,
     ):
-        """The load over one step; touched nodes weaken. `law.decay_rate` carries β itself here."""
-        load = total_load(surface, plate, law, fields, window, found, pose)
+        """The load over one step; touched nodes weaken."""
+        load = total_load(surface, law, fields, window, found, pose)
         if wp.static(variant.degrades):
-            degrade(surface, plate, fields, window, found, pose, law.decay_rate)
+            degrade(surface, fields, window, found, pose, law.degradation)
         return load
 
-    return SimpleNamespace(open_window=open_window, load_on=load_on)
+    return SimpleNamespace(Fields=Fields, open_window=open_window, load_on=load_on)

@@ -35,7 +35,6 @@ def build(variant: Variant) -> SimpleNamespace:
         period_z: wp.float64
         half_y: wp.float64
         half_z: wp.float64
-        thickness: real
         spacing: real
         taps: wp.array(dtype=real)
         reach: wp.int32
@@ -43,7 +42,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Fields:
         """Scratch of all slots, each cells_y × cells_z: exposure [s], exposure gained in the step [s], and room for
-        the filter. The literal scheme keeps each node's share of the resistance there, and whether it was touched."""
+        the filter."""
 
         exposure: wp.array(dtype=real)
         gain: wp.array(dtype=real)
@@ -55,11 +54,13 @@ def build(variant: Variant) -> SimpleNamespace:
     class Window:
         """One slot's part of the fields, and how to find the tile. The hit is the node of index `home`: a shot
         computes the same bits in a window of any size. The cell of the tile that holds the hit, the hit's place in it,
-        and cells per metre; the rims of a finite plate [m], seen from the hit. (y0, z0): where the
+        and cells per metre; the thickness of the plate and, seen from the hit, its rims [m]. (y0, z0): where the
         literal scheme has its node `home` [m]."""
 
         first: wp.int32
         home: wp.int32
+        cells_y: wp.int32
+        cells_z: wp.int32
         per_cell: real
         row: wp.int32
         column: wp.int32
@@ -67,6 +68,7 @@ def build(variant: Variant) -> SimpleNamespace:
         tile_z: real
         per_row: real
         per_column: real
+        thickness: real
         low_y: real
         high_y: real
         low_z: real
@@ -92,11 +94,22 @@ def build(variant: Variant) -> SimpleNamespace:
         z_high: wp.int32
 
     @wp.func
-    def window_at(plate: Plate, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64):
+    def window_at(
+        plate: Plate,
+        thickness: real,
+        cells_y: wp.int32,
+        cells_z: wp.int32,
+        slot: wp.int32,
+        hit_y: wp.float64,
+        hit_z: wp.float64,
+    ):
         """The window about a hit, found in float64, so that a hit far from the origin loses nothing."""
         window = Window()
-        window.first = slot * fields.cells_y * fields.cells_z
-        window.home = window.first + (fields.cells_y // 2) * fields.cells_z + fields.cells_z // 2
+        window.first = slot * cells_y * cells_z
+        window.home = window.first + (cells_y // 2) * cells_z + cells_z // 2
+        window.cells_y = cells_y
+        window.cells_z = cells_z
+        window.thickness = thickness
         window.per_cell = one / plate.spacing
         # Whole cells of the tile and the rest apart, so that hits a lattice vector of whole cells apart compute the
         # same bits.
@@ -170,12 +183,12 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.clamp(inside_y, zero, one) * wp.clamp(inside_z, zero, one)
 
     @wp.func
-    def cell_at(fields: Fields, window: Window, y: real, z: real):
+    def cell_at(window: Window, y: real, z: real):
         """The cell of the grid around a point; the caller keeps it inside the window."""
         across, along = y * window.per_cell, z * window.per_cell
         row, column = wp.floor(across), wp.floor(along)
         cell = Cell()
-        cell.index = window.home + wp.int32(row) * fields.cells_z + wp.int32(column)
+        cell.index = window.home + wp.int32(row) * window.cells_z + wp.int32(column)
         cell.y = across - row
         cell.z = along - column
         return cell
@@ -299,7 +312,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def blank(fields: Fields, window: Window):
         """A plate that nothing has touched."""
-        nodes = fields.cells_y * fields.cells_z
+        nodes = window.cells_y * window.cells_z
         clear(fields.exposure, window.first, nodes)
         clear(fields.gain, window.first, nodes)
 
@@ -325,7 +338,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Whole rows at once: what wraps round from one row to the next is zero, for the box keeps the filter's
         reach away from the window's edge.
         """
-        stride = fields.cells_z
+        stride = window.cells_z
         above = plate.reach * stride
         start = window.first + box.y_low * stride
         count = (box.y_high - box.y_low + 1) * stride
@@ -336,8 +349,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
         """Add the other half of the gained exposure and clear it for the next step."""
-        start = window.first + (box.y_low - plate.reach) * fields.cells_z
-        count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * fields.cells_z
+        start = window.first + (box.y_low - plate.reach) * window.cells_z
+        count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * window.cells_z
         take_scaled(fields.exposure, fields.gain, start, count, half)
 
     return SimpleNamespace(

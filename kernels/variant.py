@@ -25,7 +25,6 @@ class Variant:
         rubs: there is friction (η > 0).
         rate_dependent: the normal stress depends on the normal velocity (a1 or a2 > 0).
         rimmed: the plate is finite.
-        scattered: resistance, friction, degradation, thickness or mass differ from shot to shot.
         bends: the core's largest bending moment is recorded.
     """
 
@@ -35,7 +34,6 @@ class Variant:
     rubs: bool = True
     rate_dependent: bool = False
     rimmed: bool = False
-    scattered: bool = False
     bends: bool = False
 
     @property

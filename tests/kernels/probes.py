@@ -8,8 +8,10 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
+from warpimpact.solver import inputs
+from warpimpact.solver.arrays import Grid, half_taps
 from warpimpact.solver.rings import azimuths_of, rings_of
-from warpimpact.solver.tile import tent_taps
+from warpimpact.solver.tile import Tile
 
 
 def records(struct: Any, device: str, **columns: Any) -> wp.array:
@@ -55,22 +57,8 @@ def astride(count: int) -> dict[str, NDArray[np.float64]]:
 
 def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
     """The Surface of a core in `axial` × `around` patches and its discs."""
-    rings, azimuths = rings_of(core, axial, around), azimuths_of(around)
-    names = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
-    area = np.hypot(rings.area_axial, rings.area_radial)
-    arrays = {name: getattr(rings, name) for name in names} | {
-        "area": area,
-        "normal_axial": rings.area_axial / area,
-        "normal_radial": rings.area_radial / area,
-        "cosine": np.cos(azimuths),
-        "sine": np.sin(azimuths),
-    }
-    surface = struct()
-    for name, array in arrays.items():
-        setattr(surface, name, wp.array(array, dtype=wp.float64, device=device))
-    surface.rings, surface.around = len(rings.station), around
-    surface.bounding_radius = core.bounding_radius
-    return surface
+    put = inputs.Put(device, wp.float64)
+    return inputs.surface_of(struct, core, rings_of(core, axial, around), azimuths_of(around), put)
 
 
 def plate_of(
@@ -80,22 +68,20 @@ def plate_of(
     spacing: float,
     device: str,
     *,
-    thickness: float = 4.0e-3,
     length: float = 0.5e-3,
     size: Any = (np.inf, np.inf),
     real: Any = wp.float64,
 ) -> Any:
     """The Plate of a tile of material fractions, with the filter of a degradation length on a grid of some spacing."""
-    plate = struct()
-    plate.tile = wp.array(np.ascontiguousarray(tile).reshape(-1), dtype=real, device=device)
-    plate.tile_y, plate.tile_z = tile.shape
-    plate.period_y, plate.period_z = period
-    plate.half_y, plate.half_z = size[0] / 2, size[1] / 2
-    plate.thickness, plate.spacing = thickness, spacing
-    taps = tent_taps(length, spacing)
-    plate.reach = max(1, len(taps) // 2)
-    plate.taps = wp.array(np.append(taps[len(taps) // 2 :], 0.0), dtype=real, device=device)
-    return plate
+    rows, columns = tile.shape
+    grid = Grid(
+        tile=Tile(tile, period[0] / rows, period[1] / columns),
+        period=period,
+        half_size=(size[0] / 2, size[1] / 2),
+        spacing=spacing,
+        taps=half_taps(length, spacing),
+    )
+    return inputs.plate_of(struct, grid, inputs.Put(device, real))
 
 
 def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str) -> Any:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.kernels import bending, contact, core_surface, rigid_body
+from warpimpact.kernels import bending, contact, core_surface, footprint, rigid_body
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ProfileCore
 from warpimpact.solver.bending import sections_of
@@ -16,13 +16,12 @@ from .probes import poisoned_touches, surface_of
 
 VARIANT = Variant(double=True, bends=True)
 BENDS, MOTION, SURFACES = bending.build(VARIANT), rigid_body.build(VARIANT), core_surface.build(VARIANT)
-CONTACTS = contact.build(VARIANT)
 LENGTH, RADIUS, MASS, RINGS = 0.1, 0.1e-3, 4e-3, 201
 FORCE = 1000.0
 ROD = ProfileCore(s=(0.0, LENGTH), r=(RADIUS, RADIUS), mass=MASS)
 Body, Load, State, Change = MOTION.Body, MOTION.Load, MOTION.State, MOTION.Change
 Surface, Pose = SURFACES.Surface, SURFACES.Pose
-Footprint, Touches = CONTACTS.Footprint, CONTACTS.Touches
+Footprint, Touches = footprint.build(VARIANT).Footprint, contact.build(VARIANT).Touches
 Sections, Bending = BENDS.Sections, BENDS.Bending
 bent = BENDS.bent
 

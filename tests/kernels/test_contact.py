@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels import contact, core_surface, interaction, plate_grid, rigid_body
+from warpimpact.kernels import contact, core_surface, footprint, interaction, plate_grid, rigid_body
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore, OgiveCore, ProfileCore
 
@@ -19,8 +19,8 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-surfaces, grid, laws, motion, contacts = (
-    part.build(VARIANT) for part in (core_surface, plate_grid, interaction, rigid_body, contact)
+surfaces, grid, laws, motion, contacts, prints = (
+    part.build(VARIANT) for part in (core_surface, plate_grid, interaction, rigid_body, contact, footprint)
 )
 Surface, Plate, Fields, Law, Load = surfaces.Surface, grid.Plate, grid.Fields, laws.Law, motion.Load
 Touches = contacts.Touches
@@ -36,6 +36,7 @@ ALIGNED = np.array([[0.0, 0.0, 0.0, 1.0]])
 def loads(
     surface: Surface,
     plate: Plate,
+    thickness: real,
     law: Law,
     fields: Fields,
     touches: Touches,
@@ -51,9 +52,9 @@ def loads(
     """The load of one step of every pose, each on a plate of its own, from slot `first` on; none beyond its window."""
     i = wp.tid()
     slot = first + i
-    window = contacts.open_window(plate, fields, slot, wp.float64(0.0), wp.float64(0.0))
+    window = contacts.open_window(plate, thickness, fields, slot, wp.float64(0.0), wp.float64(0.0))
     pose = surfaces.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
-    found = contacts.footprint_of(surface, plate, fields, window, pose, dt)
+    found = prints.footprint_of(surface, plate, window, pose, dt)
     inside[i] = found.inside
     if found.inside:
         loads[i] = contacts.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
@@ -100,13 +101,13 @@ def loaded(
 ) -> Loaded:
     """Loads of poses in windows of some cells, with as many spare slots before and behind, never opened."""
     count = len(position)
-    plate = plate_of(Plate, tile, np.array(tile.shape) * CELL, CELL, device, thickness=thickness, length=length)
+    plate = plate_of(Plate, tile, np.array(tile.shape) * CELL, CELL, device, length=length)
     fields = poisoned_fields(Fields, count + 2 * spare, *cells, device)
     touches = poisoned_touches(Touches, count + 2 * spare, surface, device)
     omega = np.zeros((count, 3)) if omega is None else omega
     arrays = {"position": position, "attitude": attitude, "velocity": velocity, "omega": omega}
     given = [wp.array(a, dtype=quat if n == "attitude" else vec3, device=device) for n, a in arrays.items()]
-    inputs = [surface, plate, law, fields, touches, spare, *given, dt]
+    inputs = [surface, plate, thickness, law, fields, touches, spare, *given, dt]
     inside, loads = poisoned(count, wp.bool, device), poisoned(count, Load, device)
     wp.launch(LOADS, count, inputs=inputs, outputs=[inside, loads], device=device)
     load, turned = loads.numpy(), Rotation.from_quat(attitude)

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import contact, core_surface, plate_grid
+from warpimpact.kernels import contact, core_surface, footprint, plate_grid
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore
 
@@ -17,10 +17,11 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-surfaces, grid, contacts = (part.build(VARIANT) for part in (core_surface, plate_grid, contact))
-Surface, Plate, Fields, Footprint = surfaces.Surface, grid.Plate, grid.Fields, contacts.Footprint
+surfaces, grid, contacts, prints = (part.build(VARIANT) for part in (core_surface, plate_grid, contact, footprint))
+Surface, Plate, Fields, Footprint = surfaces.Surface, grid.Plate, grid.Fields, prints.Footprint
 
 CELL = 0.25e-3
+THICKNESS = wp.constant(4.0e-3)
 CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, mass=3.0e-3)
 
 
@@ -40,17 +41,17 @@ def footprints(
 ) -> None:
     """The footprints of poses; per ring whether anything is immersed, per patch its first cell."""
     i = wp.tid()
-    window = contacts.open_window(plate, fields, i, wp.float64(0.0), wp.float64(0.0))
+    window = contacts.open_window(plate, real(THICKNESS), fields, i, wp.float64(0.0), wp.float64(0.0))
     pose = surfaces.pose_of(surface, position[i], attitude[i], velocity, omega)
-    found[i] = contacts.footprint_of(surface, plate, fields, window, pose, dt)
+    found[i] = prints.footprint_of(surface, plate, window, pose, dt)
     for k in range(surface.rings):
         ring = surfaces.ring_at(surface, pose, k)
         immersed[i, k] = 0
         for j in range(surface.around):
             patch = surfaces.patch_at(pose, ring, surface.cosine[ring.first + j], surface.sine[ring.first + j])
-            if surfaces.immersed_area(pose, ring, patch, plate.thickness, dt) > real(0.0):
+            if surfaces.immersed_area(pose, ring, patch, window.thickness, dt) > real(0.0):
                 immersed[i, k] = 1
-            cell = grid.cell_at(fields, window, patch.y, patch.z)
+            cell = grid.cell_at(window, patch.y, patch.z)
             rows[i, k, j] = (cell.index - window.first) // fields.cells_z
             columns[i, k, j] = (cell.index - window.first) % fields.cells_z
 

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import contact, core_surface, interaction
+from warpimpact.kernels import core_surface, grip, interaction
 from warpimpact.kernels.variant import Variant
 
 from .probes import poisoned, records
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
-surfaces, laws, contacts = (part.build(VARIANT) for part in (core_surface, interaction, contact))
+surfaces, laws, contacts = (part.build(VARIANT) for part in (core_surface, interaction, grip))
 Ring, Patch, Law, Grip, Face = surfaces.Ring, surfaces.Patch, laws.Law, contacts.Grip, contacts.Face
 
 SLIDING = 100.0  # [m/s]

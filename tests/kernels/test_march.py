@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels.status import Status
 from warpimpact.scene import CirclePattern, ConeCore, Core, Impact, Numerics, OgiveCore, Plate, PolynomialCore, Shots
-from warpimpact.solver import inputs, marching, simulate
+from warpimpact.solver import arrays, marching, simulate
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
-    monkeypatch.setattr(inputs, "STEP_ALLOWANCE", 0.1)
+    monkeypatch.setattr(arrays, "STEP_ALLOWANCE", 0.1)
     outcomes = simulate.simulate(PAPER, SOLID, shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])

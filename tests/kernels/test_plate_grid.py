@@ -26,6 +26,7 @@ Plate, Fields, Window, Cell, Box = grid.Plate, grid.Fields, grid.Window, grid.Ce
 CELL = 0.25e-3
 CELLS_Y, CELLS_Z = 24, 30
 SLOTS = 3
+THICKNESS = wp.constant(4.0e-3)
 TILE = np.random.default_rng(1).random((29, 44))
 PERIOD = np.array([1.7e-3, 2.3e-3])
 HITS = np.array([[1.1e-4, 3.9e-4], [-2.3e-3, -7.7e-4], [5.05e-3, -1.03e-3]])
@@ -39,7 +40,9 @@ def lay(
     windows: wp.array(dtype=Window),
 ) -> None:
     slot = wp.tid()
-    windows[slot] = grid.window_at(plate, fields, slot, hit_y[slot], hit_z[slot])
+    windows[slot] = grid.window_at(
+        plate, real(THICKNESS), fields.cells_y, fields.cells_z, slot, hit_y[slot], hit_z[slot]
+    )
     grid.blank(fields, windows[slot])
 
 
@@ -53,7 +56,7 @@ def look_up(
     values: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
-    cell = grid.cell_at(fields, windows[slot], y[i], z[i])
+    cell = grid.cell_at(windows[slot], y[i], z[i])
     values[i] = grid.gather(field, fields.cells_z, cell.index, cell.y, cell.z)
 
 
@@ -86,11 +89,11 @@ def meet(
 
 def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, found: wp.array(dtype=Cell)) -> None:
     slot = wp.tid()
-    found[slot] = grid.cell_at(fields, windows[slot], y, z)
+    found[slot] = grid.cell_at(windows[slot], y, z)
 
 
 def gain(fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, y: real, z: real, amount: real) -> None:
-    cell = grid.cell_at(fields, windows[slot], y, z)
+    cell = grid.cell_at(windows[slot], y, z)
     grid.scatter(fields.gain, fields.cells_z, cell.index, cell.y, cell.z, amount)
 
 
@@ -123,7 +126,7 @@ def beneath_kernel(variant: Variant) -> Any:
         shares: wp.array(dtype=real),
     ) -> None:
         i = wp.tid()
-        window = part.window_at(plate, fields, 0, hit_y, hit_z)
+        window = part.window_at(plate, real(THICKNESS), fields.cells_y, fields.cells_z, 0, hit_y, hit_z)
         material[i] = plate.tile[part.tile_at(plate, window, y[i], z[i])]
         shares[i] = part.on_plate(plate, window, y[i], z[i])
 

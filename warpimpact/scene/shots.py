@@ -170,8 +170,8 @@ class Shots:
         return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
 
     def own(self, name: str, otherwise: float) -> Array:
-        """A quantity of every shot, where they do not have one of their own that of the scene; shape [shots]."""
-        return self.columns.get(name, np.full(len(self), otherwise))
+        """A quantity of every shot, shape [shots]; where they do not have one of their own that of the scene, [1]."""
+        return self.columns.get(name, np.array([otherwise]))
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:

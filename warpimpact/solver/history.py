@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from warpimpact.kernels.trace import COLUMNS
 from warpimpact.scene import MassProperties
 
 Array = NDArray[np.float64]
@@ -42,8 +43,8 @@ class History:
 
     @classmethod
     def from_trace(cls, trace: Array, body: MassProperties) -> Self:
-        """Read a trace of shape [steps, TRACE_COLUMNS] (kernels/march.py)."""
-        time, position, attitude, velocity, momentum, force, moment = np.split(trace, (1, 4, 8, 11, 14, 17), axis=1)
+        """Read a trace of shape [steps, WIDTH] (kernels/trace.py)."""
+        time, position, attitude, velocity, momentum, force, moment = (trace[:, part] for part in COLUMNS.values())
         axis = Rotation.from_quat(attitude).apply([1.0, 0.0, 0.0])
         along = np.sum(momentum * axis, axis=1, keepdims=True) * axis
         omega = along / body.inertia_axial + (momentum - along) / body.inertia_transverse

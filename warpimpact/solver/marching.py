@@ -15,9 +15,10 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels import free_flight
-from warpimpact.kernels.march import TRACE_COLUMNS
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Core, Interaction, MassProperties, Numerics, Plate, Shots
+from warpimpact.kernels.trace import WIDTH
+from warpimpact.scene import MassProperties, Numerics, Scene, Shots
+from warpimpact.solver.arrays import arrays_of
 from warpimpact.solver.device import cores, load
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.resolution import Fidelity
@@ -43,30 +44,26 @@ class March:
     """One scene on one device, ready to march; see `simulate` for the arguments.
 
     Args:
-        bending: follow the bending moment.
         traced: keep the history of every shot.
     """
 
     def __init__(
         self,
-        core: Core,
-        plate: Plate,
-        interaction: Interaction,
+        scene: Scene,
         numerics: Numerics | Fidelity,
         shots: Shots,
         device: Any,
         *,
         threads: int | None = None,
-        bending: bool = False,
         traced: bool = False,
     ) -> None:
-        self.core, self.plate, self.shots, self.device = core, plate, shots, device
+        self.scene, self.shots, self.device = scene, shots, device
         self.threads = threads or cores()
-        self.inputs = Inputs(core, plate, interaction, numerics, shots, device, traced=traced, bending=bending)
-        self.variant, self.stage = self.inputs.variant, self.inputs.stage
-        shape = (len(shots) * self.inputs.pace.rows, TRACE_COLUMNS)
-        self.history = wp.empty(shape, dtype=self.variant.real, device=device)
-        self.bending = wp.empty(len(shots) if bending else 0, dtype=self.stage.Bending, device=device)
+        self.arrays = arrays_of(scene, numerics, shots, traced=traced)
+        self.inputs = Inputs(self.arrays, device)
+        self.variant, self.stage = self.arrays.variant, self.inputs.stage
+        self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
+        self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -86,29 +83,29 @@ class March:
 
     def traces(self, contact: Any) -> list[Array]:
         """What every shot of a traced march wrote, the state at its end included."""
-        rows = self.history.numpy().reshape(len(self.shots), self.inputs.pace.rows, TRACE_COLUMNS)
+        rows = self.history.numpy().reshape(len(self.shots), self.arrays.rows, WIDTH)
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
         """Share of the resistance left for the first shot after some steps on the CPU, in its window once marched."""
         scratch = self._scratch(1, *self.cells)
         self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
-        first = self.inputs.array(np.zeros(1), dtype=wp.int32)
+        first = self.inputs.put(np.zeros(1), wp.int32)
         self._launch(first, self._empty(self.stage.Outcomes, (1,)), scratch, 1, 0, 1)
-        left = _host(scratch[0].exposure).reshape(self.cells) if self._field_count() else np.zeros(self.cells)
         if self.variant.nodal:
-            return left
-        return self._material() * np.exp(self.inputs.each["decay_rate"][0] * left)
+            return _host(scratch[0].share).reshape(self.cells)
+        exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
+        return self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure)
 
     def body(self) -> MassProperties:
         """Mass properties of the first shot."""
         names = ("mass", "inertia_axial", "inertia_transverse")
-        return self.core.mass_properties._replace(**{name: float(self.inputs.each[name][0]) for name in names})
+        return self.scene.core.mass_properties._replace(**{name: float(self.arrays.shots[name][0]) for name in names})
 
     def nodes(self) -> tuple[Array, Array]:
         """Where the nodes of the first shot's window are in the plate [m], along y and z."""
         hit = self.shots.hit_y[0], self.shots.hit_z[0]
-        spacing = self.inputs.spacing
+        spacing = self.arrays.grid.spacing
         y, z = (at + (np.arange(count) - count // 2) * spacing for at, count in zip(hit, self.cells, strict=True))
         return y, z
 
@@ -116,22 +113,21 @@ class March:
         """Share of material about every node of the first shot's window."""
         samples = 16
         fine = (np.arange(samples) + 0.5) / samples - 0.5
-        y, z = ((nodes[:, None] + self.inputs.spacing * fine).reshape(-1) for nodes in self.nodes())
-        solid = self.plate.is_solid(y[:, None], z[None, :])
+        y, z = ((nodes[:, None] + self.arrays.grid.spacing * fine).reshape(-1) for nodes in self.nodes())
+        solid = self.scene.target.plate.is_solid(y[:, None], z[None, :])
         shape = (self.cells[0], samples, self.cells[1], samples)
         return np.asarray(solid.reshape(shape).mean(axis=(1, 3)))
 
-    def report(self, contact: Any, standoffs: Array, standoff_point: str) -> dict[str, NDArray[Any]]:
+    def report(self, contact: Any) -> dict[str, NDArray[Any]]:
         """Free flight to the stand-offs, and everything back on the host, by the names of `Outcomes`."""
-        count, inputs = len(self.shots), self.inputs
-        flight = free_flight.build(self.variant)
+        count, record = len(self.shots), self.scene.record
+        flight, standoffs = free_flight.build(self.variant), np.array(record.standoffs, dtype=np.float64)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
-        ahead = self.core.mass_properties.centre_of_mass if standoff_point == "nose" else 0.0
-        planes = standoffs + (0.0 if self.variant.scattered else self.plate.thickness)
+        ahead = self.scene.core.mass_properties.centre_of_mass if record.standoff_point == "nose" else 0.0
         wp.launch(
             flight.kernel,
             count,
-            inputs=[inputs.body, inputs.shots, inputs.own, contact, inputs.array(planes), ahead],
+            inputs=[self.inputs.shots, contact, self.inputs.put(standoffs, wp.float64), ahead],
             outputs=[report],
             device=self.device,
         )
@@ -162,16 +158,16 @@ class March:
 
     def _window_cells(self) -> tuple[int, int]:
         """Cells of a window that holds the footprint of a core that keeps its attitude through the plate."""
-        shots, inputs = self.shots, self.inputs
+        shots, arrays = self.shots, self.arrays
         slack = NODAL_SLACK if self.variant.nodal else WINDOW_SLACK
         steepest = float(shots.obliquity.max())
         turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
         half = (
-            slack * self.core.max_radius / math.cos(steepest)
-            + float(inputs.each["thickness"].max()) * math.tan(steepest)
-            + self.core.bounding_radius * turned
+            slack * arrays.core.max_radius / math.cos(steepest)
+            + float(arrays.shots["thickness"].max()) * math.tan(steepest)
+            + arrays.core.bounding_radius * turned
         )
-        cells_y = cells_z = 2 * (math.ceil(half / inputs.spacing) + 2 * inputs.plate.reach + 3)
+        cells_y = cells_z = 2 * (math.ceil(half / arrays.grid.spacing) + 2 * self.inputs.plate.reach + 3)
         while not self._fits(cells_y, cells_z):  # what leaves a smaller window gets its named status
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
@@ -180,10 +176,15 @@ class March:
         size = 8 if self.variant.double else 4
         per_ring = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings = self.inputs.surface.rings * per_ring
-        return self._field_count() * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
+        return len(self._fields()) * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
 
-    def _field_count(self) -> int:
-        return 2 if self.variant.nodal else 3 if self.variant.degrades else 0
+    def _fields(self) -> list[str]:
+        """Names of the fields that a slot needs."""
+        return [name for name in self.stage.Fields.vars if name not in ("cells_y", "cells_z") and self._keeps_fields]
+
+    @property
+    def _keeps_fields(self) -> bool:
+        return self.variant.nodal or self.variant.degrades
 
     def _patches(self) -> int:
         """Patches of a slot's touches."""
@@ -204,7 +205,7 @@ class March:
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         scratch, touches = self.stage.Fields(), self.stage.Touches()
         scratch.cells_y, scratch.cells_z = cells_y, cells_z
-        for name in ("exposure", "gain", "filtered")[: self._field_count()]:
+        for name in self._fields():
             setattr(scratch, name, empty(slots * cells_y * cells_z))
         patches = slots * self._patches()
         for name in ("area", "slope", "shift", "gain", "y", "z"):
@@ -236,12 +237,10 @@ class March:
                 slots,
                 order,
                 inputs.surface,
-                inputs.body,
                 inputs.sections,
                 inputs.plate,
                 inputs.law,
                 inputs.shots,
-                inputs.own,
                 inputs.pace,
                 *scratch,
             ],
@@ -253,7 +252,7 @@ class March:
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
         load(self.stage.kernel, self.device)
-        launch = partial(self._launch, self.inputs.array(which, dtype=wp.int32), outcomes)
+        launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
         if self.device.is_cpu:
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)
         else:

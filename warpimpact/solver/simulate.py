@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels import free_flight
 from warpimpact.kernels import march as marching
-from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots
+from warpimpact.scene import Core, Interaction, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.solver.arrays import variant_of
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
-from warpimpact.solver.inputs import variant_of
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.resolution import Fidelity, resolve
 
@@ -115,17 +115,14 @@ def simulate(
         DeviceError: the device is absent.
         ValueError: the core or the numerics have no bending moment.
     """
-    march = March(
-        core,
-        plate,
-        interaction or Interaction(),
-        numerics or Numerics(),
-        shots,
-        find_device(device),
-        threads=threads,
-        bending=bending,
+    scene = Scene.model_construct(
+        core=core,
+        target=Target.model_construct(plate=plate),
+        interaction=interaction or Interaction(),
+        record=Record(standoffs=tuple(standoffs), standoff_point=standoff_point, bending=bending),
     )
-    return _outcomes(march, march.march(progress), standoffs, standoff_point)
+    march = March(scene, numerics or Numerics(), shots, find_device(device), threads=threads)
+    return _outcomes(march, march.march(progress))
 
 
 def build(
@@ -140,13 +137,22 @@ def build(
 ) -> None:
     """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
     resolution = resolve(numerics or Numerics(), core, plate, shots.columns)
-    variant = variant_of(resolution, plate, interaction or Interaction(), shots, bending=bending)
+    variant = variant_of(
+        resolution,
+        Scene.model_construct(
+            core=core,
+            target=Target.model_construct(plate=plate),
+            interaction=interaction or Interaction(),
+            record=Record(bending=bending),
+        ),
+        shots,
+    )
     for stage in (marching, free_flight):
         load(stage.build(variant).kernel, find_device(device))
 
 
-def _outcomes(march: March, contact: Any, standoffs: Sequence[float], standoff_point: str) -> Outcomes:
-    report = march.report(contact, np.asarray(standoffs, dtype=float), standoff_point)
+def _outcomes(march: March, contact: Any) -> Outcomes:
+    report = march.report(contact)
     return BentOutcomes(**report) if march.variant.bends else Outcomes(**report)
 
 
@@ -181,14 +187,21 @@ def replay(
         shot: shots of length 1; the others as in `simulate`.
         snapshots: how often the plate is shown, evenly from the first touch to the end.
     """
-    march = _traced(core, plate, shot, interaction, numerics, bending=bending)
+    march = _traced(
+        core,
+        plate,
+        shot,
+        interaction,
+        numerics,
+        Record(standoffs=tuple(standoffs), standoff_point=standoff_point, bending=bending),
+    )
     contact = march.march()
     (trace,) = march.traces(contact)
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     cell_y, cell_z = march.nodes()
     return Replay(
-        outcomes=_outcomes(march, contact, standoffs, standoff_point),
+        outcomes=_outcomes(march, contact),
         history=History.from_trace(trace, march.body()),
         plate_time=steps * time_step,
         resistance_share=np.stack([march.plate_after(count, time_step) for count in steps]),
@@ -197,22 +210,8 @@ def replay(
     )
 
 
-def _traced(
-    core: Core,
-    plate: Plate,
-    shots: Shots,
-    interaction: Interaction | None,
-    numerics: Numerics | Fidelity | None,
-    *,
-    bending: bool = False,
-) -> March:
-    return March(
-        core,
-        plate,
-        interaction or Interaction(),
-        numerics or Numerics(),
-        shots,
-        find_device("cpu"),
-        bending=bending,
-        traced=True,
+def _traced(core, plate, shots, interaction, numerics, record=Record()):
+    scene = Scene.model_construct(
+        core=core, target=Target.model_construct(plate=plate), interaction=interaction or Interaction(), record=record
     )
+    return March(scene, numerics or Numerics(), shots, find_device("cpu"), traced=True)

@@ -1,0 +1,90 @@
+"""What a step can touch: the rings in the slab, and the nodes of the window around them."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import core_surface, plate_grid
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the footprint for one variant."""
+    real, vec3 = variant.real, variant.vec3
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    surfaces, grid = core_surface.build(variant), plate_grid.build(variant)
+    Surface, Pose, ring_at = surfaces.Surface, surfaces.Pose, surfaces.ring_at
+    Plate, Window, Box = grid.Plate, grid.Window, grid.Box
+    far = wp.constant(2**20)  # nodes away: beyond any window
+
+    @wp.struct
+    class Footprint:
+        """What a step can touch: the first and last ring that can be in the slab (none: last < first), whether all
+        rings are beyond its rear face (`through`) or before its front face (`back`), and the nodes around those in the
+        slab; `inside` tells whether the window holds them."""
+
+        first_ring: wp.int32
+        last_ring: wp.int32
+        through: wp.bool
+        back: wp.bool
+        inside: wp.bool
+        box: Box
+
+    @wp.func
+    def node_below(window: Window, place: real):
+        """Nodes from the hit to the last one before a place along one direction."""
+        return wp.int32(wp.floor(place * window.per_cell))
+
+    @wp.func
+    def footprint_of(surface: Surface, plate: Plate, window: Window, pose: Pose, dt: real):
+        """The footprint in mid-step; patches act at their centres, so a ring covers centre ± radius."""
+        broadside = surfaces.broadside(pose)
+        across_y = wp.sqrt(wp.max(zero, one - pose.axis[1] * pose.axis[1]))
+        across_z = wp.sqrt(wp.max(zero, one - pose.axis[2] * pose.axis[2]))
+        advance = half * dt * wp.abs(wp.dot(pose.velocity, vec3(pose.axis[0], pose.right[0], pose.up[0])))
+        turning = half * dt * wp.length(pose.omega)
+        # Integers, because a CPU takes the least of a vector of them, but not of numbers that may be NaN.
+        first_ring, last_ring, not_through, not_back = int(surface.rings), int(-1), int(0), int(0)
+        y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
+        index = int(0)
+        while index < surface.rings:
+            ring = ring_at(surface, pose, index)
+            reach = surfaces.reach_along_x(ring, pose, broadside, advance, turning)
+            foremost, rearmost = ring.centre[0] + reach, ring.centre[0] - reach
+            within = foremost > zero and rearmost < window.thickness
+            first_ring = wp.min(first_ring, wp.where(within, index, surface.rings))
+            last_ring = wp.max(last_ring, wp.where(within, index, -1))
+            not_through += wp.where(rearmost > window.thickness, 0, 1)
+            not_back += wp.where(foremost < zero, 0, 1)
+            wide_y, wide_z = ring.radius * across_y, ring.radius * across_z
+            y_low = wp.min(y_low, wp.where(within, node_below(window, ring.centre[1] - wide_y), far))
+            z_low = wp.min(z_low, wp.where(within, node_below(window, ring.centre[2] - wide_z), far))
+            y_high = wp.max(y_high, wp.where(within, node_below(window, ring.centre[1] + wide_y), -far))
+            z_high = wp.max(z_high, wp.where(within, node_below(window, ring.centre[2] + wide_z), -far))
+            index += 1
+        found = Footprint()
+        found.first_ring = first_ring
+        found.last_ring = last_ring
+        found.through = not_through == 0
+        found.back = not_back == 0
+        found.inside = True
+        if last_ring >= 0:
+            # One node of slack: rounding of a patch on the ring's outermost point must stay inside.
+            home_y, home_z = window.cells_y // 2, window.cells_z // 2
+            found.box.y_low = home_y + y_low - 1
+            found.box.y_high = home_y + y_high + 2
+            found.box.z_low = home_z + z_low - 1
+            found.box.z_high = home_z + z_high + 2
+            # The filter's first pass takes rows twice its reach away, and looks a little beyond them.
+            rows = 2 * plate.reach + 1
+            found.inside = (
+                found.box.y_low >= rows
+                and found.box.z_low >= plate.reach
+                and found.box.y_high < window.cells_y - rows
+                and found.box.z_high < window.cells_z - plate.reach
+            )
+        return found
+
+    return SimpleNamespace(Footprint=Footprint, footprint_of=footprint_of)

@@ -1,0 +1,76 @@
+"""How a curved patch touches: normal and closing speed vary linearly over it, and only the part that closes in does."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import core_surface, interaction
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of a patch's contact for one variant."""
+    real = variant.real
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    surfaces, laws = core_surface.build(variant), interaction.build(variant)
+    Pose, Ring, Patch, Law = surfaces.Pose, surfaces.Ring, surfaces.Patch, laws.Law
+    tiny = real(1.0e-30)
+
+    @wp.struct
+    class Grip:
+        """How a patch touches: the share of it in contact, its derivative by the closing speed [s/m], and how far the
+        middle of that share is from the patch's own, in halves of the patch and per variation of the closing speed
+        over it [s/m]."""
+
+        share: real
+        slope: real
+        shift: real
+
+    @wp.struct
+    class Face:
+        """The part of a patch in contact: its normal (axial, outwards, around) and its closing speed [m/s]."""
+
+        axial: real
+        outward: real
+        around: real
+        closing: real
+
+    @wp.func
+    def variations(ring: Ring, patch: Patch):
+        """Half of what the closing speed varies by over a patch, along the meridian and around [m/s]."""
+        meridian = ring.turn_axial * patch.velocity_axial + ring.turn_radial * patch.velocity_outward
+        return meridian, ring.sector * ring.normal_radial * patch.velocity_around
+
+    @wp.func
+    def grip_of(law: Law, pose: Pose, ring: Ring, patch: Patch):
+        """Contact of a curved patch: normal and closing speed vary linearly over it, and only the part that closes in
+        touches. Without this, contact along a shank would come and go by whole patches."""
+        meridian, around = variations(ring, patch)
+        variation = wp.sqrt(meridian * meridian + around * around)
+        per_variation = one / (variation + tiny)
+        rate = laws.onset_rate(law, per_variation)
+        grip = Grip()
+        grip.share = laws.contact_fraction(patch.closing, variation, rate, pose.speed)
+        grip.slope = wp.where(grip.share < one, rate, zero)
+        # 0 if all of it touches.
+        grip.shift = wp.clamp(half - half * patch.closing * per_variation, zero, one) * per_variation
+        return grip
+
+    @wp.func
+    def face_of(ring: Ring, patch: Patch, shift: real):
+        """The part of a patch in contact, from its grip's shift."""
+        meridian, around = variations(ring, patch)
+        face = Face()
+        face.axial = ring.normal_axial + shift * meridian * ring.turn_axial
+        face.outward = ring.normal_radial + shift * meridian * ring.turn_radial
+        face.around = shift * around * ring.sector * ring.normal_radial
+        face.closing = patch.closing + shift * (meridian * meridian + around * around)
+        return face
+
+    @wp.func
+    def normal_along_x(pose: Pose, patch: Patch, face: Face):
+        return face.axial * pose.axis[0] + face.outward * patch.outward_x + face.around * patch.around_x
+
+    return SimpleNamespace(Grip=Grip, Face=Face, grip_of=grip_of, face_of=face_of, normal_along_x=normal_along_x)

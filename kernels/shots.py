@@ -1,0 +1,163 @@
+"""What hits what: the conditions of every shot, and the scene's own values where they do not differ.
+
+Every array has one value for all shots or one per shot, and one line reads both.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+from . import core_surface, interaction, rigid_body
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the shots for one variant."""
+    real, vec3, quat = variant.real, variant.vec3, variant.quat
+    tiny = wp.float64(1.0e-9)
+    surfaces, laws, motion = (part.build(variant) for part in (core_surface, interaction, rigid_body))
+    Surface, Pose, Law, Body, State = surfaces.Surface, surfaces.Pose, laws.Law, motion.Body, motion.State
+
+    @wp.struct
+    class Shots:
+        """Arrays of shape [1] or [shots], SI and radians.
+
+        Where the core hits and how it arrives (MODEL.md §1); the thickness of the plate [m], the members of Body and
+        Law, and those of Pace that follow from them.
+        """
+
+        hit_y: wp.array(dtype=wp.float64)
+        hit_z: wp.array(dtype=wp.float64)
+        velocity: wp.array(dtype=wp.float64)
+        obliquity: wp.array(dtype=wp.float64)
+        azimuth: wp.array(dtype=wp.float64)
+        pitch: wp.array(dtype=wp.float64)
+        yaw: wp.array(dtype=wp.float64)
+        spin: wp.array(dtype=wp.float64)
+        thickness: wp.array(dtype=wp.float64)
+        mass: wp.array(dtype=real)
+        inertia_axial: wp.array(dtype=real)
+        inertia_transverse: wp.array(dtype=real)
+        a0: wp.array(dtype=real)
+        a1: wp.array(dtype=real)
+        friction: wp.array(dtype=real)
+        decay_rate: wp.array(dtype=real)
+        degradation: wp.array(dtype=real)
+        onset_jump: wp.array(dtype=real)
+        way: wp.array(dtype=wp.float64)
+        longest_time: wp.array(dtype=wp.float64)
+        longest_step: wp.array(dtype=wp.float64)
+        longest_way: wp.array(dtype=wp.float64)
+
+    @wp.struct
+    class Pace:
+        """The time step [s], or if that is 0 the way per step [m] at impact velocity, of which `way_along` at most may
+        lie in the plane of the plate and which takes `longest_time` [s] at most, if a quarter of the way is enough for
+        both; the most that any step may take; and the way [m], at impact velocity, after which a shot that has not
+        ended is given up. `rows` of the trace belong to each shot; none if it is 0: not a build of its own, so that a
+        shot computes the same bits with a trace and without."""
+
+        time_step: wp.float64
+        way: wp.float64
+        way_along: wp.float64
+        longest_time: wp.float64
+        longest_step: wp.float64
+        longest_way: wp.float64
+        rows: wp.int32
+
+    @wp.func
+    def own(values: wp.array(dtype=Any), shot: wp.int32):
+        """The value of one shot."""
+        return values[shot % values.shape[0]]
+
+    @wp.func
+    def body_of(shots: Shots, shot: wp.int32):
+        body = Body()
+        body.mass = own(shots.mass, shot)
+        body.inertia_axial = own(shots.inertia_axial, shot)
+        body.inertia_transverse = own(shots.inertia_transverse, shot)
+        return body
+
+    @wp.func
+    def law_of(scene: Law, shots: Shots, shot: wp.int32):
+        law = scene
+        law.a0 = own(shots.a0, shot)
+        law.a1 = own(shots.a1, shot)
+        law.friction = own(shots.friction, shot)
+        law.decay_rate = own(shots.decay_rate, shot)
+        law.degradation = own(shots.degradation, shot)
+        law.onset_jump = own(shots.onset_jump, shot)
+        return law
+
+    @wp.func
+    def pace_of(scene: Pace, shots: Shots, shot: wp.int32):
+        pace = scene
+        pace.way = own(shots.way, shot)
+        pace.longest_time = own(shots.longest_time, shot)
+        pace.longest_step = own(shots.longest_step, shot)
+        pace.longest_way = own(shots.longest_way, shot)
+        return pace
+
+    @wp.func
+    def step_of(pace: Pace, speed: wp.float64, obliquity: wp.float64):
+        """Time step of a shot [s]."""
+        way = pace.time_step * speed
+        if way == wp.float64(0.0):
+            bound = wp.min(pace.way_along / wp.max(wp.sin(obliquity), tiny), pace.longest_time * speed)
+            way = wp.clamp(bound, wp.float64(0.25) * pace.way, pace.way)
+        return real(wp.min(way, pace.longest_step) / speed)
+
+    @wp.func
+    def line_of_flight(shots: Shots, shot: wp.int32):
+        """Unit vector along the line of fire."""
+        obliquity, azimuth = own(shots.obliquity, shot), own(shots.azimuth, shot)
+        sine = wp.sin(obliquity)
+        return wp.vec3d(wp.cos(obliquity), sine * wp.cos(azimuth), sine * wp.sin(azimuth))
+
+    @wp.func
+    def attitude_of(axis: wp.vec3d):
+        """The shortest turn that takes the plate normal to the axis (axis_x > 0)."""
+        return wp.normalize(wp.quatd(wp.float64(0.0), -axis[2], axis[1], wp.float64(1.0) + axis[0]))
+
+    @wp.func
+    def foremost(surface: Surface, pose: Pose):
+        """How far the core reaches ahead of its centre of mass along x [m]."""
+        front = -surface.bounding_radius
+        for index in range(surface.rings):
+            ring = surfaces.ring_at(surface, pose, index)
+            broadside = surfaces.broadside(pose)
+            middle = ring.station * pose.axis[0] + ring.radius * broadside
+            front = wp.max(front, middle + wp.abs(ring.half_axial * pose.axis[0] + ring.half_radial * broadside))
+        return front
+
+    @wp.func
+    def launch_state(surface: Surface, body: Body, shots: Shots, shot: wp.int32):
+        """State with the foremost point at the front face, the centre of mass on the line through the hit."""
+        flight = line_of_flight(shots, shot)
+        yaw = wp.atan2(flight[1], flight[0]) + own(shots.yaw, shot)
+        pitch = wp.atan2(flight[2], flight[0]) + own(shots.pitch, shot)
+        axis = wp.normalize(wp.vec3d(wp.float64(1.0), wp.tan(yaw), wp.tan(pitch)))
+        turn = attitude_of(axis)
+        direction = vec3(real(flight[0]), real(flight[1]), real(flight[2]))
+        state = State()
+        state.attitude = quat(real(turn[0]), real(turn[1]), real(turn[2]), real(turn[3]))
+        state.velocity = real(own(shots.velocity, shot)) * direction
+        state.angular_momentum = (body.inertia_axial * real(own(shots.spin, shot))) * motion.axis_of(state.attitude)
+        pose = surfaces.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())
+        state.position = (-foremost(surface, pose) / direction[0]) * direction
+        return state
+
+    return SimpleNamespace(
+        Shots=Shots,
+        Pace=Pace,
+        own=own,
+        body_of=body_of,
+        law_of=law_of,
+        pace_of=pace_of,
+        step_of=step_of,
+        line_of_flight=line_of_flight,
+        launch_state=launch_state,
+    )

@@ -1,0 +1,51 @@
+"""The trace of a shot: one row of numbers per step, and a last one, without load, where contact ended."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import rigid_body
+from .variant import Variant
+
+COLUMNS = {
+    "time": slice(0, 1),
+    "position": slice(1, 4),
+    "attitude": slice(4, 8),
+    "velocity": slice(8, 11),
+    "angular_momentum": slice(11, 14),
+    "force": slice(14, 17),
+    "moment": slice(17, 20),
+}
+"""Where a row holds what: the attitude as (x, y, z, w), force and moment as means over the step; SI."""
+WIDTH = COLUMNS["moment"].stop
+"""Numbers per row."""
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the trace for one variant."""
+    real, vec3 = variant.real, variant.vec3
+    State = rigid_body.build(variant).State
+    time_at, position_at, attitude_at, velocity_at, momentum_at, force_at, moment_at = (
+        wp.constant(columns.start) for columns in COLUMNS.values()
+    )
+
+    @wp.func
+    def write_vec3(trace: wp.array2d(dtype=real), row: wp.int32, column: wp.int32, value: vec3):
+        for k in range(3):
+            trace[row, column + k] = value[k]
+
+    @wp.func
+    def record(trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, force: vec3, moment: vec3):
+        """One traced step: the state after its kick, and the load that made it."""
+        trace[row, time_at] = time
+        write_vec3(trace, row, position_at, state.position)
+        for k in range(4):
+            trace[row, attitude_at + k] = state.attitude[k]
+        write_vec3(trace, row, velocity_at, state.velocity)
+        write_vec3(trace, row, momentum_at, state.angular_momentum)
+        write_vec3(trace, row, force_at, force)
+        write_vec3(trace, row, moment_at, moment)
+
+    return SimpleNamespace(record=record)
