@@ -19,6 +19,7 @@ from .patterns import (
 from .plate import Plate
 from .sampling import Sampler, make_shots
 from .scatter import OF_THE_SCENE, Scatter
+from .scene import Record, Scene, Target
 from .shots import Hits, Impact, Shots
 from .symmetry import IDENTITY, Symmetry, symmetries_used
 
@@ -45,12 +46,15 @@ __all__ = [
     "Plate",
     "PolynomialCore",
     "ProfileCore",
+    "Record",
     "Sampler",
     "Scatter",
+    "Scene",
     "Shots",
     "SlotPattern",
     "SquarePattern",
     "Symmetry",
+    "Target",
     "Tolerance",
     "TrianglePattern",
     "make_shots",

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels import march
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import OF_THE_SCENE, Core, Interaction, Numerics, Plate, Shots
+from warpimpact.scene import OF_THE_SCENE, Core, Interaction, Numerics, Plate, Scene, Shots
 from warpimpact.solver import inputs
 from warpimpact.solver.bending import check_bending, sections_of
 from warpimpact.solver.resolution import Fidelity, Resolution, decay_rate, resolve
@@ -38,10 +38,9 @@ STEP_ALLOWANCE = 200
 """How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
 
 
-def variant_of(
-    resolution: Resolution, plate: Plate, interaction: Interaction, shots: Shots, *, bending: bool
-) -> Variant:
+def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
     """The build of the kernels that a scene needs."""
+    plate, interaction = scene.target.plate, scene.interaction
     return Variant(
         double=resolution.double,
         nodal=resolution.nodal,
@@ -49,7 +48,7 @@ def variant_of(
         rubs=plate.shear_coefficient > 0.0 or "shear_coefficient" in shots.columns,
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
         rimmed=plate.size is not None,
-        bends=bending,
+        bends=scene.record.bending,
         scattered=any(name in shots.columns for name in OF_THE_SCENE),
     )
 
@@ -68,21 +67,18 @@ class Inputs:
 
     def __init__(
         self,
-        core: Core,
-        plate: Plate,
-        interaction: Interaction,
+        scene: Scene,
         numerics: Numerics | Fidelity,
         shots: Shots,
         device: Any,
         *,
         traced: bool,
-        bending: bool,
     ) -> None:
-        if bending:
-            check_bending(core, numerics)
+        check_bending(scene.record, numerics)
+        core, plate, interaction = scene.core, scene.target.plate, scene.interaction
         self._device = device
-        self.resolution = resolve(numerics, core, plate, shots.columns)
-        self.variant = variant_of(self.resolution, plate, interaction, shots, bending=bending)
+        self.resolution = resolve(numerics, scene, shots.columns)
+        self.variant = variant_of(self.resolution, scene, shots)
         self.stage = march.build(self.variant)
         self.spacing = self.resolution.grid_spacing
         self._rings = rings_of(

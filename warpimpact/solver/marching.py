@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight
 from warpimpact.kernels.march import TRACE_COLUMNS
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Core, Interaction, MassProperties, Numerics, Plate, Shots
+from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.device import cores, load
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.resolution import Fidelity
@@ -43,30 +43,27 @@ class March:
     """One scene on one device, ready to march; see `simulate` for the arguments.
 
     Args:
-        bending: follow the bending moment.
         traced: keep the history of every shot.
     """
 
     def __init__(
         self,
-        core: Core,
-        plate: Plate,
-        interaction: Interaction,
+        scene: Scene,
         numerics: Numerics | Fidelity,
         shots: Shots,
         device: Any,
         *,
         threads: int | None = None,
-        bending: bool = False,
         traced: bool = False,
     ) -> None:
-        self.core, self.plate, self.shots, self.device = core, plate, shots, device
+        self.core, self.plate, self.record = scene.core, scene.target.plate, scene.record
+        self.shots, self.device = shots, device
         self.threads = threads or cores()
-        self.inputs = Inputs(core, plate, interaction, numerics, shots, device, traced=traced, bending=bending)
+        self.inputs = Inputs(scene, numerics, shots, device, traced=traced)
         self.variant, self.stage = self.inputs.variant, self.inputs.stage
         shape = (len(shots) * self.inputs.pace.rows, TRACE_COLUMNS)
         self.history = wp.empty(shape, dtype=self.variant.real, device=device)
-        self.bending = wp.empty(len(shots) if bending else 0, dtype=self.stage.Bending, device=device)
+        self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -121,12 +118,12 @@ class March:
         shape = (self.cells[0], samples, self.cells[1], samples)
         return np.asarray(solid.reshape(shape).mean(axis=(1, 3)))
 
-    def report(self, contact: Any, standoffs: Array, standoff_point: str) -> dict[str, NDArray[Any]]:
+    def report(self, contact: Any) -> dict[str, NDArray[Any]]:
         """Free flight to the stand-offs, and everything back on the host, by the names of `Outcomes`."""
-        count, inputs = len(self.shots), self.inputs
+        count, inputs, standoffs = len(self.shots), self.inputs, np.array(self.record.standoffs)
         flight = free_flight.build(self.variant)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
-        ahead = self.core.mass_properties.centre_of_mass if standoff_point == "nose" else 0.0
+        ahead = self.core.mass_properties.centre_of_mass if self.record.standoff_point == "nose" else 0.0
         planes = standoffs + (0.0 if self.variant.scattered else self.plate.thickness)
         wp.launch(
             flight.kernel,
