@@ -26,13 +26,17 @@ if TYPE_CHECKING:
         Plate,
         PolynomialCore,
         ProfileCore,
+        Record,
         Scatter,
+        Scene,
         Shots,
         SlotPattern,
         SquarePattern,
+        Target,
         TrianglePattern,
         make_shots,
     )
+    from .solver.simulate import simulate
 
     __version__: str
 
@@ -53,18 +57,27 @@ __all__ = [
     "Plate",
     "PolynomialCore",
     "ProfileCore",
+    "Record",
     "Scatter",
+    "Scene",
     "Shots",
     "SlotPattern",
     "SquarePattern",
+    "Target",
     "TrianglePattern",
     "__version__",
     "make_shots",
     "run",
+    "simulate",
     "to_dataframe",
 ]
 
-_HOMES = {"Campaign": ".campaign.campaign", "run": ".campaign.run", "to_dataframe": ".export.table"}
+_HOMES = {
+    "Campaign": ".campaign.campaign",
+    "run": ".campaign.run",
+    "simulate": ".solver.simulate",
+    "to_dataframe": ".export.table",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -46,7 +46,7 @@ class Work:
 def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
     """What the law asks for at one resolution, from the histories of the shots on the CPU."""
     core, plate = campaign.core, campaign.plate
-    resolution = resolve(numerics, core, plate)
+    resolution = resolve(numerics, campaign.scene)
     rings = rings_of(core, resolution.patches_axial, resolution.patches_around, resolution.patch_width)
     azimuth = (np.arange(resolution.patches_around) + 0.5) * (2.0 * np.pi / resolution.patches_around)
     circle = np.stack([np.zeros_like(azimuth), np.cos(azimuth), np.sin(azimuth)], axis=1)
@@ -59,7 +59,7 @@ def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
     slack = np.hypot(rings.half_axial, rings.half_radial)[:, None]
 
     steps, in_slab, in_contact = 0, 0, 0
-    for rows in trace(core, plate, shots, numerics=numerics):
+    for rows in trace(campaign.scene, shots, numerics=numerics):
         history = History.from_trace(rows[:-1], core.mass_properties)  # the last row is the end
         steps += len(history.time)
         for position, attitude, velocity, omega in zip(

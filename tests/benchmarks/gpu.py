@@ -23,7 +23,7 @@ from floor import work_of
 from matplotlib.figure import Figure
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.scene import Numerics, Shots
+from warpimpact.scene import Numerics, Record, Scene, Shots
 from warpimpact.solver.device import DeviceError, find_device
 from warpimpact.solver.simulate import Outcomes, simulate
 
@@ -123,8 +123,9 @@ def growth(campaign: Campaign, numerics: Numerics, device: str) -> dict[int, flo
 
 
 def _simulate(campaign: Campaign, shots: Shots, numerics: Numerics, device: str) -> Outcomes:
-    scene = campaign.core, campaign.plate
-    return simulate(*scene, shots, numerics=numerics, standoffs=campaign.output.standoffs[-1:], device=device)
+    record = Record(standoffs=campaign.output.standoffs[-1:])
+    scene = Scene(core=campaign.core, target=campaign.plate, record=record)
+    return simulate(scene, shots, numerics=numerics, device=device)
 
 
 def difference(campaign: Campaign, numerics: Numerics, device: str) -> dict[str, tuple[float, float]]:

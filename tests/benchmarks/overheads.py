@@ -22,7 +22,7 @@ import numpy as np
 from bench import CAMPAIGN, machine, seconds, shots_of, store
 from matplotlib.figure import Figure
 
-from warpimpact import Campaign, Plate, Shots, SlotPattern
+from warpimpact import Campaign, Plate, Scene, Shots, SlotPattern
 from warpimpact.campaign.run import run
 from warpimpact.results import files
 from warpimpact.solver.simulate import simulate
@@ -168,7 +168,7 @@ def _rates(campaign: Campaign, scenes: dict[float, tuple[Plate, Shots]]) -> dict
         for name, (plate, shots) in scenes.items():
 
             def march(plate: Plate = plate, shots: Shots = shots) -> None:
-                simulate(campaign.core, plate, shots, numerics=campaign.numerics, device="cpu")
+                simulate(Scene(core=campaign.core, target=plate), shots, numerics=campaign.numerics, device="cpu")
 
             rates[name] = max(rates[name], len(shots) / seconds(march))
     return rates

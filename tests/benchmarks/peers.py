@@ -24,7 +24,7 @@ from bench import CAMPAIGN, copied, cores, machine, on_cores, seconds, shots_of,
 from floor import cpu_peak, work_of
 from matplotlib.figure import Figure
 
-from warpimpact import Campaign, Numerics, Shots
+from warpimpact import Campaign, Numerics, Record, Scene, Shots
 from warpimpact.analysis.study import LEVELS, QUOTED, study
 from warpimpact.solver.resolution import Fidelity, spelt_out
 from warpimpact.solver.simulate import simulate
@@ -84,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     campaign = Campaign.from_toml(CAMPAIGN)
     shots = shots_of(campaign, arguments.hits)
     settings = {name: Numerics(fidelity=name) for name in STATED} | {
-        "coarsest": spelt_out(COARSEST, campaign.core, campaign.plate, campaign.impact),
+        "coarsest": spelt_out(COARSEST, campaign.scene, campaign.impact),
         "nodal": Numerics(scheme="nodal"),
     }
     truth = study(campaign, hits=len(shots), device="cpu", settings=settings, levels=LEVELS[: arguments.levels])
@@ -153,8 +153,9 @@ def _warpimpact(campaign: Campaign, truth: xarray.Dataset, settings: dict[str, N
 
 
 def _simulate(campaign: Campaign, shots: Shots, numerics: Numerics) -> Any:
-    scene = campaign.core, campaign.plate
-    return simulate(*scene, shots, numerics=numerics, standoffs=campaign.output.standoffs[-1:], device="cpu")
+    record = Record(standoffs=campaign.output.standoffs[-1:])
+    scene = Scene(core=campaign.core, target=campaign.plate, record=record)
+    return simulate(scene, shots, numerics=numerics, device="cpu")
 
 
 def _numba(campaign: Campaign, truth: xarray.Dataset, shots: Shots) -> list[Contender]:

@@ -14,7 +14,7 @@ import numpy as np
 from bench import CAMPAIGN, copied, shots_of
 
 from warpimpact import Campaign
-from warpimpact.scene import CirclePattern, Interaction, Plate, Shots
+from warpimpact.scene import CirclePattern, Interaction, Record, Scene, Shots
 from warpimpact.solver.simulate import simulate, trace
 
 ROUNDS = 9
@@ -42,26 +42,32 @@ def main() -> None:
     campaign = Campaign.from_toml(CAMPAIGN)
     shots = copied(shots_of(campaign, hits), COPIES)
 
-    def run(plate: Plate = campaign.plate, shots: Shots = shots, **how: Any) -> Callable[[], Any]:
-        options = {"standoffs": (), "interaction": campaign.interaction, "numerics": campaign.numerics} | how
-        return lambda: simulate(campaign.core, plate, shots, **options)
+    bare = campaign.scene.model_copy(update={"record": Record()})
 
-    def plate(**changes: Any) -> Plate:
-        return campaign.plate.model_copy(update=changes)
+    def run(scene: Scene = bare, shots: Shots = shots) -> Callable[[], Any]:
+        return lambda: simulate(scene, shots, numerics=campaign.numerics)
+
+    def scene(**changes: Any) -> Scene:
+        return bare.model_copy(update=changes)
+
+    def plate(**changes: Any) -> Scene:
+        return scene(target=campaign.plate.model_copy(update=changes))
 
     print(f"{'feature':45} {'off, µs':>8} {'on, µs':>8} {'on/off':>8}")
     count = len(shots)
     strong = run(plate(degradation=1.0))
     report("degradation (β = 1 | 1 − 1e-12)", strong, run(plate(degradation=1.0 - 1e-12)), count)
     report("friction (η = 0 | 1e-12)", run(plate(shear_coefficient=0.0)), run(plate(shear_coefficient=1e-12)), count)
-    report("rate-dependent stress (none | 1e-12)", run(), run(interaction=Interaction(quadratic=1e-12)), count)
+    report("rate-dependent stress (none | 1e-12)", run(), run(scene(interaction=Interaction(quadratic=1e-12))), count)
     report("rim (infinite | 100 m square)", run(), run(plate(size=(100.0, 100.0))), count)
-    report("stand-offs (none | 32)", run(), run(standoffs=tuple(np.linspace(0.05, 2.0, 32))), count)
+    report(
+        "stand-offs (none | 32)", run(), run(scene(record=Record(standoffs=tuple(np.linspace(0.05, 2.0, 32))))), count
+    )
     few = shots[:64]
     report(
         "history of every step (64 hits)",
         run(shots=few),
-        lambda: trace(campaign.core, campaign.plate, few, numerics=campaign.numerics),
+        lambda: trace(bare, few, numerics=campaign.numerics),
         64,
     )
     # A core through the middle of a hole of 12 mm, and the same plate with the shot on the web between holes.

@@ -30,14 +30,12 @@ def measure(campaign: Campaign) -> None:
     hits = campaign.hits.model_copy(update={"irreducible": True})
     group = symmetries_used(campaign.impact, hits, campaign.plate)
     shots = make_shots(campaign.impact, hits, campaign.plate)
-    how: dict[str, Any] = {"interaction": campaign.interaction, "numerics": campaign.numerics}
-    how["standoffs"] = campaign.output.standoffs
 
     def every() -> Any:
-        return simulate(campaign.core, campaign.plate, shots, **how)
+        return simulate(campaign.scene, shots, numerics=campaign.numerics)
 
     def part() -> Any:
-        return unfolded(simulate(campaign.core, campaign.plate, shots[:: len(group)], **how), group)
+        return unfolded(simulate(campaign.scene, shots[:: len(group)], numerics=campaign.numerics), group)
 
     whole, folded = every(), part()  # builds the kernels
     rounds = [(seconds(every), seconds(part)) for _ in range(ROUNDS)]

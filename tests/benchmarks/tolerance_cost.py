@@ -41,22 +41,15 @@ def main() -> None:
     campaign = Campaign.from_toml(asked.campaign)
     tolerance = Tolerance(residual_velocity=asked.velocity, tilt=float(np.radians(asked.tilt)))
     shots = make_shots(campaign.impact, Hits(count=asked.hits, seed=campaign.hits.seed), campaign.plate)
-    how: dict[str, Any] = {
-        "interaction": campaign.interaction,
-        "standoffs": campaign.output.standoffs,
-        "standoff_point": campaign.output.standoff_point,
-    }
 
     def to_tolerance() -> Any:
-        return simulate_to_tolerance(
-            campaign.core, campaign.plate, shots, numerics=Numerics(tolerance=tolerance), **how
-        )
+        return simulate_to_tolerance(campaign.scene, shots, numerics=Numerics(tolerance=tolerance))
 
     outcomes, estimates = to_tolerance()  # builds the kernels, and tells the levels
     finest = LADDER[estimates.level.max()]
 
     def at_finest() -> Any:
-        return simulate(campaign.core, campaign.plate, shots, numerics=finest, **how)
+        return simulate(campaign.scene, shots, numerics=finest)
 
     rounds = [(seconds(to_tolerance), seconds(at_finest)) for _ in range(ROUNDS)]
     laddered, brute = np.min(rounds, axis=0)

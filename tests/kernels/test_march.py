@@ -9,7 +9,19 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import CirclePattern, ConeCore, Core, Impact, Numerics, OgiveCore, Plate, PolynomialCore, Shots
+from warpimpact.scene import (
+    CirclePattern,
+    ConeCore,
+    Core,
+    Impact,
+    Numerics,
+    OgiveCore,
+    Plate,
+    PolynomialCore,
+    Record,
+    Scene,
+    Shots,
+)
 from warpimpact.solver import arrays, marching, simulate
 
 Array = NDArray[np.float64]
@@ -22,6 +34,11 @@ HARD = SOLID.model_copy(update={"resistance": 1e11})
 HOLES = SOLID.model_copy(update={"pattern": CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))})
 WEIGHTLESS = Plate(thickness=4e-3, resistance=0.0)
 DRAFT = Numerics(fidelity="draft")
+
+
+def at(plate: Plate) -> Scene:
+    """The paper's core shot at a plate, seen 50 mm behind it."""
+    return Scene(core=PAPER, target=plate, record=Record(standoffs=(0.05,)))
 
 
 def shots_of(**columns: Any) -> Shots:
@@ -49,7 +66,7 @@ def slanted_shots(count: int = 40) -> Shots:
 def launched(core: Core, shots: Shots) -> dict[str, Array]:
     """How shots start: first rows of their traces through a plate without resistance, drifted back."""
     numerics = Numerics(fidelity="draft", precision="double", time_step=1e-6)
-    histories = simulate.trace(core, WEIGHTLESS, shots, numerics=numerics)
+    histories = simulate.trace(Scene(core=core, target=WEIGHTLESS), shots, numerics=numerics)
     first = np.array([history[0] for history in histories])
     assert (first[:, 0] == 0.5e-6).all()
     return {
@@ -111,7 +128,7 @@ def test_shot_starts_with_its_foremost_point_at_the_front_face(core: Core) -> No
     ],
 )
 def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], status: Status, device: str) -> None:
-    outcomes = simulate.simulate(PAPER, plate, shots_of(**shot), numerics=DRAFT, standoffs=[0.05], device=device)
+    outcomes = simulate.simulate(at(plate), shots_of(**shot), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is status
     speed, initial = outcomes.residual_velocity[0], shot.get("velocity", 825.0)
     assert np.isfinite(outcomes.tilt[0, 0]) == (status in (Status.PERFORATED, Status.MISSED))
@@ -128,7 +145,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
     monkeypatch.setattr(arrays, "STEP_ALLOWANCE", 0.1)
-    outcomes = simulate.simulate(PAPER, SOLID, shots_of(), numerics=DRAFT, device=device)
+    outcomes = simulate.simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
 
@@ -138,10 +155,10 @@ def test_shot_that_leaves_its_window_is_told_or_computed_in_a_wider_one(
 ) -> None:
     # A slow shot against the edge of a hole lies down across the window that would do for a straight one.
     shots = shots_of(velocity=200.0, hit_y=5e-3)
-    outcomes = simulate.simulate(PAPER, HOLES, shots, numerics=DRAFT, device=device)
+    outcomes = simulate.simulate(at(HOLES), shots, numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.PERFORATED
     monkeypatch.setattr(marching, "MAX_DOUBLINGS", 1)
-    outcomes = simulate.simulate(PAPER, HOLES, shots, numerics=DRAFT, device=device)
+    outcomes = simulate.simulate(at(HOLES), shots, numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.LEFT_WINDOW
     assert np.isnan(outcomes.residual_velocity[0])
 
@@ -149,9 +166,9 @@ def test_shot_that_leaves_its_window_is_told_or_computed_in_a_wider_one(
 def test_shot_computes_the_same_bits_in_any_window_and_company(device: str) -> None:
     # The steepest shot of a batch sets the windows of all.
     shot = {"hit_y": 5.1e-3, "hit_z": 1.3e-3, "obliquity": 0.3, "pitch": 0.05}
-    alone = simulate.simulate(PAPER, HOLES, shots_of(**shot), numerics=DRAFT, standoffs=[0.05], device=device)
+    alone = simulate.simulate(at(HOLES), shots_of(**shot), numerics=DRAFT, device=device)
     company = shots_of(**shot | {"hit_y": [1e-3, 5.1e-3], "obliquity": [1.2, 0.3]})
-    among = simulate.simulate(PAPER, HOLES, company, numerics=DRAFT, standoffs=[0.05], device=device)
+    among = simulate.simulate(at(HOLES), company, numerics=DRAFT, device=device)
     for field in fields(alone):
         np.testing.assert_array_equal(getattr(among, field.name)[1], getattr(alone, field.name)[0])
 
@@ -159,7 +176,7 @@ def test_shot_computes_the_same_bits_in_any_window_and_company(device: str) -> N
 def test_trace_adds_up_to_the_motion() -> None:
     # Mean force and moment of every step times its duration are the change of the momenta.
     shots = shots_of(hit_y=5.0e-3, hit_z=2.0e-3, velocity=800.0, pitch=0.05)
-    (history,) = simulate.trace(PAPER, HOLES, shots, numerics=Numerics(fidelity="draft", precision="double"))
+    (history,) = simulate.trace(at(HOLES), shots, numerics=Numerics(fidelity="draft", precision="double"))
     mass, dt = PAPER.mass_properties.mass, history[1, 0] - history[0, 0]
     assert np.abs(history[:, 14:17]).max() > 1e3
     np.testing.assert_allclose(dt * history[1:, 14:17], mass * np.diff(history[:, 8:11], axis=0), atol=1e-12)

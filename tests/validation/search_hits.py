@@ -11,7 +11,7 @@ import numpy as np
 
 from warpimpact import Campaign
 from warpimpact.analysis.paper import PUBLISHED, STANDOFFS, Row
-from warpimpact.scene import Plate, Shots, SlotPattern
+from warpimpact.scene import Plate, Record, Scene, Shots, SlotPattern
 from warpimpact.solver.simulate import simulate
 
 LATTICES = [(7.0e-3, 16e-3), (7.05e-3, 16e-3), (7.1e-3, 16e-3)]
@@ -27,14 +27,9 @@ def nearest(campaign: Campaign, plate: Plate, time_step: float, target: Row) -> 
     """The hit of a row's region that misses it least, and by how much."""
     y, z = (axis.ravel() for axis in np.meshgrid(*REGIONS[target], indexing="ij"))
     shots = Shots(hit_y=y, hit_z=z, **{name: np.full(len(y), value) for name, value in campaign.impact})
-    outcomes = simulate(
-        campaign.core,
-        plate,
-        shots,
-        numerics=campaign.numerics.model_copy(update={"time_step": time_step}),
-        standoffs=STANDOFFS,
-        standoff_point="nose",
-    )
+    record = Record(standoffs=STANDOFFS, standoff_point="nose")
+    scene = Scene(core=campaign.core, target=plate, record=record)
+    outcomes = simulate(scene, shots, numerics=campaign.numerics.model_copy(update={"time_step": time_step}))
     angles = [np.degrees(a) * np.sign(a[:, 1:] + 1e-12) for a in (outcomes.yaw, outcomes.pitch)]
     rows = np.column_stack(
         [outcomes.residual_velocity, angles[0][:, 0], angles[1][:, 0], angles[0][:, 1], angles[1][:, 1]]

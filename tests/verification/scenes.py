@@ -14,6 +14,8 @@ from warpimpact.scene import (
     Numerics,
     Plate,
     PolynomialCore,
+    Record,
+    Scene,
     Shots,
     SlotPattern,
 )
@@ -28,6 +30,7 @@ PAPER_CORE = PolynomialCore(
 )
 SLOTS = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
 STANDOFFS = (0.05, 0.13)
+STATIC = Interaction()
 
 
 def paper_plate(**changes: Any) -> Plate:
@@ -76,21 +79,14 @@ def simulate(
     shots: Shots,
     *,
     core: Core = PAPER_CORE,
-    interaction: Interaction | None = None,
+    interaction: Interaction = STATIC,
     standoffs: tuple[float, ...] = STANDOFFS,
     device: str = "cpu",
     **numerics: Any,
 ) -> simulation.Outcomes:
-    """`warpimpact.solver.simulate` with the numerics spelt out."""
-    return simulation.simulate(
-        core,
-        plate,
-        shots,
-        interaction=interaction,
-        numerics=Numerics(**numerics),
-        standoffs=list(standoffs),
-        device=device,
-    )
+    """`warpimpact.simulate` with scene and numerics spelt out."""
+    scene = Scene(core=core, target=plate, interaction=interaction, record=Record(standoffs=standoffs))
+    return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
 
 
 @dataclass(frozen=True)
@@ -130,11 +126,12 @@ def histories(
     shots: Shots,
     *,
     core: Core = PAPER_CORE,
-    interaction: Interaction | None = None,
+    interaction: Interaction = STATIC,
     **numerics: Any,
 ) -> list[History]:
     """`warpimpact.solver.simulate.trace`, its columns named."""
-    traced = simulation.trace(core, plate, shots, interaction=interaction, numerics=Numerics(**numerics))
+    scene = Scene(core=core, target=plate, interaction=interaction)
+    traced = simulation.trace(scene, shots, numerics=Numerics(**numerics))
     return [_history(core, rows.astype(float)) for rows in traced]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.scene import CirclePattern, Core, Numerics, Plate, Shots
+from warpimpact.scene import CirclePattern, Core, Numerics, Plate, Record, Scene, Shots
 from warpimpact.solver import inputs
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.bending import Sections, sections_of
@@ -19,9 +19,8 @@ COUNT = 32
 
 
 def bent(plate: Plate, shots: Shots, device: str = "cpu", **numerics: Any) -> BentOutcomes:
-    outcomes = simulation.simulate(
-        PAPER_CORE, plate, shots, numerics=Numerics(precision="double", **numerics), bending=True, device=device
-    )
+    scene = Scene(core=PAPER_CORE, target=plate, record=Record(bending=True))
+    outcomes = simulation.simulate(scene, shots, numerics=Numerics(precision="double", **numerics), device=device)
     assert isinstance(outcomes, BentOutcomes)
     return outcomes
 
@@ -69,7 +68,8 @@ def test_mirror_images_bend_alike(device: str) -> None:
 
 def test_asking_for_it_changes_nothing_else(device: str) -> None:
     numerics = Numerics(precision="double")
-    plain = simulation.simulate(PAPER_CORE, paper_plate(), slanted_shots(), numerics=numerics, device=device)
+    scene = Scene(core=PAPER_CORE, target=paper_plate())
+    plain = simulation.simulate(scene, slanted_shots(), numerics=numerics, device=device)
     asked = bent(paper_plate(), slanted_shots(), device)
     for field in fields(Outcomes):  # another build of the kernels may round otherwise
         np.testing.assert_allclose(getattr(asked, field.name), getattr(plain, field.name), rtol=1e-9, atol=1e-6)
@@ -92,4 +92,9 @@ def test_what_touches_nothing_is_not_bent() -> None:
 def test_a_core_without_the_mass_of_its_slices_is_refused() -> None:
     core = PAPER_CORE.model_copy(update={"inertia_axial": 2e-8})
     with pytest.raises(ValueError, match=r"got bending = true beside core.inertia_axial, but a bending moment needs"):
-        simulation.simulate(core, paper_plate(), shots_at(), bending=True, device="cpu")
+        Scene(core=core, target=paper_plate(), record=Record(bending=True))
+
+
+def test_the_literal_scheme_has_no_bending_moment() -> None:
+    with pytest.raises(ValueError, match=r'got bending = true beside numerics.scheme = "nodal"'):
+        bent(paper_plate(), shots_at(), scheme="nodal")

@@ -24,6 +24,8 @@ from warpimpact.scene import (
     Numerics,
     Plate,
     ProfileCore,
+    Record,
+    Scene,
     Shots,
     SlotPattern,
 )
@@ -69,7 +71,7 @@ def patterns(draw: st.DrawFn, diameter: float) -> AnyPattern:
 
 
 @st.composite
-def scenes(draw: st.DrawFn) -> tuple[Core, Plate, Interaction, Shots]:
+def scenes_and_shots(draw: st.DrawFn) -> tuple[Scene, Shots]:
     core = draw(cores())
     diameter = 2.0 * core.max_radius
     side = draw(st.none() | st.floats(0.5, 3.0).map(lambda sides: sides * diameter))
@@ -99,7 +101,8 @@ def scenes(draw: st.DrawFn) -> tuple[Core, Plate, Interaction, Shots]:
         yaw=attitude[1],
         spin=draw(st.sampled_from([0.0, -1e5, 1e5]) | st.floats(-1e5, 1e5)),
     )
-    return core, plate, Interaction(static=1.0, linear=draw(rates), quadratic=draw(rates)), shots
+    interaction = Interaction(static=1.0, linear=draw(rates), quadratic=draw(rates))
+    return Scene(core=core, target=plate, interaction=interaction, record=Record(standoffs=(1.0,))), shots
 
 
 def _direction(azimuth: float) -> tuple[float, float]:
@@ -128,14 +131,12 @@ def check_history(history: History, impact_energy: float, precision: str) -> Non
 
 @pytest.mark.parametrize("precision", list(EPSILON))
 @settings(max_examples=20, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
-@given(scene=scenes())
-def test_extremes(precision: Any, scene: tuple[Core, Plate, Interaction, Shots]) -> None:
-    core, plate, interaction, shots = scene
+@given(case=scenes_and_shots())
+def test_extremes(precision: Any, case: tuple[Scene, Shots]) -> None:
+    scene, shots = case
     numerics = Numerics(fidelity="draft", precision=precision)
-    check_outcome(
-        simulate(core, plate, shots, interaction=interaction, numerics=numerics, standoffs=[1.0], device="cpu")
-    )
-    (steps,) = trace(core, plate, shots, interaction=interaction, numerics=numerics)
-    properties = core.mass_properties
+    check_outcome(simulate(scene, shots, numerics=numerics, device="cpu"))
+    (steps,) = trace(scene, shots, numerics=numerics)
+    properties = scene.core.mass_properties
     impact = 0.5 * (properties.mass * shots.velocity[0] ** 2 + properties.inertia_axial * shots.spin[0] ** 2)
-    check_history(History.from_trace(steps, core.mass_properties), impact, precision)
+    check_history(History.from_trace(steps, properties), impact, precision)

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.scene import Core, Interaction, Numerics, Plate, PolynomialCore, Shots
+from warpimpact.scene import Core, Interaction, Numerics, Plate, PolynomialCore, Record, Scene, Shots
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.simulate import Outcomes
 
 from . import references
-from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, solid_plate
+from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, simulate, solid_plate
 
 COUNT = 24
 
@@ -58,16 +58,9 @@ def scene_of(shot: int) -> tuple[Core, Plate]:
 
 
 def simulated(core: Core, plate: Plate, shots: Shots, device: str = "cpu", **numerics: Any) -> Outcomes:
-    return simulation.simulate(
-        core,
-        plate,
-        shots,
-        interaction=INTERACTION,
-        numerics=Numerics(**numerics),
-        standoffs=STANDOFFS,
-        standoff_point="nose",
-        device=device,
-    )
+    record = Record(standoffs=STANDOFFS, standoff_point="nose")
+    scene = Scene(core=core, target=plate, interaction=INTERACTION, record=record)
+    return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
 
 
 def without(shots: Shots) -> Shots:
@@ -106,9 +99,7 @@ def test_every_shot_does_the_work_of_its_own_plate(device: str) -> None:
     # m (v0² − v²)/2 = Y h π R² at η = 0, β = 1 (MODEL.md §6.1), each shot with its Y, h and m.
     own = own_numbers() | {"shear_coefficient": np.zeros(COUNT), "degradation": np.ones(COUNT)}
     shots = Shots(**shots_at(np.zeros(COUNT)).columns | own)
-    outcomes = simulation.simulate(
-        PAPER_CORE, solid_plate(**FAR), shots, numerics=Numerics(), standoffs=STANDOFFS, device=device
-    )
+    outcomes = simulate(solid_plate(**FAR), shots, device=device)
     work = own["resistance"] * own["thickness"] * pi * references.PAPER_LARGEST_RADIUS**2
     assert np.ptp(work) > 300.0
     np.testing.assert_allclose(outcomes.energy_loss, work, rtol=1e-3)
@@ -119,10 +110,8 @@ def test_a_given_moment_of_inertia_scales_with_the_mass() -> None:
     # A core twice as heavy moves against twice the resistance as the light one does against once.
     core = core_with(inertia_transverse=3e-7)
     double = Shots(**shots_at(5e-3, 2e-3, yaw=5.0).columns | {"mass": np.array([8e-3]), "resistance": np.array([4e9])})
-    heavy = simulation.simulate(core, paper_plate(), double, standoffs=STANDOFFS, device="cpu")
-    light = simulation.simulate(
-        core, paper_plate(resistance=2e9), shots_at(5e-3, 2e-3, yaw=5.0), standoffs=STANDOFFS, device="cpu"
-    )
+    heavy = simulate(paper_plate(), double, core=core)
+    light = simulate(paper_plate(resistance=2e9), shots_at(5e-3, 2e-3, yaw=5.0), core=core)
     np.testing.assert_allclose(heavy.residual_velocity, light.residual_velocity, rtol=1e-6)
     np.testing.assert_allclose(heavy.angular_velocity, light.angular_velocity, rtol=1e-5, atol=0.1)
     np.testing.assert_allclose(heavy.energy_loss, 2.0 * light.energy_loss, rtol=1e-5)
@@ -132,7 +121,7 @@ def test_history_and_plate_of_a_replay_are_those_of_the_shot() -> None:
     numerics = Numerics(fidelity="draft", precision="double")
     core, plate = scene_of(5)
     shown = [
-        simulation.replay(c, p, s, interaction=INTERACTION, numerics=numerics, standoffs=STANDOFFS)
+        simulation.replay(Scene(core=c, target=p, interaction=INTERACTION), s, numerics=numerics)
         for c, p, s in ((PAPER_CORE, paper_plate(**FAR), SHOTS[5:6]), (core, plate, without(SHOTS)[5:6]))
     ]
     own, plain = shown

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Impact, Numerics, ProfileCore
+from warpimpact.scene import Impact, Numerics, ProfileCore, Scene
 from warpimpact.solver import arrays
 from warpimpact.solver.resolution import resolve
 
@@ -29,7 +29,7 @@ def shoulder_tolerance(fidelity: str, shear_coefficient: float, residual: float)
     of the work and the pressure Y h 2πR |c2| l².
     """
     plate = solid_plate()
-    resolution = resolve(Numerics(fidelity=fidelity), PAPER_CORE, plate)
+    resolution = resolve(Numerics(fidelity=fidelity), Scene(core=PAPER_CORE, target=plate))
     velocity, curvature = PAPER_SHOT["velocity"], 2 * abs(references.PAPER_COEFFICIENTS[2])
     step = resolution.step_of(Impact(velocity=velocity), plate)
     onset = step * arrays.onset_jump(PAPER_CORE, plate.thickness, references.PAPER_MASS, plate.resistance)

@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import ConeCore
+from warpimpact import ConeCore, Plate, Record, Scene, SquarePattern
 from warpimpact.campaign import parts
 from warpimpact.kernels.status import Status
 from warpimpact.results.dataset import to_dataset
 from warpimpact.results.variables import SHOT_VARIABLES
-from warpimpact.scene import Shots
+from warpimpact.scene import AnyPattern, Shots
 
 STANDOFFS = np.array([0.05, 0.13])
 PERIOD = (16e-3, 8e-3)
-SQUARE_HOLE = np.array([[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0], [-2.0, -2.0]]) * 1e-3
+SQUARE_HOLE = SquarePattern(side=4e-3, spacing=PERIOD)
+CYLINDER = ConeCore(diameter="6 mm", length="20 mm", cone_length="1 nm", mass="4 g")
 
 ResultMaker = Callable[..., xarray.Dataset]
 
@@ -68,14 +69,14 @@ def outcomes_of(status: np.ndarray) -> SimpleNamespace:
 def make_result() -> ResultMaker:
     """A function of status (or of a count of perforating hits) that builds the Dataset."""
 
-    def make(status: Any = 4, hits: np.ndarray | None = None, outlines: Any = (SQUARE_HOLE,)) -> xarray.Dataset:
+    def make(status: Any = 4, hits: np.ndarray | None = None, pattern: AnyPattern = SQUARE_HOLE) -> xarray.Dataset:
         status = np.zeros(status, np.int8) if np.ndim(status) == 0 else np.asarray(status)
         hits = scattered_hits(len(status)) if hits is None else hits
+        plate = Plate(thickness=4e-3, resistance=2.6e9, pattern=pattern)
         return to_dataset(
+            Scene(core=CYLINDER, target=plate, record=Record(standoffs=tuple(STANDOFFS))),
             shots_at(hits),
             outcomes_of(status),
-            standoffs=STANDOFFS,
-            outlines=outlines,
             period=PERIOD,
             attributes={
                 "title": "a test",
@@ -86,9 +87,6 @@ def make_result() -> ResultMaker:
         )
 
     return make
-
-
-CYLINDER = ConeCore(diameter="6 mm", length="20 mm", cone_length="1 nm", mass="4 g")
 
 
 def plate_result(

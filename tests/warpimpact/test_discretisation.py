@@ -18,6 +18,7 @@ from warpimpact.scene import (
     Plate,
     PolynomialCore,
     ProfileCore,
+    Scene,
     SlotPattern,
     TrianglePattern,
 )
@@ -33,6 +34,7 @@ CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, density=78
 TABLE = ProfileCore(s=(0.0, 3e-3, 11e-3, 20e-3), r=(1e-3, 2e-3, 3e-3, 2.5e-3), density=7850.0)
 CORES = pytest.mark.parametrize("core", [PAPER, OGIVE, CONE, TABLE], ids=["paper", "ogive", "cone", "table"])
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
+SCENE = Scene(core=PAPER, target=PLATE)
 PATTERNS = [
     SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True),
     CirclePattern(diameter=5e-3, spacing=(7.1e-3, 9.3e-3)),
@@ -46,7 +48,7 @@ PATTERNS = [
 @pytest.mark.parametrize("name", FIDELITIES)
 def test_fidelity_fills_in_what_is_not_given(name: str) -> None:
     fidelity = FIDELITIES[name]
-    resolution = resolve(Numerics(fidelity=name), PAPER, PLATE)
+    resolution = resolve(Numerics(fidelity=name), SCENE)
     assert not resolution.nodal
     assert resolution.time_step is None
     assert (resolution.patches_axial, resolution.patches_around) == (
@@ -64,8 +66,8 @@ def test_fidelity_fills_in_what_is_not_given(name: str) -> None:
 )
 def test_single_setting_goes_before_fidelity_and_scheme(name: str, value: float, scheme: str) -> None:
     given: dict[str, Any] = {"scheme": scheme, "fidelity": "reference"}
-    plain = resolve(Numerics(**given), PAPER, PLATE)
-    changed = resolve(Numerics(**given, **{name: value}), PAPER, PLATE)
+    plain = resolve(Numerics(**given), SCENE)
+    changed = resolve(Numerics(**given, **{name: value}), SCENE)
     assert getattr(changed, name) == value
     assert {k for k in vars(plain) if getattr(plain, k) != getattr(changed, k)} == {name}
 
@@ -73,12 +75,12 @@ def test_single_setting_goes_before_fidelity_and_scheme(name: str, value: float,
 @pytest.mark.parametrize(("precision", "double"), [("single", False), ("double", True)])
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_precision_goes_before_fidelity(fidelity: str, precision: str, double: bool) -> None:
-    assert resolve(Numerics(fidelity=fidelity, precision=precision), PAPER, PLATE).double is double
+    assert resolve(Numerics(fidelity=fidelity, precision=precision), SCENE).double is double
 
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_nodal_scheme_has_the_paper_s_own_resolution(fidelity: str) -> None:
-    resolution = resolve(Numerics(scheme="nodal", fidelity=fidelity), PAPER, PLATE)
+    resolution = resolve(Numerics(scheme="nodal", fidelity=fidelity), SCENE)
     assert resolution.nodal
     assert {name: getattr(resolution, name) for name in NODAL} == NODAL
     assert (resolution.patches_axial, resolution.patches_around) == (36, 36)
@@ -86,13 +88,13 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(fidelity: str) -> None:
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
-    way = 800.0 * resolve(Numerics(), PAPER, PLATE).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
+    way = 800.0 * resolve(Numerics(), SCENE).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
     standard = FIDELITIES["standard"].travel
     np.testing.assert_allclose(way, [standard * 1e-3, standard * SLENDER * PAPER.length])
 
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
-    resolution, velocity = resolve(Numerics(), PAPER, PLATE), 800.0
+    resolution, velocity = resolve(Numerics(), SCENE), 800.0
     free = resolution.step_at(velocity, 0.0, PLATE.thickness, np.inf)
     for degradation, interval in ((1.0, 1e-6), (0.9, 1e-6), (0.05, 1e-6), (0.05, 1e-9), (0.0, 1e-6)):
         plate = PLATE.model_copy(update={"degradation": degradation, "degradation_interval": interval})

@@ -11,6 +11,7 @@ from PIL import Image
 
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import cell, hit_map, hit_maps, overview, save_beside, save_maps, status_map
+from warpimpact.scene import NoPattern
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
 GREY = (0.62, 0.62, 0.62)
@@ -164,7 +165,7 @@ def test_hole_outline_is_white_between_black_on_any_colour(perforated, variable)
 
 
 def test_solid_plate_has_no_outline(make_result):
-    axes = hit_map(make_result(512, outlines=()), "tilt").axes[0]
+    axes = hit_map(make_result(512, pattern=NoPattern()), "tilt").axes[0]
     assert len(axes.lines) == 0
     assert axes.get_legend() is None
 

@@ -11,7 +11,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.run import run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
-from warpimpact.scene import Shots
+from warpimpact.scene import Scene, Shots
 from warpimpact.solver import marching, simulate
 from warpimpact.solver.simulate import Outcomes
 
@@ -25,13 +25,13 @@ def campaign(tmp_path: Path) -> Campaign:
     return Campaign.from_toml(path)
 
 
-def at_once(core: object, plate: object, shots: Shots, *, standoffs: Any, **_: object) -> Outcomes:
+def at_once(scene: Scene, shots: Shots, **_: object) -> Outcomes:
     """Outcomes without computing: numbers that zlib cannot make smaller."""
     numbers, n = np.random.default_rng(0), len(shots)
     single = {
         name: numbers.random(n) for name in ("residual_velocity", "deflection", "energy_loss", "contact_duration")
     }
-    each = {name: numbers.random((n, len(standoffs))) for name in ("tilt", "pitch", "yaw", "total_yaw")}
+    each = {name: numbers.random((n, len(scene.record.standoffs))) for name in ("tilt", "pitch", "yaw", "total_yaw")}
     return Outcomes(np.zeros(n, dtype=np.int8), angular_velocity=numbers.random((n, 3)), **single, **each)
 
 
@@ -84,9 +84,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
     shots = campaign.sampler().shots(0, 64)
 
     def computed() -> Outcomes:
-        return simulate.simulate(
-            campaign.core, campaign.plate, shots, numerics=campaign.numerics, standoffs=(0.05,), device="cpu", threads=4
-        )
+        return simulate.simulate(campaign.scene, shots, numerics=campaign.numerics, device="cpu", threads=4)
 
     plenty, granted, original = computed(), 0, marching.March._scratch
 

@@ -8,7 +8,18 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.campaign.replay import replay
-from warpimpact.scene import Core, Hits, Impact, Numerics, Plate, PolynomialCore, Shots, SlotPattern, make_shots
+from warpimpact.scene import (
+    Hits,
+    Impact,
+    Numerics,
+    Plate,
+    PolynomialCore,
+    Record,
+    Scene,
+    Shots,
+    SlotPattern,
+    make_shots,
+)
 from warpimpact.solver.refinement import LADDER, simulate_to_tolerance
 from warpimpact.solver.resolution import resolve
 from warpimpact.solver.rings import rings_of
@@ -22,7 +33,7 @@ PLATE = Plate(
     degradation=0.8,
     pattern=SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True),
 )
-STANDOFFS = (0.05, 0.13)
+SCENE = Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05, 0.13)))
 TOLERANCE = {"residual_velocity": "0.5 m/s", "tilt": "0.7 deg"}
 
 
@@ -33,13 +44,11 @@ def shots(count: int, **impact: str) -> Shots:
 @pytest.fixture(scope="module")
 def limit() -> Outcomes:
     """Converged to some 0.05 m/s and 0.1° (90th percentile of its change from the reference fidelity)."""
-    return simulate(CORE, PLATE, shots(64), numerics=LADDER[-1], standoffs=STANDOFFS, device="cpu")
+    return simulate(SCENE, shots(64), numerics=LADDER[-1], device="cpu")
 
 
 def test_true_errors_are_within_the_tolerance_for_95_percent_of_hits(limit: Outcomes) -> None:
-    outcomes, estimates = simulate_to_tolerance(
-        CORE, PLATE, shots(64), numerics=Numerics(tolerance=TOLERANCE), standoffs=STANDOFFS, device="cpu"
-    )
+    outcomes, estimates = simulate_to_tolerance(SCENE, shots(64), numerics=Numerics(tolerance=TOLERANCE), device="cpu")
     assert estimates.converged.all()
     velocity = np.abs(outcomes.residual_velocity - limit.residual_velocity) <= 0.5
     tilt = (np.abs(outcomes.tilt - limit.tilt) <= np.radians(0.7)).all(axis=1)
@@ -51,7 +60,7 @@ def test_true_errors_are_within_the_tolerance_for_95_percent_of_hits(limit: Outc
 
 def patch_steps(shots: Shots, numerics: Any, outcomes: Outcomes) -> float:
     """Work of some shots: patches times steps in contact, summed over them."""
-    resolution = resolve(numerics, CORE, PLATE)
+    resolution = resolve(numerics, SCENE)
     around = resolution.patches_around
     rings = rings_of(CORE, resolution.patches_axial, around, resolution.patch_width)
     longest_time = resolution.longest_time(np.array(PLATE.degradation), PLATE.degradation_interval)
@@ -63,17 +72,15 @@ def patch_steps(shots: Shots, numerics: Any, outcomes: Outcomes) -> float:
 def test_costs_less_than_every_hit_on_the_finest_level_used(monkeypatch: pytest.MonkeyPatch) -> None:
     work = []
 
-    def counted(core: Core, plate: Plate, shots: Shots, **how: Any) -> Outcomes:
-        outcomes = simulate(core, plate, shots, **how)
+    def counted(scene: Scene, shots: Shots, **how: Any) -> Outcomes:
+        outcomes = simulate(scene, shots, **how)
         work.append(patch_steps(shots, how["numerics"], outcomes))
         return outcomes
 
     monkeypatch.setattr("warpimpact.solver.refinement.simulate", counted)
-    _, estimates = simulate_to_tolerance(
-        CORE, PLATE, shots(64), numerics=Numerics(tolerance=TOLERANCE), standoffs=STANDOFFS, device="cpu"
-    )
+    _, estimates = simulate_to_tolerance(SCENE, shots(64), numerics=Numerics(tolerance=TOLERANCE), device="cpu")
     finest = LADDER[estimates.level.max()]
-    every = patch_steps(shots(64), finest, simulate(CORE, PLATE, shots(64), numerics=finest, device="cpu"))
+    every = patch_steps(shots(64), finest, simulate(SCENE, shots(64), numerics=finest, device="cpu"))
     assert estimates.level.max() >= 2
     assert len(work) == estimates.level.max() + 1
     # Measured 0.58; were no hit let go before the finest level, 1.40.
@@ -82,8 +89,8 @@ def test_costs_less_than_every_hit_on_the_finest_level_used(monkeypatch: pytest.
 
 def test_a_hit_does_not_depend_on_its_company() -> None:
     numerics = Numerics(tolerance=TOLERANCE)
-    whole, _ = simulate_to_tolerance(CORE, PLATE, shots(8), numerics=numerics, standoffs=STANDOFFS, device="cpu")
-    alone, _ = simulate_to_tolerance(CORE, PLATE, shots(8)[3:4], numerics=numerics, standoffs=STANDOFFS, device="cpu")
+    whole, _ = simulate_to_tolerance(SCENE, shots(8), numerics=numerics, device="cpu")
+    alone, _ = simulate_to_tolerance(SCENE, shots(8)[3:4], numerics=numerics, device="cpu")
     assert np.array_equal(alone.residual_velocity, whole.residual_velocity[3:4])
     assert np.array_equal(alone.tilt, whole.tilt[3:4])
 
@@ -91,7 +98,7 @@ def test_a_hit_does_not_depend_on_its_company() -> None:
 def test_what_no_level_meets_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.solver.refinement.LADDER", LADDER[:2])
     numerics = Numerics(tolerance={"residual_velocity": 1e-6})
-    _, estimates = simulate_to_tolerance(CORE, PLATE, shots(4), numerics=numerics, standoffs=STANDOFFS, device="cpu")
+    _, estimates = simulate_to_tolerance(SCENE, shots(4), numerics=numerics, device="cpu")
     assert not estimates.converged.any()
     assert (estimates.residual_velocity_error > 1e-6).all()
 

@@ -13,8 +13,11 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SCATTER_VARIABLES, SHOT_VARIABLES
-from warpimpact.scene import Shots
+from warpimpact.scene import NoPattern, Shots, SquarePattern
 from warpimpact.solver.simulate import BentOutcomes, Outcomes
+
+MM = 1e-3
+TWO_HOLES = SquarePattern(side=2 * MM, spacing=(16 * MM, 8 * MM), holes=[(2 * MM, 0.0), (-2 * MM, 0.0)])
 
 CONTRACT = {
     "hit_y": (("hit",), "m"),
@@ -108,15 +111,15 @@ def test_attributes_follow_cf_and_carry_the_run(make_result):
 
 
 def test_outlines_are_separated_by_nan(make_result):
-    first, second = np.array([[0.0, 1.0], [2.0, 3.0]]), np.array([[4.0, 5.0]])
-    dataset = make_result(outlines=[first, second])
-    np.testing.assert_array_equal(dataset["outline_y"], [0.0, 2.0, np.nan, 4.0])
-    np.testing.assert_array_equal(dataset["outline_z"], [1.0, 3.0, np.nan, 5.0])
+    dataset = make_result(pattern=TWO_HOLES)
+    right, left = np.array([2.0, 0.0, 0.0, 2.0, 2.0]), np.array([1.0, 1.0, -1.0, -1.0, 1.0])
+    np.testing.assert_allclose(dataset["outline_y"] * 1e3, [*(right + 1.0), np.nan, *(right - 3.0)], atol=1e-12)
+    np.testing.assert_allclose(dataset["outline_z"] * 1e3, [*left, np.nan, *left], atol=1e-12)
 
 
-@pytest.mark.parametrize("outlines", [(), (np.zeros((3, 2)),)])
-def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, outlines):
-    dataset = make_result([Status.PERFORATED, Status.ARRESTED], outlines=outlines)
+@pytest.mark.parametrize("pattern", [NoPattern(), TWO_HOLES])
+def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, pattern):
+    dataset = make_result([Status.PERFORATED, Status.ARRESTED], pattern=pattern)
     path = tmp_path / "out.nc"
     files.write(dataset, path)
     with xarray.open_dataset(path) as file:

@@ -45,8 +45,7 @@ def campaign() -> Campaign:
 @pytest.fixture(scope="module")
 def small(campaign: Campaign) -> xarray.Dataset:
     """A study of three settings and the literal scheme on a coarse grid, 16 hits."""
-    core, plate, impact = campaign.core, campaign.plate, campaign.impact
-    settings = {name: spelt_out(setting, core, plate, impact) for name, setting in LADDER.items()}
+    settings = {name: spelt_out(setting, campaign.scene, campaign.impact) for name, setting in LADDER.items()}
     settings["nodal"] = Numerics(scheme="nodal", grid_spacing=5e-5)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(studies, "MEASURED_TIME", 0.0)
@@ -128,7 +127,7 @@ def test_speed_is_that_of_many_hits_without_their_preparation(
 ) -> None:
     clock = [0.0]
 
-    def fake(core: object, plate: object, shots: Shots, **options: object) -> Answer:
+    def fake(scene: object, shots: Shots, **options: object) -> Answer:
         clock[0] += 1.0 + 0.01 * len(shots)
         return answer([1.0])
 
@@ -149,8 +148,8 @@ def test_runs_for_the_extrapolation_differ_in_the_time_step_alone(campaign: Camp
 def test_spelt_out_fidelities_resolve_as_their_names_do(campaign: Campaign) -> None:
     impact = campaign.impact
     for name, fidelity in FIDELITIES.items():
-        named = resolve(Numerics(fidelity=name), campaign.core, campaign.plate)
-        spelt = resolve(spelt_out(fidelity, campaign.core, campaign.plate, impact), campaign.core, campaign.plate)
+        named = resolve(Numerics(fidelity=name), campaign.scene)
+        spelt = resolve(spelt_out(fidelity, campaign.scene, impact), campaign.scene)
         step = named.step_of(impact, campaign.plate)
         assert spelt.step_of(impact, campaign.plate) == pytest.approx(step, rel=1e-12)
         assert spelt.time_step == pytest.approx(step, rel=1e-12)
@@ -220,7 +219,7 @@ def test_file_gives_back_what_was_measured(small: xarray.Dataset, tmp_path: Path
 
 def test_progress_ends_with_all_hits_and_never_goes_back(campaign: Campaign) -> None:
     seen: list[tuple[int, int]] = []
-    settings = {"only": spelt_out(LADDER["coarse"], campaign.core, campaign.plate, campaign.impact)}
+    settings = {"only": spelt_out(LADDER["coarse"], campaign.scene, campaign.impact)}
     levels = (LADDER["coarse"], LADDER["middle"])
     study(campaign, hits=8, device="cpu", settings=settings, levels=levels, progress=lambda *now: seen.append(now))
     assert seen == sorted(seen)

@@ -58,9 +58,9 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many shots each call of `simulate` computed."""
     counts: list[int] = []
 
-    def counting(core: Any, plate: Any, shots: Any, **how: Any) -> Any:
+    def counting(scene: Any, shots: Any, **how: Any) -> Any:
         counts.append(len(shots))
-        return simulation.simulate(core, plate, shots, **how)
+        return simulation.simulate(scene, shots, **how)
 
     monkeypatch.setattr(computing, "simulate", counting)
     return counts
@@ -153,13 +153,10 @@ def test_every_image_replays_to_the_bits_of_its_outcome(impact: Impact, tmp_path
 
 @pytest.mark.parametrize("impact", [STRAIGHT, PITCHED], ids=["straight", "pitched"])
 def test_the_history_of_an_image_is_that_of_its_own_shot(impact: Impact) -> None:
-    scene = campaign(impact=impact, count=8)
-    group = symmetries_used(scene.impact, scene.hits, scene.plate)
-    shots = make_shots(scene.impact, scene.hits, scene.plate)
-    alone = [
-        simulation.replay(CORE, scene.plate, shots[k : k + 1], numerics=scene.numerics, standoffs=[0.05])
-        for k in range(len(group))
-    ]
+    asked = campaign(impact=impact, count=8)
+    group = symmetries_used(asked.impact, asked.hits, asked.plate)
+    shots = make_shots(asked.impact, asked.hits, asked.plate)
+    alone = [simulation.replay(asked.scene, shots[k : k + 1], numerics=asked.numerics) for k in range(len(group))]
     for k, symmetry in enumerate(group):
         home, image = ((shots.hit_y[at], shots.hit_z[at]) for at in (0, k))
         folded = image_of(alone[0], symmetry, home=home, image=image)

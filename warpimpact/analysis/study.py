@@ -158,14 +158,14 @@ def study(
 def default_settings(campaign: Campaign) -> dict[str, Numerics]:
     """The fidelities by their names, and the sweep and the literal scheme by what they are."""
     fidelities = {name: Numerics(fidelity=name) for name in FIDELITIES}
-    sweep = [spelt_out(setting, campaign.core, campaign.plate, campaign.impact) for setting in SWEEP]
+    sweep = [spelt_out(setting, campaign.scene, campaign.impact) for setting in SWEEP]
     nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
     return fidelities | {label(campaign, numerics): numerics for numerics in sweep} | nodal
 
 
 def label(campaign: Campaign, numerics: Numerics) -> str:
     """Patches, cells per degradation length and time step as one short name."""
-    resolution = resolve(numerics, campaign.core, campaign.plate)
+    resolution = resolve(numerics, campaign.scene)
     cells = campaign.plate.degradation_length / resolution.grid_spacing
     step = _time_step(campaign, resolution)
     return f"{resolution.patches_axial}×{resolution.patches_around}, ℓ/{cells:.3g}, {step * 1e6:.3g} µs"
@@ -272,12 +272,14 @@ class _Bench:
 
     def __init__(self, campaign: Campaign, hits: int, device: str, progress: Progress) -> None:
         self.campaign, self.device = campaign, find_device(device)
+        plain = campaign.scene.record.model_copy(update={"bending": False})  # which the literal scheme has not
+        self.scene = campaign.scene.model_copy(update={"record": plain})
         self.progress, self.work, self.total = progress, 0.0, 0.0
         spread = Hits(count=hits, seed=campaign.hits.seed)
         self.shots = make_shots(campaign.impact, spread, campaign.plate, campaign.scatter)
 
     def numerics(self, fidelity: Fidelity) -> Numerics:
-        return spelt_out(fidelity, self.campaign.core, self.campaign.plate, self.campaign.impact)
+        return spelt_out(fidelity, self.campaign.scene, self.campaign.impact)
 
     def expect(self, runs: Sequence[Numerics]) -> None:
         """Say what is going to be computed, for the progress."""
@@ -315,22 +317,11 @@ class _Bench:
 
     def _work(self, numerics: Numerics) -> float:
         """Patches times steps of a hit, up to a factor."""
-        resolution = resolve(numerics, self.campaign.core, self.campaign.plate)
+        resolution = resolve(numerics, self.campaign.scene)
         return resolution.patches_axial * resolution.patches_around / _time_step(self.campaign, resolution)
 
     def _simulate(self, numerics: Numerics, shots: Shots, progress: Progress) -> Outcomes:
-        campaign = self.campaign
-        return simulate(
-            campaign.core,
-            campaign.plate,
-            shots,
-            interaction=campaign.interaction,
-            numerics=numerics,
-            standoffs=campaign.output.standoffs,
-            standoff_point=campaign.output.standoff_point,
-            device=str(self.device),
-            progress=progress,
-        )
+        return simulate(self.scene, shots, numerics=numerics, device=str(self.device), progress=progress)
 
 
 def _repeated(shots: Shots, copies: int) -> Shots:
@@ -344,7 +335,7 @@ def _doubled(level: Fidelity) -> Fidelity:
 
 def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> dict[str, Any]:
     """The numerics of every setting with all choices made."""
-    resolutions = [resolve(numerics, campaign.core, campaign.plate) for numerics in settings.values()]
+    resolutions = [resolve(numerics, campaign.scene) for numerics in settings.values()]
     values = {
         name: np.array([getattr(resolution, name) for resolution in resolutions])
         for name in ("patches_axial", "patches_around", "grid_spacing")

@@ -3,16 +3,29 @@
 import json
 import math
 import tomllib
-from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, PrivateAttr, ValidationError, field_validator, model_validator
+from pydantic import Field, PrivateAttr, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from ..results.variables import BENDING_VARIABLES
-from ..scene import AnyCore, Hits, Impact, Interaction, Numerics, Plate, Sampler, Scatter, Symmetry, symmetries_used
+from ..scene import (
+    AnyCore,
+    Hits,
+    Impact,
+    Interaction,
+    Numerics,
+    Plate,
+    Record,
+    Sampler,
+    Scatter,
+    Scene,
+    Symmetry,
+    Target,
+    symmetries_used,
+)
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_scatter
@@ -25,30 +38,17 @@ class CampaignError(ValueError):
     """A campaign that cannot be run: one sentence naming file, field, value and what is allowed."""
 
 
-class Output(Model):
-    """What is reported.
+class Output(Record):
+    """What is reported: what is recorded of every shot, of which a campaign needs a stand-off, and what a run adds.
 
     Attributes:
-        standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
-        standoff_point: the point of the core that passes them.
-        bending: whether the largest bending moment and stress of each core are reported.
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
         solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1)] = (0.05, 0.13)
-    standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
-    bending: Annotated[bool, Field(strict=True)] = False
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
-
-    @field_validator("standoffs")
-    @classmethod
-    def _increase(cls, standoffs: tuple[float, ...]) -> tuple[float, ...]:
-        for before, after in pairwise(standoffs):
-            if after <= before:
-                raise ValueError(f"got {after:g} m after {before:g} m, but stand-offs must increase")
-        return standoffs
 
 
 class Campaign(Model):
@@ -115,6 +115,11 @@ class Campaign(Model):
         return campaign
 
     @property
+    def scene(self) -> Scene:
+        """What is shot at what, and what is recorded."""
+        return Scene(core=self.core, target=Target(plate=self.plate), interaction=self.interaction, record=self.output)
+
+    @property
     def replicates(self) -> int:
         """Independent scramblings that its shots are dealt out to in turn."""
         return self.hits.replicates or (16 if self.stop is not None and self.hits.sampling == "sobol" else 1)
@@ -171,8 +176,8 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _core_has_a_bending_moment(self) -> Self:
-        if self.output.bending:
-            check_bending(self.core, self.numerics)
+        self.output.check_bending(self.core)
+        check_bending(self.output, self.numerics)
         return self
 
     @model_validator(mode="after")
@@ -194,14 +199,7 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _standoffs_clear_of_plate(self) -> Self:
-        needed = self.core.bounding_radius
-        if self.output.standoff_point == "nose":
-            needed += self.core.mass_properties.centre_of_mass
-        if self.output.standoffs[0] < needed:
-            raise ValueError(
-                f"got output.standoffs of {self.output.standoffs[0]:g} m, "
-                f"but a core of this size is sure to be out of the plate only from {needed:.4g} m"
-            )
+        self.output.check_standoffs(self.core)
         return self
 
 

@@ -17,7 +17,7 @@ import xarray
 import warpimpact
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.dataset import solid_dataset, to_dataset
-from warpimpact.scene import Numerics, Plate, Shots, Symmetry
+from warpimpact.scene import Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
@@ -49,29 +49,19 @@ def compute(
     Raises:
         DeviceError: the device is absent.
     """
-    group = campaign.symmetries
+    scene, group = campaign.scene, campaign.symmetries
     computed = shots[:: len(group)]
-    how: dict[str, Any] = {
-        "interaction": campaign.interaction,
-        "numerics": campaign.numerics,
-        "standoffs": campaign.output.standoffs,
-        "standoff_point": campaign.output.standoff_point,
-        "bending": campaign.output.bending,
-        "device": device,
-        "threads": threads,
-    }
     follow = progress and (lambda done, total: progress(done * len(group), total * len(group)))
     _build(campaign, computed, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(campaign, campaign.plate, computed, **how, progress=follow)
+    outcomes, estimates = _outcomes(scene, computed, campaign.numerics, device, threads, follow)
     elapsed = time.perf_counter() - begin
     period, chosen = campaign.hits.covered(campaign.plate), find_device(device)
     ligament = campaign.plate.ligament
     dataset = to_dataset(
+        scene,
         shots,
         unfolded(outcomes, group),
-        standoffs=np.array(campaign.output.standoffs),
-        outlines=campaign.plate.pattern.outlines(*((-0.5 * side, 0.5 * side) for side in period)),
         period=period,
         attributes={
             "title": campaign.title,
@@ -103,28 +93,30 @@ def compute(
     thinner = campaign.plate.solid
     if solid.thickness is not None:
         solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
-    return dataset.merge(solid_dataset(_outcomes(campaign, thinner, solid, **how)[0]))
+    reference = scene.model_copy(update={"target": thinner})
+    return dataset.merge(solid_dataset(_outcomes(reference, solid, campaign.numerics, device, threads)[0]))
 
 
 def _build(campaign: Campaign, shots: Shots, device: str) -> None:
     """Have the kernels ready, so that the time of computing is that alone."""
     numerics = campaign.numerics
-    build(
-        campaign.core,
-        campaign.plate,
-        shots,
-        interaction=campaign.interaction,
-        numerics=numerics if numerics.tolerance is None else Numerics(precision=numerics.precision),
-        bending=campaign.output.bending,
-        device=device,
-    )
+    if numerics.tolerance is not None:
+        numerics = Numerics(precision=numerics.precision)
+    build(campaign.scene, shots, numerics=numerics, device=device)
 
 
-def _outcomes(campaign: Campaign, plate: Plate, shots: Shots, **how: Any) -> tuple[Outcomes, Estimates | None]:
-    """Outcomes on a plate, with estimates of their errors where the campaign has a tolerance."""
-    if campaign.numerics.tolerance is None:
-        return simulate(campaign.core, plate, shots, **how), None
-    return simulate_to_tolerance(campaign.core, plate, shots, **how)
+def _outcomes(
+    scene: Scene,
+    shots: Shots,
+    numerics: Numerics,
+    device: str,
+    threads: int | None,
+    progress: Progress | None = None,
+) -> tuple[Outcomes, Estimates | None]:
+    """Outcomes, with estimates of their errors where the numerics have a tolerance."""
+    if numerics.tolerance is None:
+        return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
+    return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
 
 
 def _impact(campaign: Campaign) -> str:
@@ -158,7 +150,7 @@ def _numerics(campaign: Campaign, shots: Shots) -> str:
             f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg, "
             f"at most {LADDER[-1].patches_axial} by {LADDER[-1].patches_around} patches"
         )
-    resolution = resolve(campaign.numerics, campaign.core, campaign.plate, shots.columns)
+    resolution = resolve(campaign.numerics, campaign.scene, shots.columns)
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "

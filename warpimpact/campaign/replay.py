@@ -52,31 +52,16 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     sampler = campaign.sampler()
     if len(sampler) != hits and (campaign.stop is None or len(sampler) < hits):
         raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(sampler)}")
-    group = campaign.symmetries
+    scene, group = campaign.scene, campaign.symmetries
     image = hit % len(group)
     images = sampler.shots(hit - image, len(group))
     computed, shot = images[:1], images[image:][:1]
-    again = simulate.replay(
-        campaign.core,
-        campaign.plate,
-        computed,
-        interaction=campaign.interaction,
-        numerics=_numerics(campaign, result, hit),
-        standoffs=list(campaign.output.standoffs),
-        standoff_point=campaign.output.standoff_point,
-        bending=campaign.output.bending,
-    )
+    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, hit))
     home, away = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
-    reach = [(float(cells.min()), float(cells.max())) for cells in (again.cell_y, again.cell_z)]
-    end = to_dataset(
-        shot,
-        again.outcomes,
-        standoffs=np.array(campaign.output.standoffs),
-        outlines=campaign.plate.pattern.outlines(*reach),
-        period=campaign.hits.covered(campaign.plate),
-        attributes={},
-    ).isel(hit=0)
+    end = to_dataset(scene, shot, again.outcomes, period=campaign.hits.covered(campaign.plate), attributes={}).isel(
+        hit=0
+    )
     stored = result.isel(hit=hit)
     if not _same(end, stored, ("hit_y", "hit_z", *shot_variables(end))):
         raise ResultError(f"hit: got {hit}, whose shot is no longer what the campaign and the files it names give")
@@ -88,7 +73,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         "warp_version": warp.__version__,
         "device": "cpu",
     }
-    return history_dataset(end, again, campaign.core, campaign.plate, attributes=attributes)
+    return history_dataset(scene, end, again, attributes=attributes)
 
 
 def _numerics(campaign: Campaign, result: xarray.Dataset, hit: int) -> Numerics | Fidelity:

@@ -6,7 +6,7 @@ follows the CF conventions and opens with plain ``xarray.open_dataset``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from warpimpact.results.variables import (
     HISTORY_COORDINATES,
     HISTORY_VARIABLES,
     OUTCOME_VARIABLES,
+    OUTLINE_VARIABLES,
     SCATTER_VARIABLES,
     SHOT_VARIABLES,
     SOLID_VARIABLES,
@@ -32,7 +33,7 @@ from warpimpact.results.variables import (
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from warpimpact.scene import Core, Plate, Shots
+    from warpimpact.scene import Scene, Shots
     from warpimpact.solver.refinement import Estimates
     from warpimpact.solver.simulate import Outcomes, Replay
 
@@ -51,11 +52,10 @@ _STATIONS, _SECTION_POINTS = 101, 1601
 
 
 def to_dataset(
+    scene: Scene,
     shots: Shots,
     outcomes: Outcomes,
     *,
-    standoffs: NDArray[np.float64],
-    outlines: Sequence[NDArray[np.float64]],
     period: tuple[float, float],
     attributes: Mapping[str, str | int | float],
     estimates: Estimates | None = None,
@@ -63,22 +63,21 @@ def to_dataset(
     """Gather shots and outcomes into the Dataset of the hit map.
 
     Args:
+        scene: What was shot at what; it records m stand-offs.
         shots: n shots, SI and radians.
-        outcomes: Their outcomes, SI and radians; NaN where a quantity does not exist.
-        standoffs: Distances behind the rear face [m], shape (m,), for the outcomes of shape (n, m).
-        outlines: Closed hole outlines [m], each of shape (vertices, 2), that maps draw.
-        period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits are drawn.
+        outcomes: Their outcomes, of shape (n,) or (n, m), SI and radians; NaN where a quantity does not exist.
+        period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
         estimates: Of the errors of a run to a tolerance, SI and radians.
     """
-    vertices = _joined(outlines)
+    standoffs = np.array(scene.record.standoffs)
     coordinates = {"hit_y": shots.hit_y, "hit_z": shots.hit_z, "standoff": standoffs, "axis": ["x", "y", "z"]}
     values = {name: getattr(shots, name.removeprefix("impact_")) for name in SHOT_VARIABLES}
     values |= {name: shots.columns[name] for name in SCATTER_VARIABLES if name in shots.columns}
     values |= {
         name: getattr(outcomes, name) for name in OUTCOME_VARIABLES | BENDING_VARIABLES if hasattr(outcomes, name)
     }
-    values |= {"outline_y": vertices[:, 0], "outline_z": vertices[:, 1]}
+    values |= _outlines(scene, *((-0.5 * side, 0.5 * side) for side in period))
     optional = SCATTER_VARIABLES | BENDING_VARIABLES
     variables = VARIABLES | {name: variable for name, variable in optional.items() if name in values}
     if estimates is not None:
@@ -149,32 +148,32 @@ def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, str | int 
 
 
 def history_dataset(
-    hit: xarray.Dataset,
-    replay: Replay,
-    core: Core,
-    plate: Plate,
-    *,
-    attributes: Mapping[str, str | int | float],
+    scene: Scene, hit: xarray.Dataset, replay: Replay, *, attributes: Mapping[str, str | int | float]
 ) -> xarray.Dataset:
-    """Gather a replayed shot into the Dataset of its history.
+    """Gather a replayed shot into the Dataset of its history, which tells enough of core and plate to draw them.
 
     Args:
+        scene: what was shot at what.
         hit: the shot and its outcome as `to_dataset` gives them, one hit of it selected; they stay as scalars,
             the angular velocity at the end as `residual_angular_velocity`.
         replay: the shot's history.
-        core, plate: what hit what; the Dataset tells enough of both to draw them.
         attributes: global attributes over those of `hit`.
     """
+    core, plate = scene.core, scene.target.plate
     hit_y, hit_z = float(hit["hit_y"]), float(hit["hit_z"])
     history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
     section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * core.bounding_radius
-    values = {name: getattr(history, name) for name in HISTORY_VARIABLES if hasattr(history, name)} | {
-        "plate_position": history.position + np.array([0.0, hit_y, hit_z]),
-        "resistance_share": replay.resistance_share,
-        "core_radius": core.radius(stations),
-        "solid_along_y": plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
-        "solid_along_z": plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
-    }
+    values = (
+        {name: getattr(history, name) for name in HISTORY_VARIABLES if hasattr(history, name)}
+        | {
+            "plate_position": history.position + np.array([0.0, hit_y, hit_z]),
+            "resistance_share": replay.resistance_share,
+            "core_radius": core.radius(stations),
+            "solid_along_y": plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
+            "solid_along_z": plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
+        }
+        | _outlines(scene, *((float(cells.min()), float(cells.max())) for cells in (replay.cell_y, replay.cell_z)))
+    )
     coordinates = {
         "time": history.time,
         "quaternion": ["x", "y", "z", "w"],
@@ -184,11 +183,15 @@ def history_dataset(
         "section": section,
         "station": core.mass_properties.centre_of_mass - stations,
     }
-    dataset = hit.rename(angular_velocity="residual_angular_velocity").assign_coords(
-        {name: _described(variable, coordinates[name]) for name, variable in HISTORY_COORDINATES.items()}
+    dataset = (
+        hit.drop_dims("vertex")
+        .rename(angular_velocity="residual_angular_velocity")
+        .assign_coords(
+            {name: _described(variable, coordinates[name]) for name, variable in HISTORY_COORDINATES.items()}
+        )
     )
     return dataset.assign(
-        {name: _described(variable, values[name]) for name, variable in HISTORY_VARIABLES.items()}
+        {name: _described(variable, values[name]) for name, variable in (HISTORY_VARIABLES | OUTLINE_VARIABLES).items()}
     ).assign_attrs(dict(attributes) | {"plate_thickness": float(hit.get("thickness", plate.thickness))})
 
 
@@ -198,11 +201,14 @@ def _described(variable: Variable, values: Any) -> tuple[tuple[str, ...], Any, d
     return variable.dims, surface, {"units": variable.units, "long_name": variable.long_name}
 
 
-def _joined(outlines: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """All outlines in one array of shape (vertices, 2), with a NaN row between one and the next."""
+def _outlines(
+    scene: Scene, y_range: tuple[float, float], z_range: tuple[float, float]
+) -> dict[str, NDArray[np.float64]]:
+    """Outlines of the holes in a rectangle [m], by OUTLINE_VARIABLES, with a NaN between one and the next."""
     gap = np.full((1, 2), np.nan)
-    rows = [row for outline in outlines for row in (gap, outline)]
-    return np.concatenate(rows[1:]) if rows else np.empty((0, 2))
+    rows = [row for outline in scene.target.plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
+    vertices = np.concatenate(rows[1:]) if rows else np.empty((0, 2))
+    return {"outline_y": vertices[:, 0], "outline_z": vertices[:, 1]}
 
 
 def status_codes(dataset: xarray.Dataset) -> dict[str, int]:

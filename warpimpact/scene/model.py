@@ -1,5 +1,7 @@
 """What the models of a scene have in common."""
 
+from collections.abc import Mapping
+from copy import deepcopy
 from difflib import get_close_matches
 from typing import Any, Self
 
@@ -26,11 +28,18 @@ class Model(BaseModel):
             raise ValueError(f'got the unknown key "{unknown[0]}"; {hint}')
         return values
 
-    def __copy__(self) -> Self:
-        """A copy without what was computed from the fields, which model_copy may change."""
-        copied = super().__copy__()
-        copied.__dict__ = {name: value for name, value in copied.__dict__.items() if name in type(self).model_fields}
-        return copied
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A copy with changes that is validated like any other value; what was computed of this one stays behind.
+
+        Args:
+            update: new values of fields, as the model takes them; file names count from the working directory.
+            deep: whether the values that stay are copied, too.
+
+        Raises:
+            ValidationError: a field is unknown, or the copy would be something that cannot be.
+        """
+        kept = {name: value for name, value in self if name in self.model_fields_set}
+        return type(self).model_validate((deepcopy(kept) if deep else kept) | dict(update or {}))
 
     def __eq__(self, other: object) -> bool:
         """Whether all fields are the same, whatever was computed from them."""

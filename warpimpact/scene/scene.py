@@ -1,25 +1,105 @@
-"""Scene: what is shot at what, and what is recorded of it."""
+"""Scene: one core, what it is shot at, how the material resists, and what is recorded of a shot."""
 
-from typing import Literal
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
 
-from .core import AnyCore
+from pydantic import Field, field_validator, model_validator
+
+from .core import AnyCore, Core
 from .interaction import Interaction
 from .model import Model
 from .plate import Plate
+from .units import PositiveLength
 
 
 class Record(Model):
-    standoffs: tuple[float, ...] = ()
+    """What is recorded of every shot beside how it ended.
+
+    Attributes:
+        standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
+        standoff_point: the point of the core that passes them.
+        bending: whether the largest bending moment and stress of each core are reported.
+    """
+
+    standoffs: tuple[PositiveLength, ...] = ()
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
-    bending: bool = False
+    bending: Annotated[bool, Field(strict=True)] = False
+
+    @field_validator("standoffs")
+    @classmethod
+    def _increase(cls, standoffs: tuple[float, ...]) -> tuple[float, ...]:
+        for before, after in pairwise(standoffs):
+            if after <= before:
+                raise ValueError(f"got {after:g} m after {before:g} m, but stand-offs must increase")
+        return standoffs
+
+    def check_bending(self, core: Core) -> None:
+        """Refuse to record the bending moment of a core that has none.
+
+        Raises:
+            ValueError: names what the core overrides.
+        """
+        overridden = ("centre_of_mass", "inertia_axial", "inertia_transverse")
+        given = [name for name in overridden if getattr(core, name) is not None]
+        if self.bending and given:
+            raise ValueError(
+                f"got bending = true beside core.{given[0]}, but a bending moment needs the mass of every slice, which "
+                "follows from the shape alone"
+            )
+
+    def check_standoffs(self, core: Core) -> None:
+        """Refuse stand-offs at which a core may still be in the plate.
+
+        Raises:
+            ValueError: names the first stand-off and the least that is allowed.
+        """
+        needed = core.bounding_radius
+        if self.standoff_point == "nose":
+            needed += core.mass_properties.centre_of_mass
+        if self.standoffs and self.standoffs[0] < needed:
+            raise ValueError(
+                f"got {self._name}.standoffs of {self.standoffs[0]:g} m, "
+                f"but a core of this size is sure to be out of the plate only from {needed:.4g} m"
+            )
+
+    @property
+    def _name(self) -> str:
+        """What the field is called that holds it."""
+        return type(self).__name__.lower()
 
 
 class Target(Model):
+    """What is shot at.
+
+    Attributes:
+        plate: its front face lies in x = 0.
+    """
+
     plate: Plate
 
 
 class Scene(Model):
+    """What is shot at what, and what is recorded; with `Shots` and numerics, all that outcomes depend on.
+
+    Attributes:
+        core: the rigid core.
+        target: what it is shot at; a plate alone will do.
+        interaction: stress on the surface of the core.
+        record: what is recorded of every shot.
+    """
+
     core: AnyCore
     target: Target
     interaction: Interaction = Interaction()
     record: Record = Record()
+
+    @field_validator("target", mode="before")
+    @classmethod
+    def _of_a_plate(cls, target: Any) -> Any:
+        return Target(plate=target) if isinstance(target, Plate) else target
+
+    @model_validator(mode="after")
+    def _record_is_possible(self) -> Self:
+        self.record.check_bending(self.core)
+        self.record.check_standoffs(self.core)
+        return self

@@ -100,9 +100,8 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         MemoryError: the plate's period does not fit at the grid spacing.
     """
     core, plate = scene.core, scene.target.plate
-    if scene.record.bending:
-        check_bending(core, numerics)
-    resolution = resolve(numerics, core, plate, shots.columns)
+    check_bending(scene.record, numerics)
+    resolution = resolve(numerics, scene, shots.columns)
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     conditions = _conditions(scene, resolution, shots)

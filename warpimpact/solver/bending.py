@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpimpact.scene import Core, Numerics
+from warpimpact.scene import Core, Numerics, Record
 
 if TYPE_CHECKING:
     from warpimpact.solver.resolution import Fidelity
@@ -30,21 +30,13 @@ class Sections:
     rotary: Array
 
 
-def check_bending(core: Core, numerics: Numerics | Fidelity) -> None:
-    """Refuse what has no bending moment.
+def check_bending(record: Record, numerics: Numerics | Fidelity) -> None:
+    """Refuse to record a bending moment that the numerics do not have.
 
     Raises:
-        ValueError: says why.
+        ValueError: names the scheme.
     """
-    given = [
-        name for name in ("centre_of_mass", "inertia_axial", "inertia_transverse") if getattr(core, name) is not None
-    ]
-    if given:
-        raise ValueError(
-            f"got bending = true beside core.{given[0]}, but a bending moment needs the mass of every slice, which "
-            "follows from the shape alone"
-        )
-    if isinstance(numerics, Numerics) and numerics.scheme == "nodal":
+    if record.bending and isinstance(numerics, Numerics) and numerics.scheme == "nodal":
         raise ValueError('got bending = true beside numerics.scheme = "nodal", but it must be "consistent"')
 
 

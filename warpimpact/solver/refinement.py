@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.scene import Core, Interaction, Numerics, Plate, Shots, Tolerance
+from warpimpact.scene import Numerics, Scene, Shots, Tolerance
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import Fidelity
 from warpimpact.solver.simulate import Outcomes, simulate
@@ -49,15 +48,10 @@ class Estimates:
 
 
 def simulate_to_tolerance(
-    core: Core,
-    plate: Plate,
+    scene: Scene,
     shots: Shots,
     *,
     numerics: Numerics,
-    interaction: Interaction | None = None,
-    standoffs: Sequence[float] = (),
-    standoff_point: str = "centre_of_mass",
-    bending: bool = False,
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
@@ -80,14 +74,9 @@ def simulate_to_tolerance(
 
     def on(index: int, which: NDArray[np.int64]) -> Outcomes:
         return simulate(
-            core,
-            plate,
+            scene,
             shots[which],
-            interaction=interaction,
             numerics=level(index, numerics),
-            standoffs=standoffs,
-            standoff_point=standoff_point,
-            bending=bending,
             device=device,
             threads=threads,
             progress=lambda *_: show(len(shots) - len(pending)),  # nothing new, but a chance to end the computation

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Core, Impact, Numerics, Plate
+from warpimpact.scene import Impact, Numerics, Plate, Scene
 
 Array = NDArray[np.float64]
 
@@ -107,12 +107,13 @@ class Resolution:
         return float(self.step_at(impact.velocity, impact.obliquity, plate.thickness, longest_time))
 
 
-def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate, scattered: Collection[str] = ()) -> Resolution:
+def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[str] = ()) -> Resolution:
     """Fill in what the numerics leave to fidelity and scheme; a fidelity need not have a name.
 
     Args:
         scattered: names of the quantities of the scene that differ from shot to shot.
     """
+    core, plate = scene.core, scene.target.plate
     if isinstance(numerics, Fidelity):
         fidelity, numerics = numerics, Numerics()
     else:
@@ -142,10 +143,11 @@ def resolve(numerics: Numerics | Fidelity, core: Core, plate: Plate, scattered: 
     )
 
 
-def spelt_out(fidelity: Fidelity, core: Core, plate: Plate, impact: Impact) -> Numerics:
+def spelt_out(fidelity: Fidelity, scene: Scene, impact: Impact) -> Numerics:
     """Numerics that give, for one impact, what `resolve` would make of the fidelity if it had a name."""
+    plate = scene.target.plate
     return Numerics(
-        time_step=resolve(fidelity, core, plate).step_of(impact, plate),
+        time_step=resolve(fidelity, scene).step_of(impact, plate),
         patches_axial=fidelity.patches_axial,
         patches_around=fidelity.patches_around,
         grid_spacing=plate.degradation_length / fidelity.cells_per_length,

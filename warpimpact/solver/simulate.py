@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels import free_flight
 from warpimpact.kernels import march as marching
-from warpimpact.scene import Core, Interaction, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.arrays import variant_of
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
@@ -88,65 +87,37 @@ class Replay:
 
 
 def simulate(
-    core: Core,
-    plate: Plate,
+    scene: Scene,
     shots: Shots,
     *,
-    interaction: Interaction | None = None,
     numerics: Numerics | Fidelity | None = None,
-    standoffs: Sequence[float] = (),
-    standoff_point: str = "centre_of_mass",
-    bending: bool = False,
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
-    """Compute every shot on its own copy of the plate (MODEL.md §§1–5).
+    """Compute every shot on its own copy of the target (MODEL.md §§1–5).
 
     Args:
-        standoffs: distances behind the rear face [m], shape [stand-offs]; at least the core's bounding radius.
-        standoff_point: which point has to pass them: "centre_of_mass" or "nose".
-        bending: follow the bending moment, and return `BentOutcomes`.
+        numerics: how finely; None is the standard fidelity.
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
         threads: of a CPU; None is one for every core that this process may use.
         progress: called with (shots done, shots) as they come; what it raises ends the computation.
 
+    Returns:
+        The outcomes at the stand-offs that the scene records; `BentOutcomes` where it records the bending moment.
+
     Raises:
         DeviceError: the device is absent.
-        ValueError: the core or the numerics have no bending moment.
+        ValueError: the numerics have a tolerance, or have no bending moment that the scene records.
     """
-    scene = Scene.model_construct(
-        core=core,
-        target=Target.model_construct(plate=plate),
-        interaction=interaction or Interaction(),
-        record=Record(standoffs=tuple(standoffs), standoff_point=standoff_point, bending=bending),
-    )
     march = March(scene, numerics or Numerics(), shots, find_device(device), threads=threads)
     return _outcomes(march, march.march(progress))
 
 
-def build(
-    core: Core,
-    plate: Plate,
-    shots: Shots,
-    *,
-    interaction: Interaction | None = None,
-    numerics: Numerics | Fidelity | None = None,
-    bending: bool = False,
-    device: str = "auto",
-) -> None:
+def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None, device: str = "auto") -> None:
     """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
-    resolution = resolve(numerics or Numerics(), core, plate, shots.columns)
-    variant = variant_of(
-        resolution,
-        Scene.model_construct(
-            core=core,
-            target=Target.model_construct(plate=plate),
-            interaction=interaction or Interaction(),
-            record=Record(bending=bending),
-        ),
-        shots,
-    )
+    resolution = resolve(numerics or Numerics(), scene, shots.columns)
+    variant = variant_of(resolution, scene, shots)
     for stage in (marching, free_flight):
         load(stage.build(variant).kernel, find_device(device))
 
@@ -156,45 +127,20 @@ def _outcomes(march: March, contact: Any) -> Outcomes:
     return BentOutcomes(**report) if march.variant.bends else Outcomes(**report)
 
 
-def trace(
-    core: Core,
-    plate: Plate,
-    shots: Shots,
-    *,
-    interaction: Interaction | None = None,
-    numerics: Numerics | Fidelity | None = None,
-) -> list[Array]:
-    """Histories of shots on the CPU: one array [steps + 1, TRACE_COLUMNS] per shot (kernels/march.py)."""
-    march = _traced(core, plate, shots, interaction, numerics)
+def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None) -> list[Array]:
+    """Histories of shots on the CPU: one array [steps + 1, WIDTH] per shot (kernels/trace.py)."""
+    march = _traced(scene, shots, numerics)
     return march.traces(march.march())
 
 
-def replay(
-    core: Core,
-    plate: Plate,
-    shot: Shots,
-    *,
-    interaction: Interaction | None = None,
-    numerics: Numerics | Fidelity | None = None,
-    standoffs: Sequence[float] = (),
-    standoff_point: str = "centre_of_mass",
-    bending: bool = False,
-    snapshots: int = 6,
-) -> Replay:
+def replay(scene: Scene, shot: Shots, *, numerics: Numerics | Fidelity | None = None, snapshots: int = 6) -> Replay:
     """One shot again on the CPU, with its history; it ends with the bits of `simulate` on the same CPU.
 
     Args:
-        shot: shots of length 1; the others as in `simulate`.
+        shot: shots of length 1; the numerics as in `simulate`.
         snapshots: how often the plate is shown, evenly from the first touch to the end.
     """
-    march = _traced(
-        core,
-        plate,
-        shot,
-        interaction,
-        numerics,
-        Record(standoffs=tuple(standoffs), standoff_point=standoff_point, bending=bending),
-    )
+    march = _traced(scene, shot, numerics)
     contact = march.march()
     (trace,) = march.traces(contact)
     time_step = 2.0 * trace[0, 0]
@@ -210,8 +156,5 @@ def replay(
     )
 
 
-def _traced(core, plate, shots, interaction, numerics, record=Record()):
-    scene = Scene.model_construct(
-        core=core, target=Target.model_construct(plate=plate), interaction=interaction or Interaction(), record=record
-    )
+def _traced(scene: Scene, shots: Shots, numerics: Numerics | Fidelity | None) -> March:
     return March(scene, numerics or Numerics(), shots, find_device("cpu"), traced=True)
