@@ -112,7 +112,7 @@ def plate_result(
             "plate_period": PERIOD,
             "areal_density": 23.55,
             "open_area": 0.25,
-            "numerics": "draft fidelity, consistent scheme, time_step 1e-06 s",
+            "numerics_given": '{"fidelity": "draft", "time_step": null}',
         }
         | told,
     )

@@ -164,13 +164,14 @@ def test_plates_that_were_asked_something_else_are_refused(change: dict, sentenc
 
 def test_what_makes_a_comparison_less_than_fair_is_said(make_plate_result) -> None:
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)), sampling="sobol", replicates=1)
-    finer = "reference fidelity, consistent scheme, time_step 1e-7 s"
-    notes = compare([plate, plate.assign_attrs(areal_density=30.0, numerics=finer)], ["a", "b"]).notes
+    finer = '{"fidelity": "reference", "time_step": null}'
+    notes = compare([plate, plate.assign_attrs(areal_density=30.0, numerics_given=finer)], ["a", "b"]).notes
     assert [note.split()[:4] for note in notes] == [
         ["The", "plates", "differ", "in"],
         ["The", "plates", "were", "computed"],
         ["Intervals", "are", "those", "of"],
     ]
+    assert 'different numerics: fidelity is "draft" and "reference".' in notes[1]
     assert not compare([plate.assign_attrs(sampling="random")] * 2, ["a", "b"]).notes
 
 

@@ -15,7 +15,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -192,9 +192,10 @@ def _notes(datasets: Sequence[xarray.Dataset]) -> Iterator[str]:
     densities = [dataset.attrs["areal_density"] for dataset in datasets]
     if max(densities) > 1.01 * min(densities):
         yield "The plates differ in weight; the ratio to the solid plate of the same areal density allows for it."
-    numerics = sorted({dataset.attrs["numerics"].partition(", time_step")[0] for dataset in datasets})
-    if len(numerics) > 1:
-        yield f"The plates were computed with different numerics: {_listed(numerics)}."
+    asked = [json.loads(dataset.attrs["numerics_given"]) for dataset in datasets if "numerics_given" in dataset.attrs]
+    differences = (first_difference(one, other) for one, other in pairwise(asked))
+    if (found := next(filter(None, differences), None)) is not None:
+        yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
     if note := sampling_note(datasets[0]):
         yield note
 

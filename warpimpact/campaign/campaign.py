@@ -68,7 +68,7 @@ class Campaign(Model):
 
     @property
     def text(self) -> str:
-        """The TOML file as it was read; of a campaign made in Python, its values as JSON."""
+        """The TOML file as it was read; of a campaign made or changed in Python, its values as JSON."""
         return self._source or self.model_dump_json()
 
     @classmethod
@@ -113,6 +113,11 @@ class Campaign(Model):
             raise CampaignError(f"{name}: {_sentence(error, data)}") from None
         campaign._source = text
         return campaign
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        """What two campaigns are compared by: not how their text is written."""
+        return tuple(getattr(self, name) for name in type(self).model_fields)
 
     @property
     def scene(self) -> Scene:

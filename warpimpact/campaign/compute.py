@@ -79,6 +79,7 @@ def compute(
             "core": campaign.core.model_dump_json(),
             "impact": _impact(campaign),
             "numerics": _numerics(campaign, shots),
+            "numerics_given": json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             "failed_share": campaign.output.failed_share,
             "compute_time": elapsed,
             "hits_per_second": len(computed) / elapsed,

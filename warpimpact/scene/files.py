@@ -13,13 +13,14 @@ from .units import quoted
 
 
 def input_file(name: object, info: ValidationInfo) -> Path:
-    """Path of an existing file; a relative name counts from the validation context's `folder`, if any."""
+    """Absolute path of an existing file; a relative name counts from the validation context's `folder`, if any, else
+    from the working directory."""
     if not isinstance(name, str | Path):
         raise ValueError(f"got {quoted(name)}, which is not a file name")
     path = Path((info.context or {}).get("folder", "")) / name
     if not path.is_file():
         raise ValueError(f"got {quoted(name)}, but there is no file {path}")
-    return path
+    return path.absolute()
 
 
 InputFile = Annotated[Path, BeforeValidator(input_file)]

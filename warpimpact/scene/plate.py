@@ -49,7 +49,7 @@ class Plate(Model):
     @classmethod
     def _within_the_margin(cls, pattern: Pattern, info: ValidationInfo) -> Pattern:
         size, margin = (info.data.get(name) for name in ("size", "margin"))
-        return pattern.bounded(size, margin) if size is not None and margin is not None else pattern
+        return pattern.bounded(size, margin) if size is not None and margin is not None else pattern.unbounded
 
     @model_validator(mode="after")
     def _margin_has_a_rim(self) -> Self:

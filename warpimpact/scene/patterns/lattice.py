@@ -2,6 +2,7 @@
 
 import math
 from abc import abstractmethod
+from copy import copy
 from functools import cached_property
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -112,13 +113,26 @@ class LatticePattern(Pattern):
 
     def bounded(self, size: tuple[float, float], margin: float) -> Self:
         """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m]."""
-        on_plate = self.model_copy()
-        on_plate._plate = (size, margin)
+        if self._plate == (size, margin):
+            return self
+        on_plate = self._on((size, margin))
         if not len(on_plate._places):
             raise ValueError(
                 f"got size = {_millimetres(size)} and margin = {1e3 * margin:g} mm, which leave no hole on the plate"
             )
         return on_plate
+
+    @property
+    def unbounded(self) -> Self:
+        """The pattern with all its holes, whatever plate it was bounded by."""
+        return self if self._plate is None else self._on(None)
+
+    def _on(self, plate: tuple[tuple[float, float], float] | None) -> Self:
+        """The same holes on a plate of some size and margin [m], with nothing computed."""
+        pattern = copy(self)
+        pattern.__dict__ = {name: getattr(self, name) for name in type(self).model_fields}
+        pattern._plate = plate
+        return pattern
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""

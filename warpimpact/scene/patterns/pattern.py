@@ -75,6 +75,11 @@ class Pattern(Model, ABC):
             along_y, along_z: 1, or −1 for a mirror image.
         """
 
+    @property
+    def unbounded(self) -> Self:
+        """The pattern with all its holes, whatever plate it was bounded by."""
+        return self
+
     @abstractmethod
     def bounded(self, size: tuple[float, float], margin: float) -> Self:
         """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m], which

@@ -1,0 +1,218 @@
+"""Copies with changes are values like any other: validated, computed anew, and with a text of their own."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from warpimpact import (
+    Campaign,
+    CirclePattern,
+    Impact,
+    Interaction,
+    MaskPattern,
+    Numerics,
+    Plate,
+    PolynomialCore,
+    ProfileCore,
+    SlotPattern,
+    run,
+)
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run_to_file
+from warpimpact.results import files
+from warpimpact.scene import Hits, NoPattern, Tolerance
+from warpimpact.scene.model import Model
+
+CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
+MM = 1e-3
+CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
+ROUND = CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))
+PLATE = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05, degradation=0.8, pattern=ROUND)
+
+HEAD = """\
+title = "a test"
+[core]
+shape = "profile"
+file = "profile.csv"
+mass = "4 g"
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+degradation = 0.8
+pattern = { shape = "mask", file = "mask.npy", cell_size = "1 mm" }
+[numerics]
+fidelity = "draft"
+[output]
+standoffs = ["50 mm", "130 mm"]
+solid_reference = false
+"""
+STRAIGHT = '[impact]\nvelocity = "825 m/s"\n'
+LISTED = STRAIGHT + '[hits]\nsampling = "list"\nfile = "hits.csv"\n'
+SCATTERED = """\
+[impact]
+velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }
+yaw = { distribution = "discrete", values = ["0 deg", "2 deg"] }
+[hits]
+seed = 7
+[stop]
+quantity = "P(tilt@130mm > 30 deg)"
+half_width = 0.01
+max_count = 64
+"""
+PLAIN = STRAIGHT + "[hits]\ncount = 6\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the files that HEAD and LISTED name; a file beside it is named as people do, by a relative path."""
+    place = tmp_path / "campaigns"
+    place.mkdir()
+    (place / "profile.csv").write_text("s,r\n0,0\n0.012,0.003\n0.02,0.003\n")
+    (place / "hits.csv").write_text("hit_y,hit_z,velocity\n0.001,0.002,820\n0.002,0.001,810\n0.0,0.0,800\n")
+    material = np.ones((12, 12), dtype=np.uint8)
+    material[3:8, 4:9] = 0
+    np.save(place / "mask.npy", material)
+    monkeypatch.chdir(tmp_path)
+    return Path("campaigns")
+
+
+def read(folder: Path, text: str, **options: Any) -> Campaign:
+    (folder / "a.toml").write_text(HEAD + text)
+    return Campaign.from_toml(folder / "a.toml", **options)
+
+
+def thinner(campaign: Campaign) -> Campaign:
+    return campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"thickness": "3 mm"})})
+
+
+@pytest.mark.parametrize(
+    ("value", "update", "complaint"),
+    [
+        (PLATE, {"thicknes": 1.0}, 'got the unknown key "thicknes"; did you mean "thickness"?'),
+        (PLATE, {"thickness": -1.0}, "greater than 0"),
+        (PLATE, {"margin": 1e-3}, "got margin = 1 mm without size"),
+        (CORE, {"density": 7850.0}, "got both of mass and density"),
+        (ROUND, {"diameter": 9e-3}, "overlap or touch"),
+        (Impact(velocity=825.0), {"velocity": "825 m"}, "not a speed"),
+        (Hits(count=4), {"sampling": "list"}, 'got sampling = "list" without file'),
+        (Numerics(tolerance={"tilt": "1 deg"}), {"time_step": 1e-6}, "got time_step beside tolerance"),
+    ],
+)
+def test_a_copy_that_cannot_be_is_refused(value: Model, update: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        value.model_copy(update=update)
+    assert complaint in str(caught.value)
+
+
+def test_a_copy_takes_what_the_model_takes() -> None:
+    assert PLATE.model_copy(update={"thickness": "5 mm"}).thickness == 5e-3
+    assert PLATE.model_copy(update={"pattern": {"shape": "none"}}).pattern == NoPattern()
+
+
+def test_nothing_computed_goes_along(folder: Path) -> None:
+    assert CORE.mass_properties.mass == 4e-3
+    assert CORE.model_copy(update={"mass": 8e-3}).mass_properties.mass == 8e-3
+    slots = SlotPattern(length=12 * MM, width=4 * MM, spacing=(8 * MM, 16 * MM))
+    assert slots.ligament() == pytest.approx(4 * MM)
+    assert slots.model_copy(update={"spacing": (10 * MM, 18 * MM)}).ligament() == pytest.approx(6 * MM)
+    mask = MaskPattern(file=folder / "mask.npy", cell_size=1 * MM)
+    np.save(folder / "mask.npy", np.pad(mask.material, 2, constant_values=True))
+    assert mask.model_copy(update={"cell_size": 2 * MM}).period == pytest.approx((32 * MM, 32 * MM))
+
+
+def test_a_pattern_keeps_no_rim_of_another_plate() -> None:
+    rimmed = PLATE.model_copy(update={"size": (40 * MM, 40 * MM), "margin": 3 * MM})
+    assert rimmed.open_area < PLATE.open_area
+    assert rimmed.model_copy(update={"thickness": 5 * MM}).pattern is rimmed.pattern
+    assert rimmed.model_copy(update={"margin": None}).open_area == PLATE.open_area
+    other = rimmed.model_copy(update={"size": (60 * MM, 60 * MM)})
+    assert other == Plate(**dict(PLATE) | {"size": (60 * MM, 60 * MM), "margin": 3 * MM})
+
+
+def test_what_was_not_given_is_not_given_in_a_copy() -> None:
+    numerics = Numerics(tolerance=Tolerance(tilt=0.01)).model_copy(update={"precision": "double"})
+    assert numerics.model_dump() == {"tolerance": {"tilt": 0.01}, "precision": "double"}
+
+
+def test_a_deep_copy_shares_nothing_that_can_hold_other_values() -> None:
+    for deep in (False, True):
+        copied = PLATE.model_copy(update={"thickness": 5e-3}, deep=deep)
+        assert copied.pattern == PLATE.pattern
+        assert (copied.pattern is PLATE.pattern) is not deep
+
+
+@pytest.mark.parametrize("text", [LISTED, SCATTERED, PLAIN], ids=["listed", "scattered", "plain"])
+def test_the_text_of_a_changed_campaign_gives_it_again(
+    folder: Path, text: str, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    campaign = read(folder, text)
+    changed = thinner(campaign).model_copy(update={"interaction": Interaction(quadratic=1.0)})
+    assert campaign.text == HEAD + text
+    assert changed != campaign
+    elsewhere = tmp_path_factory.mktemp("elsewhere")
+    monkeypatch.chdir(elsewhere)
+    again = Campaign.from_text(changed.text, name="text", folder=elsewhere)
+    assert again == changed
+    assert again.plate.thickness == 3e-3
+    assert isinstance(again.core, ProfileCore)
+    for name in ("hit_y", "hit_z", "velocity", "yaw"):
+        expected = getattr(changed.sampler().shots(0, 6), name)
+        np.testing.assert_array_equal(getattr(again.sampler().shots(0, 6), name), expected)
+
+
+def test_a_campaign_copied_without_a_change_is_the_same(folder: Path) -> None:
+    campaign = read(folder, LISTED)
+    assert campaign.model_copy() == campaign
+    assert Campaign.from_text(campaign.model_copy().text, name="text", folder=Path("nowhere")) == campaign
+
+
+@pytest.mark.parametrize(
+    "numerics", [{"fidelity": "draft"}, {"tolerance": {"residual_velocity": 5.0}}], ids=["fidelity", "tolerance"]
+)
+@pytest.mark.parametrize(("text", "options"), [(LISTED, {}), (PLAIN, {"count": 3})], ids=["listed", "another count"])
+def test_a_replay_computes_the_plate_of_a_changed_campaign(
+    folder: Path, text: str, options: dict[str, int], numerics: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    original = read(folder, text, **options).model_copy(update={"numerics": numerics})
+    changed = thinner(original)
+    result, before = (run(campaign, device="cpu") for campaign in (changed, original))
+    assert result.sizes["hit"] == 3
+    assert (result["residual_velocity"] != before["residual_velocity"]).all()
+    monkeypatch.chdir(Path.cwd().root)
+    history = replay(result, 2, folder=Path("nowhere"))
+    assert history.attrs["agreement"] == "bit-identical"
+    assert history.attrs["plate_thickness"] == 3e-3
+    np.testing.assert_array_equal(history["tilt"], result["tilt"][2])
+
+
+def test_a_stored_result_tells_the_changed_campaign(folder: Path) -> None:
+    changed = thinner(read(folder, PLAIN))
+    run_to_file(changed, Path("a.nc"), device="cpu")
+    stored = files.read(Path("a.nc"))
+    assert json.loads(stored.attrs["campaign"])["plate"]["thickness"] == 3e-3
+    assert replay(stored, 0, folder=Path()).attrs["agreement"] == "bit-identical"
+
+
+def test_a_plate_of_a_comparison_can_be_changed() -> None:
+    campaign = next(iter(read_plates(CAMPAIGNS / "two_plates.toml", count=4).values()))
+    changed = thinner(campaign)
+    assert Campaign.from_text(changed.text, name="text", folder=Path("nowhere")) == changed
+    assert Campaign.from_text(campaign.text, name="text", folder=CAMPAIGNS, count=4) == campaign
+
+
+def test_a_campaign_changed_to_what_cannot_be_is_refused(folder: Path) -> None:
+    campaign = read(folder, SCATTERED)
+    with pytest.raises(ValidationError, match=r"got stop beside hits.sampling"):
+        campaign.model_copy(update={"hits": Hits(sampling="grid", count=64)})
+    with pytest.raises(ValidationError, match=r"got output.standoffs of 0.001 m"):
+        read(folder, PLAIN).model_copy(update={"output": {"standoffs": ["1 mm"]}})
+    changed = thinner(read(folder, LISTED))
+    (folder / "hits.csv").unlink()
+    with pytest.raises(CampaignError, match=r"text: hits.file: got .*hits.csv\", but there is no file"):
+        Campaign.from_text(changed.text, name="text", folder=folder)

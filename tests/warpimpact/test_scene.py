@@ -1,0 +1,88 @@
+"""Scenes: what they take, and what they refuse."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+import warpimpact
+from warpimpact import (
+    Campaign,
+    Hits,
+    Impact,
+    Interaction,
+    Numerics,
+    Plate,
+    PolynomialCore,
+    Record,
+    Scene,
+    Target,
+    make_shots,
+    run,
+    simulate,
+)
+
+SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
+PLATE = Plate(thickness=4e-3, resistance=2.6e9)
+
+
+def test_a_plate_alone_is_a_target() -> None:
+    scene = Scene(core=CORE, target=PLATE)
+    assert scene == Scene(core=CORE, target=Target(plate=PLATE))
+    assert scene.target.plate is PLATE
+    assert (scene.interaction, scene.record) == (Interaction(), Record())
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"plate": PLATE}, 'got the unknown key "plate"; allowed are core, target, interaction, record'),
+        ({"record": {"standoffs": ["130 mm", "50 mm"]}}, "got 0.05 m after 0.13 m, but stand-offs must increase"),
+        (
+            {"record": {"standoffs": ["10 mm"]}},
+            "got record.standoffs of 0.01 m, but a core of this size is sure to be out of the plate only from 0.01",
+        ),
+        (
+            {"record": {"standoffs": ["20 mm"], "standoff_point": "nose"}},
+            "got record.standoffs of 0.02 m, but a core of this size is sure to be out of the plate only from 0.03",
+        ),
+        (
+            {"core": CORE.model_copy(update={"centre_of_mass": 15e-3}), "record": {"bending": True}},
+            "got bending = true beside core.centre_of_mass, but a bending moment needs the mass of every slice",
+        ),
+    ],
+)
+def test_what_cannot_be_is_refused(changes: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        Scene(**{"core": CORE, "target": PLATE} | changes)
+    assert complaint in str(caught.value)
+
+
+def test_simulate_gives_what_a_campaign_of_the_same_scene_gives() -> None:
+    assert warpimpact.simulate is simulate
+    standoffs, numerics = (0.05, 0.13), Numerics(fidelity="draft")
+    impact, hits = Impact(velocity=825.0, obliquity=0.2), Hits(count=4)
+    campaign = Campaign(title="", core=CORE, plate=PLATE, impact=impact, hits=hits, numerics=numerics)
+    scene = Scene(core=CORE, target=PLATE, record=Record(standoffs=standoffs))
+    outcomes = simulate(scene, make_shots(impact, hits, PLATE), numerics=numerics, device="cpu")
+    dataset = run(campaign, device="cpu")
+    np.testing.assert_array_equal(np.degrees(outcomes.tilt), dataset["tilt"])
+    np.testing.assert_array_equal(outcomes.residual_velocity, dataset["residual_velocity"])
+    assert campaign.scene.record.standoffs == standoffs
+
+
+def test_a_scene_without_standoffs_records_none() -> None:
+    shots = make_shots(Impact(velocity=825.0), Hits(count=2), PLATE)
+    outcomes = simulate(Scene(core=CORE, target=PLATE), shots, numerics=Numerics(fidelity="draft"), device="cpu")
+    assert outcomes.tilt.shape == (2, 0)
+    assert (outcomes.residual_velocity > 0.0).all()
+
+
+def test_a_campaign_has_a_scene() -> None:
+    campaign = Campaign.from_toml(SLOTTED_PLATE)
+    scene = campaign.scene
+    assert (scene.core, scene.target.plate, scene.interaction) == (campaign.core, campaign.plate, campaign.interaction)
+    assert scene.record.standoffs == campaign.output.standoffs
