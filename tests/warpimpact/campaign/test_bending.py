@@ -13,7 +13,7 @@ from warpimpact.plotting.maps import hit_map
 from warpimpact.results import files
 from warpimpact.results.variables import BENDING_VARIABLES
 
-SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 STOP = """
 bending = true
 

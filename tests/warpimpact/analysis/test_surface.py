@@ -13,7 +13,7 @@ from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run
 from warpimpact.plotting.pressure import pressure
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 RESISTANCE = 2.6e9
 
 

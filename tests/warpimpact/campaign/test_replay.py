@@ -18,7 +18,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.variables import HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.scene import Interaction
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 NOWHERE = Path("nowhere")
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 HOLES = Plate(

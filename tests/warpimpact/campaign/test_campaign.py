@@ -8,7 +8,7 @@ import pytest
 from warpimpact import Campaign, Core, Hits, Impact, Interaction, Numerics, Plate, PolynomialCore
 from warpimpact.campaign.campaign import CampaignError
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 CAMPAIGN = """\
 title = "test"

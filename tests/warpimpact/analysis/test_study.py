@@ -32,7 +32,7 @@ from warpimpact.results.variables import STUDY_COORDINATES, STUDY_VARIABLES
 from warpimpact.scene import Numerics, Shots
 from warpimpact.solver.resolution import FIDELITIES, Fidelity, resolve, spelt_out
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 LADDER = {"coarse": Fidelity(8, 16, 1.0, 0.8), "middle": Fidelity(16, 32, 2.0, 0.4), "fine": Fidelity(32, 64, 4.0, 0.2)}
 LEVELS = (Fidelity(36, 72, 4.0, 0.15), Fidelity(54, 108, 6.0, 0.1))
 

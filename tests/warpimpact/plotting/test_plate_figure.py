@@ -14,7 +14,7 @@ from warpimpact.cli import main
 from warpimpact.plotting import plate_figure
 from warpimpact.scene import ConeCore, MaskPattern, NoPattern, Plate, SlotPattern
 
-CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 MM = 1e-3
 SLOTS = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
 CORE = ConeCore(diameter="6 mm", length="20 mm", mass="4 g")

@@ -25,7 +25,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.statistics.intervals import estimate_of
 
 pytestmark = pytest.mark.usefixtures("small_shards")
-TWO_PLATES = Path(__file__).parents[2] / "campaigns" / "two_plates.toml"
+TWO_PLATES = Path(__file__).parents[3] / "campaigns" / "two_plates.toml"
 TRIALS = 100
 LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below
 MEAN, TAIL, TILTED = "residual_energy_fraction", "residual_energy_fraction_worst_tenth", "tilted_share"

@@ -15,7 +15,7 @@ from warpimpact.scene import Shots
 from warpimpact.solver import marching, simulate
 from warpimpact.solver.simulate import Outcomes
 
-SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
 
 @pytest.fixture

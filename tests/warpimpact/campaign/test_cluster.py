@@ -15,7 +15,7 @@ from warpimpact.solver.device import DeviceError
 
 distributed = pytest.importorskip("distributed")
 
-SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 SCATTERED = (
     SLOTTED_PLATE.replace('"825 m/s"  ', '{ distribution = "normal", mean = "825 m/s", std = "10 m/s" }  ')
     .replace('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }')

@@ -17,7 +17,7 @@ from warpimpact.plotting import animation as film
 from warpimpact.plotting import trajectory
 from warpimpact.results import files
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 
 @pytest.fixture(scope="module", autouse=True)

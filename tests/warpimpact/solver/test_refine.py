@@ -97,7 +97,7 @@ def test_what_no_level_meets_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_campaign_carries_estimates_and_replays_on_the_level_of_each_hit(tmp_path: Path) -> None:
-    text = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
     text = text.replace("count = 4096", "count = 16").replace(
         'fidelity = "standard"', 'tolerance = { residual_velocity = "0.3 m/s", tilt = "0.4 deg" }'
     )

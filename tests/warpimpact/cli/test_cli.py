@@ -12,7 +12,7 @@ import xarray
 from warpimpact.cli import main
 from warpimpact.results import files
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 
 @pytest.fixture

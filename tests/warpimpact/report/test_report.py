@@ -23,7 +23,7 @@ from warpimpact.plotting.trajectory import poses_behind, poses_in_plate, silhoue
 from warpimpact.report import hits, report
 from warpimpact.results import files
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 TRAJECTORIES = 6
 ResultMaker = Callable[..., xarray.Dataset]
 

@@ -14,7 +14,7 @@ from warpimpact.campaign.run import run, run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 
-SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 SMALL = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 600")
 PATTERN = SMALL[SMALL.index("[plate.pattern]") : SMALL.index("[impact]")]
 pytestmark = pytest.mark.usefixtures("small_shards")

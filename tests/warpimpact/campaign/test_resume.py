@@ -25,11 +25,11 @@ from warpimpact.results import files
 from warpimpact.results.files import OutputError
 
 SameBits = Callable[[Path, Path], None]
-SLOTTED_PLATE = (Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
 COUNT = 4000  # sixteen shards, the last one short
 KILLS = 20
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 pytestmark = pytest.mark.usefixtures("small_shards")
 WARPIMPACT = (
     sys.executable,

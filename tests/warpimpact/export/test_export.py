@@ -19,7 +19,7 @@ from warpimpact.export.paraview import AROUND, write_vtk
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
 ResultMaker = Callable[..., xarray.Dataset]
 
