@@ -14,11 +14,12 @@ from warpimpact.analysis.summary import estimated
 from warpimpact.campaign import compute as computing
 from warpimpact.campaign import parts
 from warpimpact.campaign.campaign import Output
-from warpimpact.campaign.estimates import Measure, Stop, Tally
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, run_to_file
+from warpimpact.campaign.stop import Stop
 from warpimpact.cli import main
 from warpimpact.results import files
+from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.variables import ESTIMATE_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import simulate as simulation

@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from warpimpact.campaign.estimates import Estimate, Measure
 from warpimpact.campaign.run import Standing
 from warpimpact.cli.progress import show_standing
+from warpimpact.results.measures import Estimate, Measure
 
 
 def standing(done: int, *, failed: int = 0, resumed: int = 100) -> Standing:

@@ -1,22 +1,19 @@
-"""Numbers of a campaign that a person can ask for, means, quantiles and probabilities, and when to stop for one."""
+"""Measures: the numbers of a Dataset that a person can ask for (means, quantiles, probabilities) and their tallies."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Self
+from typing import Any, Self
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import Field, ValidationInfo, field_validator
 
 from warpimpact.kernels.status import Status
 from warpimpact.results.dataset import failed, passed
 from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES
-from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -148,43 +145,6 @@ def _shown(units: str, value: float) -> float:
     return math.degrees(value) if units == "degree" else value
 
 
-class Stop(Model):
-    """When a campaign is good enough: the half width of a confidence interval.
-
-    Attributes:
-        quantity: see `Measure.parse`.
-        half_width: at most this, SI.
-        confidence: of the interval.
-        max_count: shots after which it ends anyhow.
-    """
-
-    quantity: str
-    half_width: float
-    confidence: Annotated[Number, Field(gt=0, lt=1)] = 0.95
-    max_count: Annotated[int, Field(strict=True, ge=1, le=2**30)]
-
-    @field_validator("quantity")
-    @classmethod
-    def _is_a_measure(cls, text: str) -> str:
-        Measure.parse(text)
-        return text
-
-    @field_validator("half_width", mode="before")
-    @classmethod
-    def _in_si(cls, value: object, info: ValidationInfo) -> float:
-        if "quantity" not in info.data:
-            raise ValueError(f"got {quoted(value)}, which means nothing without a quantity")
-        number = Measure.parse(info.data["quantity"]).in_units(value)
-        if number <= 0.0:
-            raise ValueError(f"got {quoted(value)}, but it must be greater than 0")
-        return number
-
-    @property
-    def measure(self) -> Measure:
-        """The quantity."""
-        return Measure.parse(self.quantity)
-
-
 class Tally:
     """Gathers a measure over shots, in the order of their numbers.
 
@@ -205,13 +165,3 @@ class Tally:
     def estimate(self) -> Estimate:
         """What the shots so far say."""
         return self._dealt.estimate()
-
-
-def looks(sampling: str, shards: int) -> Iterator[int]:
-    """Numbers of shards after which a stop rule looks at its interval: few, as every look is a chance to stop on a
-    spread that is small by accident. Sobol points are balanced at powers of two."""
-    at = 1
-    while at < shards:
-        yield at
-        at = 2 * at if sampling == "sobol" else max(at + 1, math.ceil(1.25 * at))
-    yield shards

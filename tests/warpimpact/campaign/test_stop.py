@@ -1,5 +1,4 @@
-"""Intervals that hold as often as they say, for independent shots and for Sobol replicates, and the stop rule on
-them."""
+"""The stop rule of a campaign: intervals of Sobol replicates that hold as often as they say, and runs that it ends."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,11 +10,11 @@ import xarray
 from warpimpact import Campaign
 from warpimpact.analysis.summary import summary_text
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.estimates import Measure, Tally, looks
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
+from warpimpact.results.measures import Measure, Tally
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -51,18 +50,6 @@ TRUTHS = {
     "P(residual_velocity > 1.5 m/s)": 0.125,
     "P(tilt@130mm < 0.2 deg)": 0.02,
 }
-
-
-@pytest.mark.parametrize("text", TRUTHS)
-def test_intervals_of_independent_shots_hold_as_often_as_they_say(text: str) -> None:
-    held, numbers = 0, np.random.default_rng(7)
-    for _ in range(TRIALS):
-        tally = Tally(Measure.parse(text))
-        for _ in range(2):
-            tally.add(shard_of(numbers.random((200, 2)).sum(axis=1)))
-        estimate = tally.estimate()
-        held += estimate.low <= TRUTHS[text] <= estimate.high
-    assert held >= LEAST
 
 
 def surface(campaign: Campaign, first: int, count: int) -> np.ndarray:
@@ -109,50 +96,6 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
         ends.append(watch.end.shards)
     assert held >= LEAST_STOPPED
     assert np.median(ends) > 2
-
-
-def test_what_failed_or_stayed_counts_where_it_says() -> None:
-    mixed = xarray.concat(
-        [
-            shard_of(np.array([700.0, 720.0])),
-            shard_of(np.array([0.0]), Status.ARRESTED),
-            shard_of(np.array([5.0]), Status.UNFINISHED),
-        ],
-        dim="hit",
-    )
-    expected = {
-        "mean(residual_velocity)": (710.0, 2),
-        "P(residual_velocity < 705 m/s)": (0.5, 2),
-        "P(perforated)": (2 / 3, 3),
-        "P(arrested)": (1 / 3, 3),
-        "quantile(residual_velocity, 0.5)": (710.0, 2),
-    }
-    for text, (value, count) in expected.items():
-        tally = Tally(Measure.parse(text))
-        tally.add(mixed)
-        assert (tally.estimate().value, tally.estimate().count) == (pytest.approx(value), count), text
-
-
-def test_what_never_happens_in_any_replicate_is_not_certain() -> None:
-    tally = Tally(Measure.parse("P(arrested)"), replicates=8)
-    tally.add(shard_of(np.ones(800)))
-    estimate = tally.estimate()
-    assert estimate.value == 0.0
-    assert estimate.high == pytest.approx(1.96**2 / (800 + 1.96**2), rel=1e-3)  # Wilson's for 0 of 800
-
-
-def test_moments_are_those_of_all_numbers_at_once() -> None:
-    values, tally = np.random.default_rng(3).normal(1e6, 1.0, 1000), Tally(Measure.parse("mean(residual_velocity)"))
-    for part in np.split(values, [1, 7, 500]):
-        tally.add(shard_of(part))
-    assert tally.estimate().value == pytest.approx(values.mean(), rel=1e-14)
-    assert tally.estimate().spread == pytest.approx(values.std(), rel=1e-9)
-
-
-def test_a_rule_looks_at_balanced_points_or_at_steps_of_a_quarter() -> None:
-    assert list(looks("sobol", 20)) == [1, 2, 4, 8, 16, 20]
-    assert list(looks("random", 20)) == [1, 2, 3, 4, 5, 7, 9, 12, 15, 19, 20]
-    assert list(looks("random", 1)) == [1]
 
 
 @pytest.mark.parametrize(
