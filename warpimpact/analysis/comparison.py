@@ -2,8 +2,8 @@
 
 Shot k hits every plate at the same place of its unit cell under the same conditions. What the shots have in common
 then drops out of the differences (common random numbers), which are means of differences shot by shot and have their
-intervals (statistics/intervals.py). Plates that were hit by other shots are compared as independent, by G. Y. Zou and
-A. Donner's interval of a difference from the intervals of its two parts (Statistics in Medicine 27 (2008) 1693).
+intervals (statistics/intervals.py). Plates that were hit by other shots are compared as independent
+(statistics/comparisons.py).
 
 The intervals of all pairs of plates hold together, for each measure on its own: each has its share of the error
 (Bonferroni). Two plates are told apart where the interval of their difference leaves out 0.
@@ -27,6 +27,7 @@ from warpimpact.analysis.summary import sampling_note
 from warpimpact.campaign.parts import first_difference
 from warpimpact.results.files import ResultError
 from warpimpact.results.variables import SHOT_VARIABLES
+from warpimpact.statistics.comparisons import confidence_of_each, difference_of_independent
 from warpimpact.statistics.intervals import estimate_of
 
 _SAME_PLACE = 1e-9
@@ -116,7 +117,7 @@ def compare(
     datasets = [dataset.isel(hit=slice(hits)) for dataset in datasets]
     independent = next((why for other in datasets[1:] if (why := _other_shots(datasets[0], other))), "")
     pairs = list(combinations(range(len(datasets)), 2))
-    each = 1.0 - (1.0 - confidence) / max(1, len(pairs))
+    each = confidence_of_each(confidence, len(pairs))
     measures: list[list[Measure]] = [[] for _ in datasets]
     differences = []
     for evidences in zip(*(gather(dataset, angle=angle, standoff=standoff) for dataset in datasets), strict=True):
@@ -154,8 +155,7 @@ def _apart(one: Evidence, other: Evidence, dealt: Sequence[dict[str, Any]]) -> t
     if math.isnan(one.measure.low + other.measure.low):
         return difference, math.nan, math.nan
     a, b = estimate_of(one.kind, one.numbers, **dealt[0]), estimate_of(other.kind, other.numbers, **dealt[1])
-    below, above = math.hypot(a.value - a.low, b.high - b.value), math.hypot(a.high - a.value, b.value - b.low)
-    return difference, difference - below, difference + above
+    return difference, *difference_of_independent(a, b)
 
 
 def _check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:

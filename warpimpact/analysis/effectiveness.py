@@ -1,10 +1,8 @@
 """How well a plate protects, as numbers that are defined, cited, and certain to a stated degree.
 
-Every number but the worst point is a mean, over hits that cover the cell evenly, of something that each shot says; so
-all have the intervals of statistics/intervals.py. The mean of the worst tenth of the area is one, too: Rockafellar and
-Uryasev write it as the smallest mean of q + (x − q)₊ / 0.1 over q, where q is the quantile of 0.9. At a minimum an
-error of q does nothing to first order, so the interval is that of this mean at the q of the sample. A ratio to the
-solid plate is linearised likewise (the delta method).
+Every number but the worst point is a mean over the shots: of one number per shot, or of numbers made for the purpose
+(statistics/worst_tenth.py). All of them have the intervals of statistics/intervals.py, and their ratios to the solid
+plate those of statistics/comparisons.py.
 """
 
 from __future__ import annotations
@@ -20,16 +18,14 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.effects import Effect, effects
 from warpimpact.results.dataset import images, solid_reference
+from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
 
 Array = NDArray[np.float64]
 
 ANGLE = math.radians(30.0)
 """Inclination beyond which a core counts as tilted, unless said otherwise [rad]."""
-WORST = 0.1
-"""Share of the area that is the worst tenth."""
-FEWEST_WORST = 40
-"""Hits, images of each other counted once, that the worst tenth must have for an interval that holds as it says."""
 
 
 @dataclass(frozen=True)
@@ -131,23 +127,14 @@ def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
     return {"replicates": int(dataset.attrs.get("replicates", 1)), "images": images(dataset)}
 
 
-def worst_tenth(values: Array) -> Array:
-    """Numbers whose mean is that of the largest tenth of the values; NaN stays NaN."""
-    known = values[~np.isnan(values)]
-    if not len(known):
-        return values
-    start = float(np.quantile(known, 1.0 - WORST, method="inverted_cdf"))
-    return start + np.maximum(values - start, 0.0) / WORST
-
-
 def _averaged(
     effect: Effect, statistic: _Statistic, numbers: Array, solid: Array | None, dealt: dict[str, Any]
 ) -> Evidence:
     """The measure that is the mean of some numbers."""
     estimate = estimate_of(effect.kind, numbers, **dealt)
-    if statistic is _WORST_TENTH and estimate.count * WORST < FEWEST_WORST * dealt["images"]:
+    if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
         estimate = _without_interval(estimate.value)
-    against = _Against.of(effect.kind, estimate, numbers, solid, dealt)
+    against = Ratio.of(estimate, numbers, solid, dealt)
     return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers)
 
 
@@ -157,7 +144,7 @@ def _worst_point(effect: Effect, values: Array, solid: Array | None) -> Evidence
     hit = int(np.argmax(np.where(known, values, -math.inf))) if known.any() else None
     estimate = _without_interval(math.nan if hit is None else float(values[hit]))
     largest = None if solid is None else np.atleast_1d(np.fmax.reduce(solid))
-    against = _Against.of(effect.kind, estimate, values, largest, {})
+    against = Ratio.of(estimate, values, largest, {})
     return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None)
 
 
@@ -165,42 +152,8 @@ def _without_interval(value: float) -> Estimate:
     return Estimate(value, math.nan, math.nan, 1, math.nan)
 
 
-class _Against(NamedTuple):
-    """The solid plate's number, the ratio to it and the interval of the ratio."""
-
-    solid: float = math.nan
-    ratio: float = math.nan
-    ratio_low: float = math.nan
-    ratio_high: float = math.nan
-
-    @classmethod
-    def of(cls, kind: str, estimate: Estimate, numbers: Array, solid: Array | None, dealt: dict[str, Any]) -> _Against:
-        """Against the mean of the solid plate's numbers, those of the first shots or one for all."""
-        known = np.empty(0) if solid is None else solid[~np.isnan(solid)]
-        if solid is None or not len(known):
-            return cls()
-        if (mean := float(known.mean())) <= 0.0:
-            return cls(mean)
-        ratio, low, high = (number / mean for number in (estimate.value, estimate.low, estimate.high))
-        if np.ptp(known) > 0.0 and not math.isnan(low):
-            linear = estimate_of("mean", _ratio_numbers(numbers, solid, ratio), **dealt)
-            low, high = linear.low, linear.high
-        return cls(mean, ratio, low, high)
-
-
-def _ratio_numbers(numbers: Array, solid: Array, ratio: float) -> Array:
-    """Numbers of the shots whose mean is the ratio of two means, and tells its error to first order.
-
-    Shot k of the solid plate is that of the perforated one. Where there are fewer, each stands for several.
-    """
-    mean, weight = np.nanmean(solid), np.isfinite(numbers).sum() / np.isfinite(solid).sum()
-    linear = numbers / mean
-    linear[: len(solid)] -= np.nan_to_num(ratio * weight * (solid / mean - 1.0))
-    return linear
-
-
 def _measure(
-    effect: Effect, statistic: _Statistic, estimate: Estimate, against: _Against, hit: int | None = None
+    effect: Effect, statistic: _Statistic, estimate: Estimate, against: Ratio, hit: int | None = None
 ) -> Measure:
     return Measure(
         name=effect.name + statistic.name,
@@ -212,7 +165,10 @@ def _measure(
         definition=effect.definition + statistic.definition,
         source=effect.source + statistic.source,
         higher_is_better=effect.higher_is_better,
-        **against._asdict(),
+        solid=against.reference,
+        ratio=against.value,
+        ratio_low=against.low,
+        ratio_high=against.high,
         hit=hit,
     )
 

@@ -19,9 +19,9 @@ from warpimpact.analysis.summary import (
     stop_lines,
     symmetry_text,
 )
-from warpimpact.campaign.estimates import STATUSES, Measure
 from warpimpact.kernels.status import Status
 from warpimpact.results.dataset import failed
+from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.variables import shot_variables
 from warpimpact.statistics.intervals import Estimate
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 
-from warpimpact.campaign.estimates import MEASURED, Measure, Tally
 from warpimpact.results.dataset import images, status_codes
+from warpimpact.results.measures import MEASURED, Measure, Tally
 from warpimpact.statistics.intervals import Estimate
 
 SLICE = 2**18

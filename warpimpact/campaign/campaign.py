@@ -31,7 +31,7 @@ from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_scatter
 from ..scene.units import Number, PositiveLength, quoted
 from ..solver.bending import check_bending
-from .estimates import Stop
+from .stop import Stop
 
 
 class CampaignError(ValueError):

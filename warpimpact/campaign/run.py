@@ -14,13 +14,14 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.estimates import Measure, Tally, looks
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results.dataset import failed, images
 from warpimpact.results.files import OutputError
+from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Shots
 from warpimpact.statistics.intervals import Estimate
+from warpimpact.statistics.stopping import looks
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""

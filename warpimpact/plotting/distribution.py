@@ -9,7 +9,6 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
-from warpimpact.campaign.estimates import Measure
 from warpimpact.plotting.cell import (
     draw_holes,
     draw_values,
@@ -23,6 +22,7 @@ from warpimpact.plotting.cell import (
     shown,
     tree_of,
 )
+from warpimpact.results.measures import Measure
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

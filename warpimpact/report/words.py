@@ -15,10 +15,10 @@ import xarray
 from warpimpact.analysis.comparison import compare, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.summary import UNITS, estimated, main_measures
-from warpimpact.campaign.estimates import STATUSES, Measure
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results.files import ResultError
+from warpimpact.results.measures import STATUSES, Measure
 
 _MM = 1e3
 _PROVENANCE = (

@@ -1,0 +1,305 @@
+"""Plates side by side: rankings with known answers, intervals that hold as often as they say, one sentence for what
+cannot be compared."""
+
+import json
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.analysis.comparison import Comparison, Difference, compare, comparison_text
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import Standing
+from warpimpact.cli import main
+from warpimpact.plotting import comparison_figure
+from warpimpact.results import files
+from warpimpact.results.files import ResultError
+
+pytestmark = pytest.mark.usefixtures("small_shards")
+TWO_PLATES = Path(__file__).parents[3] / "campaigns" / "two_plates.toml"
+TRIALS = 100
+LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below
+MEAN, TAIL, TILTED = "residual_energy_fraction", "residual_energy_fraction_worst_tenth", "tilted_share"
+NUMBERS = np.random.default_rng(3)
+
+
+def difference(comparison: Comparison, measure: str, one: str, other: str) -> Difference:
+    (found,) = (
+        pair for pair in comparison.differences if (pair.measure, pair.one, pair.other) == (measure, one, other)
+    )
+    return found
+
+
+def velocities(fraction: np.ndarray) -> np.ndarray:
+    """Residual velocities of energy fractions [m/s]."""
+    return 1000.0 * np.sqrt(fraction)
+
+
+def moved(dataset: xarray.Dataset) -> xarray.Dataset:
+    """The same outcomes of shots that hit elsewhere."""
+    return dataset.assign_coords(hit_y=dataset["hit_y"] * 0.5)
+
+
+def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
+    plate = make_plate_result(velocities(NUMBERS.uniform(0.5, 1.0, 500)), NUMBERS.uniform(0.0, 90.0, 500))
+    comparison = compare([plate, plate], ["a", "b"])
+    assert not any(pair.told_apart for pair in comparison.differences)
+    for measure in (MEAN, TAIL, TILTED):
+        assert comparison.ranks(measure) == {"a": 1, "b": 1}
+        assert difference(comparison, measure, "a", "b").value == 0.0
+    text = comparison_text(comparison)
+    assert text.count("a and b cannot be told apart: difference 0.000 (") == 6
+    assert "better than" not in text
+
+
+def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) -> None:
+    fraction, tilt = NUMBERS.uniform(0.5, 0.9, 500), NUMBERS.uniform(0.0, 60.0, 500)
+    plates = [
+        make_plate_result(velocities(fraction + less), tilt + more) for less, more in [(0.1, 0), (0, 20), (0, 20)]
+    ]
+    comparison = compare(plates, ["worst", "one", "other"])
+    for measure in (MEAN, TAIL, "residual_energy_density", TILTED):
+        assert comparison.ranks(measure) == {"worst": 3, "one": 1, "other": 1}
+    lines = comparison_text(comparison).splitlines()
+    assert "one better than worst by 0.1000 (0.1000 to 0.1000)" in lines
+    assert "one and other cannot be told apart: difference 0.000 (0.000 to 0.000)" in lines
+    best = next(line for line in lines if line.startswith("residual energy fraction, mean  "))
+    assert best.endswith("   one and other")
+    assert next(line for line in lines if line.startswith("P(stopped)  ")).endswith("   cannot be told apart")
+    ranking = lines[lines.index("P(inclined > 30° at 130 mm, or stopped); higher is better") + 2 :]
+    assert [line.split()[:2] for line in ranking[:3]] == [["1", "one"], ["1", "other"], ["3", "worst"]]
+
+
+def test_the_same_shots_narrow_the_interval(make_plate_result) -> None:
+    common = NUMBERS.uniform(0.2, 0.8, 500)
+    one, other = (make_plate_result(velocities(common + NUMBERS.uniform(0.0, 0.05, 500))) for _ in range(2))
+    paired, apart = compare([one, other], ["a", "b"]), compare([one, moved(other)], ["a", "b"])
+    assert not paired.independent
+    assert apart.independent == "their shots hit other places of the cell"
+    assert "compared as independent, because their shots hit other places of the cell." in comparison_text(apart)
+    for measure in (MEAN, TAIL):
+        pairs = [difference(comparison, measure, "a", "b") for comparison in (paired, apart)]
+        widths = [pair.high - pair.low for pair in pairs]
+        assert pairs[0].value == pytest.approx(pairs[1].value)
+        assert widths[0] < 0.5 * widths[1]
+
+
+def test_cells_of_any_size_are_hit_by_the_same_shots(make_plate_result) -> None:
+    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)))
+    larger = plate.assign_coords(hit_y=3.0 * plate["hit_y"], hit_z=0.7 * plate["hit_z"])
+    larger.attrs["plate_period"] = np.array(plate.attrs["plate_period"]) * [3.0, 0.7]
+    assert not compare([plate, larger], ["a", "b"]).independent
+
+
+def test_of_more_hits_the_first_are_compared(make_plate_result) -> None:
+    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 1000)))
+    comparison = compare([plate, plate.isel(hit=slice(600))], ["a", "b"])
+    assert (comparison.hits, comparison.independent) == (600, "")
+    assert difference(comparison, MEAN, "a", "b").value == 0.0
+    assert comparison.plates[0].measures == comparison.plates[1].measures
+
+
+@pytest.mark.parametrize("independent", [False, True])
+def test_differences_hold_as_often_as_they_say_all_pairs_together(independent: bool, make_plate_result) -> None:
+    """Three plates of known energy fractions: mean, worst tenth and share."""
+    truths = {MEAN: (0.05, 0.04), TAIL: (0.05, 0.04), TILTED: (0.1, 0.02)}
+    held, numbers = dict.fromkeys(truths, 0), np.random.default_rng(9)
+    for _ in range(TRIALS):
+        plates = []
+        common, turned = numbers.random(400), numbers.random(400)
+        for shift, share in ((0.05, 0.5), (0.0, 0.4), (0.04, 0.42)):
+            if independent:
+                common, turned = numbers.random(400), numbers.random(400)
+            fraction = 0.4 * common + 0.4 * numbers.random(400) + 0.1 + shift
+            # A tenth of the tilts are no matter of the shot.
+            own = np.where(numbers.random(400) < 0.1, numbers.random(400), turned)
+            plates.append(make_plate_result(velocities(fraction), np.where(own < share, 60.0, 10.0)))
+        if independent:
+            plates = [plates[0], moved(plates[1]), moved(plates[2])]
+        comparison = compare(plates, ["a", "b", "c"])
+        for measure, (above, between) in truths.items():
+            exact = {("a", "b"): above, ("b", "c"): -between, ("a", "c"): above - between}
+            pairs = [difference(comparison, measure, *names) for names in exact]
+            held[measure] += all(p.low <= exact[p.one, p.other] <= p.high for p in pairs)
+    assert min(held.values()) >= LEAST, held
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"core": '{"mass": 0.005}'}, "core.cone_length is not given here and "),
+        ({"impact": '{"velocity": 900.0}'}, "impact.velocity is 900.0 here and 1000.0 there"),
+        ({"standoff_point": "centre_of_mass"}, 'output.standoff_point is "centre_of_mass" here and "nose" there'),
+    ],
+)
+def test_plates_that_were_asked_something_else_are_refused(change: dict, sentence: str, make_plate_result) -> None:
+    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)))
+    with pytest.raises(ResultError) as caught:
+        compare([plate, plate.assign_attrs(change)], ["a", "b"])
+    assert str(caught.value).startswith(f"b: cannot be compared with a: {sentence}")
+    with pytest.raises(ResultError, match=r"^b: does not tell its core and impact, which a comparison needs"):
+        compare([plate, plate.drop_attrs()], ["a", "b"])
+
+
+def test_what_makes_a_comparison_less_than_fair_is_said(make_plate_result) -> None:
+    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)), sampling="sobol", replicates=1)
+    finer = '{"fidelity": "reference", "time_step": null}'
+    notes = compare([plate, plate.assign_attrs(areal_density=30.0, numerics_given=finer)], ["a", "b"]).notes
+    assert [note.split()[:4] for note in notes] == [
+        ["The", "plates", "differ", "in"],
+        ["The", "plates", "were", "computed"],
+        ["Intervals", "are", "those", "of"],
+    ]
+    assert 'different numerics: fidelity is "draft" and "reference".' in notes[1]
+    assert not compare([plate.assign_attrs(sampling="random")] * 2, ["a", "b"]).notes
+
+
+def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> None:
+    plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 500)), np.linspace(0.0, 90.0, 500))
+    better = make_plate_result(velocities(np.linspace(0.4, 0.9, 500)), np.linspace(0.0, 90.0, 500))
+    figure = comparison_figure(compare([plate, better, plate], ["a", "b", "c"]))
+    figure.savefig("/dev/null", format="png")
+    left, right = figure.axes[::2], figure.axes[1::2]
+    assert [axes.get_title(loc="left").split(";")[0] for axes in left] == [
+        "residual energy fraction",
+        "proxy: energy per presented area at 130 mm [J/mm²]",
+        "P(inclined > 30° at 130 mm, or stopped)",
+        "P(stopped)",
+    ]
+    for axes in right:
+        assert [label.get_text() for label in axes.get_yticklabels()] == ["a − b", "a − c", "b − c"]
+    hollow = [line.get_markerfacecolor() == "white" for line in right[0].lines if line.get_marker() == "o"]
+    assert hollow == [False, True, False]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+SMALL = TWO_PLATES.read_text(encoding="utf-8") + '[numerics]\nfidelity = "draft"\n'
+
+
+def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("two.toml").write_text(SMALL, encoding="utf-8")
+    command = ["compare", "two.toml", "--count", "256", "--device", "cpu"]
+    assert main(command) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("256 hits of each plate: the same shots at every plate, compared shot by shot.\n")
+    assert "round holes better than slots by" in shown
+    assert sorted(path.name for path in folder.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
+    before = Path("slots.nc").stat()
+    assert main([*command, "-o", "two.svg", "--angle", "45 deg", "--standoff", "50 mm"]) == 0
+    assert "P(inclined > 45° at 50 mm, or stopped)" in capsys.readouterr().out
+    assert Path("slots.nc").stat() == before
+    assert main(["compare", "slots.nc", "round holes.nc"]) == 0
+    assert capsys.readouterr().out == shown.replace("two.png", "comparison.png")
+    stored = files.read(Path("slots.nc"))
+    assert stored.attrs["title"].endswith(": slots")
+    assert replay(stored, 3, folder=folder).attrs["agreement"] == "bit-identical"
+    assert effectiveness(stored)[0].ratio > 0.0
+    Path("two.toml").write_text(SMALL.replace("seed = 1", "seed = 2"), encoding="utf-8")
+    assert main(command) == 2
+    assert "slots.nc: exists already" in capsys.readouterr().err
+    assert main([*command, "--overwrite"]) == 0
+
+
+def test_a_comparison_that_was_broken_off_goes_on(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After the first plate, and one shard of two into the second."""
+    Path("two.toml").write_text(SMALL, encoding="utf-8")
+    command = ["compare", "two.toml", "--count", "512", "--device", "cpu"]
+
+    @contextmanager
+    def breaking() -> Iterator[Callable[[Standing], None]]:
+        def follow(standing: Standing) -> None:
+            if Path("slots.nc").exists() and standing.done >= 256:
+                raise KeyboardInterrupt
+
+        yield follow
+
+    with monkeypatch.context() as patched:
+        patched.setattr("warpimpact.cli.compare.show_standing", breaking)
+        assert main(command) == 130
+    assert "continue with --resume" in capsys.readouterr().err
+    assert main(command) == 2
+    assert "holds a run that has not ended" in capsys.readouterr().err
+    before = Path("slots.nc").stat()
+    assert main([*command, "--resume"]) == 0
+    assert Path("slots.nc").stat() == before
+    assert capsys.readouterr().out.startswith("512 hits of each plate: the same shots at every plate")
+
+
+def test_the_plates_of_a_file_share_all_else() -> None:
+    campaigns = read_plates(TWO_PLATES)
+    assert list(campaigns) == ["slots", "round holes"]
+    slots, holes = (campaign.model_dump(exclude={"plate", "title"}) for campaign in campaigns.values())
+    assert slots == holes
+    densities = [campaign.plate.areal_density for campaign in campaigns.values()]
+    assert densities[0] == pytest.approx(densities[1], rel=1e-3)  # what the file says of them
+    assert json.loads(campaigns["slots"].text)["title"] == campaigns["slots"].title
+    assert math.isclose(campaigns["slots"].plate.open_area, 0.348, abs_tol=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (('name = "slots"\n', ""), "plate[0].name: is missing, but must be given"),
+        (('"round holes"', '"slots"'), 'plate[1].name: got "slots" again, but each plate needs its own'),
+        (('"slots"', '"../slots"'), 'plate[0].name: got "../slots", but a name begins with a letter or digit and has'),
+        (('"slots"', "3"), "plate[0].name: got 3, but a name begins"),
+        (('"4 mm"\nresistance', '"4 kg"\nresistance'), ', plate "slots": plate.thickness: got "4 kg", which is not a'),
+    ],
+)
+def test_a_wrong_plate_is_told_in_one_sentence(change: tuple[str, str], sentence: str, tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(SMALL.replace(*change, 1), encoding="utf-8")
+    with pytest.raises(CampaignError) as caught:
+        read_plates(tmp_path / "two.toml")
+    assert sentence in str(caught.value)
+
+
+def test_one_plate_is_run_and_several_are_compared(tmp_path: Path) -> None:
+    with pytest.raises(
+        CampaignError, match=r"plate: got 2 plates, but this takes one; warpimpact compare .* runs them"
+    ):
+        Campaign.from_toml(TWO_PLATES)
+    with pytest.raises(CampaignError, match=r"plate: must be two tables \[\[plate\]\] or more, each with a name"):
+        read_plates(TWO_PLATES.with_name("slotted_plate.toml"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["a.nc"], "a.nc: is one result, but two or more, or one campaign, are needed to compare"),
+        (["a.nc", "a.nc"], "the same result is given twice"),
+        (["a.nc", "b.nc"], "a.nc: cannot be read as a netCDF file"),
+        (["a.nc", "b.nc", "-o", "a.gif"], "a.gif: must end with .png, .pdf or .svg"),
+        (["a.nc", "b.nc", "--angle", "30"], '--angle, --standoff: got "30", which has no unit'),
+        (
+            ["a.nc", "b.nc", "--angle", "90 deg"],
+            '--angle: got "90 deg", but it must be at least 0 and less than 90 deg',
+        ),
+        (["a.toml", "b.nc"], "a.toml: is a campaign, which is compared on its own"),
+    ],
+)
+def test_a_wrong_command_is_told_in_one_sentence_and_writes_nothing(
+    arguments: list[str], sentence: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", *arguments]) == 2
+    shown = capsys.readouterr()
+    assert shown.err.startswith(f"warpimpact: error: {sentence}")
+    assert shown.err.count("\n") == 1
+    assert not list(folder.iterdir())

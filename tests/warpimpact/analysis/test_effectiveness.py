@@ -1,0 +1,141 @@
+"""Effectiveness against values computed by hand, and intervals that hold as often as they say."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiveness_text
+from warpimpact.analysis.inspect import inspect_text
+from warpimpact.kernels.status import Status
+from warpimpact.results.files import ResultError
+
+TRIALS = 100
+LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below
+
+
+def with_solid(dataset: xarray.Dataset, velocity: np.ndarray) -> xarray.Dataset:
+    """The same with these residual velocities of the solid plate [m/s]."""
+    shots = len(velocity)
+    return dataset.assign(
+        solid_status=("solid_hit", np.zeros(shots, dtype=np.int8)),
+        solid_residual_velocity=("solid_hit", velocity),
+        solid_tilt=(("solid_hit", "standoff"), np.zeros((shots, 2))),
+    )
+
+
+def named(dataset: xarray.Dataset, **options: float) -> dict[str, Measure]:
+    return {measure.name: measure for measure in effectiveness(dataset, **options)}
+
+
+@pytest.fixture
+def mixed(make_plate_result) -> xarray.Dataset:
+    """Shots that end in every way."""
+    ends = [Status.PERFORATED, Status.MISSED, Status.ARRESTED, Status.RICOCHETED, Status.UNFINISHED, Status.PERFORATED]
+    velocity = np.array([800.0, 1000.0, 0.0, 500.0, np.nan, 600.0])
+    return make_plate_result(velocity, np.array([20.0, 90.0, np.nan, np.nan, np.nan, 170.0]), np.array(ends))
+
+
+def test_what_counts_where(mixed) -> None:
+    measures = named(mixed)
+    assert measures["residual_energy_fraction"].value == pytest.approx((0.64 + 1.0 + 0.0 + 0.0 + 0.36) / 5)
+    assert measures["residual_energy_fraction_worst_point"].value == pytest.approx(1.0)
+    assert measures["residual_energy_fraction_worst_point"].hit == 1
+    assert measures["stopped_share"].value == pytest.approx(2 / 5)
+    assert measures["tilted_share"].value == pytest.approx(3 / 5)  # broadside and stopped; not 20°, nor base first
+    assert named(mixed, angle=math.radians(5.0))["tilted_share"].value == pytest.approx(5 / 5)
+    assert named(mixed, standoff=0.05)["tilted_share"].value == pytest.approx(2 / 5)
+
+
+def test_energy_per_area_is_that_of_a_cylinder_and_symmetric_about_broadside(make_plate_result) -> None:
+    def density(tilt: float) -> float:
+        return named(make_plate_result(np.array([700.0]), tilt))["residual_energy_density"].value
+
+    energy, end, side = 0.5 * 0.004 * 700.0**2, math.pi * 3.0**2, 6.0 * 20.0  # [J], [mm²]
+    assert density(0.0) == pytest.approx(energy / end, rel=1e-5)
+    assert density(90.0) == pytest.approx(energy / side, rel=1e-5)
+    slope = math.radians(35.0)
+    assert density(35.0) == pytest.approx(energy / (end * math.cos(slope) + side * math.sin(slope)), rel=1e-4)
+    assert density(145.0) == density(35.0)
+    heavier = make_plate_result(np.array([700.0])).assign(mass=("hit", [0.008]))
+    assert named(heavier)["residual_energy_density"].value == pytest.approx(2 * energy / end, rel=1e-5)
+
+
+def test_numbers_without_a_valid_interval_have_none(make_plate_result) -> None:
+    few, many = (named(make_plate_result(np.linspace(500.0, 900.0, count))) for count in (399, 400))
+    name = "residual_energy_fraction_worst_tenth"
+    assert math.isnan(few[name].low)
+    assert many[name].low < many[name].value < many[name].high
+    assert math.isnan(many["residual_energy_fraction_worst_point"].low)
+    images = make_plate_result(np.linspace(500.0, 900.0, 400), symmetries="(y, z), (-y, z)")
+    assert math.isnan(named(images)[name].low)
+
+
+def test_failed_computations_alone_tell_nothing(make_plate_result) -> None:
+    failed = make_plate_result(np.full(3, np.nan), status=Status.UNFINISHED)
+    assert all(math.isnan(measure.value) and measure.hit is None for measure in effectiveness(failed))
+    assert "nan" not in effectiveness_text(failed)
+
+
+@pytest.mark.parametrize("count", [400, 1600])
+def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, count: int) -> None:
+    """Velocities that the impact scatters, on both plates alike; the solid plate has only the first 400 shots."""
+    held, numbers, widths = 0, np.random.default_rng(5), []
+    for _ in range(TRIALS):
+        common = numbers.uniform(0.5, 1.0, count)
+        fraction = 0.8 * common + numbers.uniform(0.0, 0.2, count)
+        dataset = with_solid(make_plate_result(1000.0 * np.sqrt(fraction)), 1000.0 * np.sqrt(common[:400]))
+        measure = named(dataset)["residual_energy_fraction"]
+        held += measure.ratio_low <= (0.8 * 0.75 + 0.1) / 0.75 <= measure.ratio_high
+        widths.append((measure.ratio_high - measure.ratio_low) / (measure.high - measure.low) * measure.solid)
+    assert held >= LEAST
+    if count == 400:
+        assert np.median(widths) < 0.6  # what moves both plates alike is no error of the ratio
+
+
+def test_one_shot_at_the_solid_plate_serves_all(make_plate_result) -> None:
+    dataset = with_solid(make_plate_result(np.linspace(500.0, 900.0, 1000)), np.array([800.0]))
+    measures = named(dataset)
+    mean, worst = measures["residual_energy_fraction"], measures["residual_energy_fraction_worst_point"]
+    assert (mean.solid, mean.ratio) == (pytest.approx(0.64), pytest.approx(mean.value / 0.64))
+    assert (mean.ratio_low, mean.ratio_high) == (pytest.approx(mean.low / 0.64), pytest.approx(mean.high / 0.64))
+    assert worst.ratio == pytest.approx(0.81 / 0.64)
+    assert math.isnan(measures["tilted_share"].ratio)  # the solid plate tilts none
+    assert measures["tilted_share"].solid == 0.0
+
+
+def test_a_solid_plate_is_its_own_reference(make_plate_result) -> None:
+    dataset = make_plate_result(
+        np.linspace(500.0, 900.0, 1000), np.linspace(0.0, 60.0, 1000), open_area=0.0, areal_density=31.4
+    )
+    for measure in effectiveness(dataset):
+        if measure.solid > 0.0:
+            assert measure.ratio == pytest.approx(1.0)
+            if measure.hit is None:
+                assert (measure.ratio_low, measure.ratio_high) == (pytest.approx(1.0), pytest.approx(1.0))
+
+
+def test_a_stand_off_that_is_not_there_is_refused(mixed) -> None:
+    with pytest.raises(ResultError, match=r"^standoff: got 100 mm, but the result has 50 mm, 130 mm$"):
+        effectiveness(mixed, standoff=0.1)
+
+
+def test_every_measure_is_defined_and_cited(mixed) -> None:
+    for measure in effectiveness(mixed):
+        assert measure.definition.endswith(".")
+        assert measure.source
+
+
+def test_the_table_says_what_a_result_carries(mixed, make_result) -> None:
+    by_hand = make_result(8)
+    text = inspect_text(by_hand)
+    assert "residual energy fraction, mean" in text
+    assert "solid plate" not in text  # no reference
+    assert "proxy" not in text  # no core
+    told = effectiveness_text(with_solid(mixed, np.array([800.0])).assign_attrs(open_area=0.25, areal_density=23.55))
+    head, first, *_ = told.splitlines()
+    assert head.startswith("effectiveness, 23.55 kg/m², 25.0% open ")
+    assert "solid plate   ratio to it" in head
+    assert first.split()[:5] == ["residual", "energy", "fraction,", "mean", "0.4000"]
+    assert " 0.6400   0.6250" in first

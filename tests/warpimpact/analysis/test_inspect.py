@@ -1,0 +1,93 @@
+"""What warpimpact inspect tells, and failures as data: inputs, a named status, a list, exit code 3."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign
+from warpimpact.analysis.inspect import failures, inspect_text
+from warpimpact.campaign.run import run_to_file
+from warpimpact.cli import main
+from warpimpact.kernels.status import Status
+from warpimpact.results import files
+
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 512")
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("result") / "a.nc"
+    (path.parent / "a.toml").write_text(DRAFT.replace("seed = 1", "seed = 1\nreplicates = 8"), encoding="utf-8")
+    run_to_file(Campaign.from_toml(path.parent / "a.toml"), path, device="cpu")
+    return path
+
+
+def test_it_tells_origin_and_numbers_with_intervals(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(result)]) == 0
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert lines[0] == ["7.62", "mm", "P80", "core", "against", "a", "slotted", "plate"]
+    assert ["hits", "512", "hits,", "sobol", "sampling,", "seed", "1,", "8", "replicates"] in lines
+    plate = "plate open area 34.8%, smallest ligament 4.00 mm, areal density 20.5 kg/m²"  # (32 + 4π)/128 is hole
+    assert plate.split() in lines
+    assert next(line for line in lines if line[:1] == ["perforated"])[1] == "100.00%"
+    # Eight replicates of 64 hits: Student's interval over their means, by hand.
+    velocity = files.read(result)["residual_velocity"].values
+    means = np.array([velocity[replicate::8].mean() for replicate in range(8)])
+    half = 2.364624 * means.std(ddof=1) / np.sqrt(8)  # t of 7 degrees of freedom, 97.5 %
+    row = next(line for line in lines if line[:4] == ["residual", "velocity,", "m/s", "mean"])
+    assert row[4] == f"{means.mean():.2f}"
+    assert (row[5], row[7]) == (f"{means.mean() - half:.2f}", f"{means.mean() + half:.2f}")
+    assert lines[-1] == ["0", "of", "512", "shots", "failed"]
+
+
+def test_it_gives_the_campaign_back(result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", str(result), "--campaign"]) == 0
+    assert capsys.readouterr().out == (result.parent / "a.toml").read_text(encoding="utf-8") + "\n"
+
+
+def test_slices_change_nothing(result: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    dataset = files.read(result)
+    whole = inspect_text(dataset)
+    monkeypatch.setattr("warpimpact.analysis.summary.SLICE", 100)
+    assert inspect_text(dataset) == whole
+
+
+def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_result, monkeypatch) -> None:
+    statuses = np.array([Status.PERFORATED] * 6, dtype=np.int8)
+    statuses[[1, 4]] = Status.UNFINISHED, Status.NOT_FINITE
+    dataset = make_result(statuses)
+    monkeypatch.setattr("warpimpact.analysis.summary.SLICE", 4)
+    head, first, second, count = failures(dataset)
+    assert head.startswith(
+        "failed shots: hit, status, hit_y [m], hit_z [m], impact_velocity [m s-1], obliquity [degree]"
+    )
+    assert first.split()[:2] == ["1", "unfinished"]
+    assert second.split()[:2] == ["4", "not_finite"]
+    assert [float(value) for value in second.split()[2:5]] == pytest.approx(
+        [float(dataset["hit_y"][4]), float(dataset["hit_z"][4]), 825.0], rel=1e-5
+    )
+    assert count == "2 of 6 shots failed"
+    row = next(line for line in inspect_text(dataset).splitlines() if line.startswith("perforated"))
+    assert row.split()[1] == "100.00%"
+
+
+@pytest.mark.parametrize(("allowed", "code"), [("0.5", 3), ("1", 0)])
+def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
+    allowed: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("warpimpact.solver.arrays.STEP_ALLOWANCE", 0.01)  # no shot ends so soon
+    text = DRAFT.replace("count = 512", "count = 300") + f"failed_share = {allowed}\n"
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    output = tmp_path / "a.nc"
+    assert main(["run", str(tmp_path / "a.toml"), "-o", str(output), "--device", "cpu"]) == code
+    shown = capsys.readouterr()
+    assert "300 failed" in shown.err
+    told = "1 of the shots failed, more than output.failed_share = 0.5" in shown.err
+    assert told == (code == 3)
+    assert (files.read(output)["status"] == Status.UNFINISHED).all()
+    assert main(["inspect", str(output)]) == 0
+    shown = capsys.readouterr().out
+    assert "300 of 300 shots failed" in shown
+    assert sum(" unfinished " in line for line in shown.splitlines()) == 300

@@ -1,0 +1,68 @@
+"""What presses on the core's surface adds up to the force that the march recorded."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from mpl_toolkits.mplot3d.art3d import Line3DCollection
+
+from warpimpact import Campaign
+from warpimpact.analysis.surface import pressed
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.plotting.pressure import pressure
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+RESISTANCE = 2.6e9
+
+
+@pytest.fixture(scope="module")
+def histories() -> list[xarray.Dataset]:
+    text = SLOTTED_PLATE.read_text().replace("shear_coefficient = 0.05", "shear_coefficient = 0")
+    result = run(Campaign.from_text(text, name="a", folder=Path(), count=8), device="cpu")
+    return [replay(result, hit, folder=Path()) for hit in range(8)]
+
+
+def largest(history: xarray.Dataset) -> int:
+    return int(np.linalg.norm(history["force"], axis=1).argmax())
+
+
+def test_stress_adds_up_to_the_recorded_force(histories: list[xarray.Dataset]) -> None:
+    for history in histories:
+        step = largest(history)
+        surface = pressed(history, step)
+        force = -RESISTANCE * np.sum((surface.stress * surface.area)[..., None] * surface.normal, axis=(0, 1))
+        recorded = history["force"].values[step]
+        size = np.linalg.norm(recorded)
+        assert force @ recorded / (size * np.linalg.norm(force)) > 0.995
+        assert np.linalg.norm(force) == pytest.approx(size, rel=0.3)
+
+
+def test_surface_is_closed_but_for_its_discs(histories: list[xarray.Dataset]) -> None:
+    history = histories[0]
+    surface = pressed(history, 5)
+    np.testing.assert_allclose(np.linalg.norm(surface.normal, axis=-1), 1.0)
+    total = np.sum(surface.area[..., None] * surface.normal, axis=(0, 1))
+    nose, base = history["core_radius"].values[[0, -1]]
+    np.testing.assert_allclose(total, np.pi * (base**2 - nose**2) * history["core_axis"][5], rtol=1e-6, atol=1e-12)
+
+
+def test_nothing_presses_outside_the_slab_or_in_holes(histories: list[xarray.Dataset]) -> None:
+    for history in histories:
+        surface = pressed(history, largest(history))
+        x = surface.point[surface.stress > 0.0][:, 0]
+        assert ((x >= 0.0) & (x <= 4e-3)).all()
+        assert surface.stress.max() <= 1.0
+    last = pressed(history, history.sizes["time"] - 1)
+    assert not last.stress.any()
+
+
+def test_arrows_end_on_the_surface_and_point_into_it(histories: list[xarray.Dataset]) -> None:
+    figure = pressure(histories[0])
+    *_, arrows = (c for c in figure.axes[0].collections if isinstance(c, Line3DCollection))
+    shafts = np.array([segment for segment in arrows._segments3d if len(segment) == 2])
+    surface = pressed(histories[0], largest(histories[0]))
+    points = surface.point[surface.stress > 0.0] * 1e3
+    ends = shafts[: len(shafts) // 3, 0]
+    assert all(np.linalg.norm(points - end, axis=1).min() < 1e-6 for end in ends)

@@ -1,0 +1,80 @@
+"""Bending from a campaign file to its result, its stop rule, its text and its map."""
+
+from pathlib import Path
+
+import pytest
+
+from warpimpact import Campaign
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.replay import replay
+from warpimpact.cli import main
+from warpimpact.plotting.cell import MAPPED
+from warpimpact.plotting.maps import hit_map
+from warpimpact.results import files
+from warpimpact.results.variables import BENDING_VARIABLES
+
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+STOP = """
+bending = true
+
+[stop]
+quantity = "P(bending_stress > 1.5 GPa)"
+half_width = 0.04
+max_count = 1024
+"""
+
+
+def written(tmp_path: Path, tail: str, *changes: tuple[str, str]) -> Path:
+    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096\n", "") + tail
+    for change in changes:
+        assert change[0] in text
+        text = text.replace(*change)
+    path = tmp_path / "campaign.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.usefixtures("small_shards")
+def test_from_a_campaign_to_its_result(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, output = written(tmp_path, STOP, ("seed = 1", "seed = 1\nirreducible = true")), tmp_path / "a.nc"
+    assert main(["run", str(path), "-o", str(output), "--device", "cpu"]) == 0
+    dataset = files.read(output)
+    assert {dataset[name].attrs["units"] for name in BENDING_VARIABLES} == {"N m", "m", "Pa"}
+    stress = dataset["bending_stress"].values
+    assert dataset.attrs["estimate"] == pytest.approx((stress > 1.5e9).mean())
+    assert 0.0 < dataset.attrs["estimate"] < 1.0
+    images = stress.reshape(-1, 8)
+    assert (images == images[:, :1]).all()
+    assert ((dataset["bending_section"] > 0.0) & (dataset["bending_section"] < 27.86e-3)).all()
+    assert replay(dataset, 11, folder=tmp_path).attrs["agreement"] == "bit-identical"
+    capsys.readouterr()
+    assert main(["inspect", str(output)]) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    row = next(line for line in rows if line[:4] == ["bending", "stress,", "GPa", "mean"])
+    assert row[4] == f"{1e-9 * stress.mean():.2f}"
+    assert "bending_stress" in MAPPED
+    (axes, bar) = hit_map(dataset, "bending_stress").axes
+    assert "GPa" in bar.get_ylabel() + bar.get_xlabel() + axes.get_title()
+
+
+@pytest.mark.parametrize(
+    ("tail", "changes", "sentence"),
+    [
+        (STOP.replace("bending = true", ""), (), "but that needs output.bending = true"),
+        (
+            "bending = true\n",
+            (('mass = "4 g"', 'mass = "4 g"\ninertia_axial = 2e-8'),),
+            "beside core.inertia_axial, but",
+        ),
+        ("bending = true\n", (('"consistent"', '"nodal"'),), 'beside numerics.scheme = "nodal", but it must be'),
+        ("bending = 1\n", (), "output.bending: got 1, but it must be a valid boolean"),
+    ],
+)
+def test_what_has_no_bending_is_refused(
+    tail: str, changes: tuple[tuple[str, str], ...], sentence: str, tmp_path: Path
+) -> None:
+    if "[stop]" not in tail:
+        changes = (*changes, ("seed = 1", "seed = 1\ncount = 64"))
+    with pytest.raises(CampaignError, match=r"^\S+campaign.toml: ") as caught:
+        Campaign.from_toml(written(tmp_path, tail, *changes))
+    assert sentence in str(caught.value)

@@ -1,0 +1,309 @@
+"""Campaign files: what is read, and the one sentence that each mistake gets: file, field, value, cure."""
+
+import struct
+from pathlib import Path
+
+import pytest
+
+from warpimpact import Campaign, Core, Hits, Impact, Interaction, Numerics, Plate, PolynomialCore
+from warpimpact.campaign.campaign import CampaignError
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+
+CAMPAIGN = """\
+title = "test"
+[core]
+shape = "polynomial"
+coefficients = [3.0e-4, 0.24, -5.29]
+length = "27.86 mm"
+mass = "4 g"
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+shear_coefficient = 0.05
+degradation = 0.8
+[plate.pattern]
+shape = "slot"
+length = "12 mm"
+width = "4 mm"
+spacing = ["8 mm", "16 mm"]
+staggered = true
+[impact]
+velocity = "825 m/s"
+[hits]
+sampling = "sobol"
+count = 16
+[numerics]
+fidelity = "standard"
+[output]
+standoffs = ["50 mm", "130 mm"]
+"""
+SLOT = CAMPAIGN[CAMPAIGN.index("[plate.pattern]") : CAMPAIGN.index("[impact]")]
+CIRCLE = '[plate.pattern]\nshape = "circle"\ndiameter = "9 mm"\nspacing = ["8 mm", "16 mm"]\n'
+MASK = '[plate.pattern]\nshape = "mask"\nfile = "{}"\ncell_size = "1 mm"\n'
+SAMPLING = 'sampling = "sobol"\ncount = 16'
+
+MISTAKES = {
+    "missing key": (
+        'thickness = "4 mm"\n',
+        "",
+        "plate.thickness: is missing, but must be given",
+    ),
+    "missing table": (
+        '[impact]\nvelocity = "825 m/s"\n',
+        "",
+        "impact: is missing, but must be given",
+    ),
+    "missing key of a shape": (
+        'width = "4 mm"\n',
+        "",
+        "plate.pattern.width: is missing, but must be given",
+    ),
+    "missing shape": (
+        'shape = "slot"\n',
+        "",
+        "plate.pattern.shape: is missing, but must be given",
+    ),
+    "misspelt key": (
+        "thickness",
+        "thicknes",
+        'plate: got the unknown key "thicknes"; did you mean "thickness"?',
+    ),
+    "misspelt key of a shape": (
+        "staggered",
+        "stagered",
+        'plate.pattern: got the unknown key "stagered"; did you mean "staggered"?',
+    ),
+    "misspelt table": (
+        "[numerics]",
+        "[numeric]",
+        'got the unknown key "numeric"; did you mean "numerics"?',
+    ),
+    "foreign key": (
+        "velocity",
+        "colour",
+        'impact: got the unknown key "colour"; allowed are velocity, obliquity, azimuth, pitch, yaw, spin',
+    ),
+    "unknown shape": (
+        'shape = "slot"',
+        'shape = "slit"',
+        "plate.pattern.shape: got \"slit\", but it must be one of 'slot', 'circle', 'triangle', "
+        "'square', 'hexagon', 'ellipse', 'none', 'mask'",
+    ),
+    "unknown choice": (
+        '"standard"',
+        '"fast"',
+        "numerics.fidelity: got \"fast\", but it must be 'draft', 'standard' or 'reference'",
+    ),
+    "value in place of a table": (
+        '[impact]\nvelocity = "825 m/s"\n',
+        "[impact]\n[[impacts]]\n",
+        'got the unknown key "impacts"; did you mean "impact"?',
+    ),
+    "wrong unit": (
+        '"4 mm"\nres',
+        '"4 kg"\nres',
+        'plate.thickness: got "4 kg", which is not a length; give a number in m or a string such as "4 mm"',
+    ),
+    "no unit": (
+        '"825 m/s"',
+        '"825"',
+        'impact.velocity: got "825", which has no unit; give a number in m/s or a string such as "825 m/s"',
+    ),
+    "negative mass": (
+        '"4 g"',
+        '"-4 g"',
+        'core.mass: got "-4 g", but it must be greater than 0',
+    ),
+    "zero mass": (
+        '"4 g"',
+        "0",
+        "core.mass: got 0, but it must be greater than 0",
+    ),
+    "negative thickness": (
+        '"4 mm"\nres',
+        "-0.004\nres",
+        "plate.thickness: got -0.004, but it must be greater than 0",
+    ),
+    "zero velocity": (
+        '"825 m/s"',
+        '"0 km/s"',
+        'impact.velocity: got "0 km/s", but it must be greater than 0',
+    ),
+    "NaN": (
+        "0.05",
+        "nan",
+        'plate.shear_coefficient: got NaN, which is not finite; give a number or a string such as "0.05"',
+    ),
+    "infinity": (
+        '"2600 MPa"',
+        "inf",
+        'plate.resistance: got Infinity, which is not finite; give a number in Pa or a string such as "2600 MPa"',
+    ),
+    "radius not positive": (
+        "3.0e-4",
+        "-3.0e-4",
+        "core: got coefficients with a radius of -0.0003 m at s = 0 m, "
+        "but the radius must be positive from nose to base, 0 to 0.02786 m",
+    ),
+    "holes that overlap into no plate": (
+        SLOT,
+        CIRCLE,
+        "plate.pattern: got spacing = (8, 16) mm, which lets the holes at (0, 0) mm and (-8, 0) mm overlap or touch, "
+        "but a ligament must be left between them",
+    ),
+    "spacing smaller than the hole": (
+        '"16 mm"',
+        '"11 mm"',
+        "plate.pattern: got spacing = (8, 11) mm, which lets the holes at (0, 0) mm and (0, -11) mm overlap or touch, "
+        "but a ligament must be left between them",
+    ),
+    "negative spacing": (
+        '"16 mm"',
+        '"-16 mm"',
+        'plate.pattern.spacing[1]: got "-16 mm", but it must be greater than 0',
+    ),
+    "beta above 1": (
+        "= 0.8",
+        "= 1.2",
+        "plate.degradation: got 1.2, but it must be less than or equal to 1",
+    ),
+    "beta below 0": (
+        "= 0.8",
+        "= -0.2",
+        "plate.degradation: got -0.2, but it must be greater than or equal to 0",
+    ),
+    "eta below 0": (
+        "0.05",
+        "-0.05",
+        "plate.shear_coefficient: got -0.05, but it must be greater than or equal to 0",
+    ),
+    "hit list with a bad row": (
+        SAMPLING,
+        'sampling = "list"\nfile = "bad_hits.csv"',
+        'hits: bad_hits.csv, line 3: hit_z: got "oops", but it must be a finite number',
+    ),
+    "hit list that is not there": (
+        SAMPLING,
+        'sampling = "list"\nfile = "none.csv"',
+        'hits.file: got "none.csv", but there is no file {folder}/none.csv',
+    ),
+    "count 0": (
+        "count = 16",
+        "count = 0",
+        "hits.count: got 0, but it must be greater than or equal to 1",
+    ),
+    "mask that is no mask": (
+        SLOT,
+        MASK.format("bad_hits.csv"),
+        "plate.pattern: bad_hits.csv is not a mask: give a .png image, a .npy array or a .svg drawing",
+    ),
+    "mask absurdly large": (
+        SLOT,
+        MASK.format("huge.png"),
+        "plate.pattern: huge.png has 1000000 × 1000000 cells, "
+        "but a mask has at least 1 and at most 4096 along each side",
+    ),
+    "stand-offs that do not increase": (
+        '["50 mm", "130 mm"]',
+        '["130 mm", "50 mm"]',
+        "output.standoffs: got 0.05 m after 0.13 m, but stand-offs must increase",
+    ),
+    "stand-off within the plate": (
+        '["50 mm", "130 mm"]',
+        '["10 mm"]',
+        "got output.standoffs of 0.01 m, but a core of this size is sure to be out of the plate only from 0.01805 m",
+    ),
+    "a number in place of a table": (
+        SLOT,
+        "pattern = 3\n",
+        "plate.pattern: got 3, but it must be a table",
+    ),
+    "a number in place of a list": (
+        '["50 mm", "130 mm"]',
+        '"50 mm"',
+        'output.standoffs: got "50 mm", but it must be a list',
+    ),
+    "two mistakes": (
+        'mass = "4 g"\n[plate]\nthickness = "4 mm"',
+        'mass = "4 mm"\n[plate]\nthickness = "4 g"',
+        'core.mass: got "4 mm", which is not a mass; give a number in kg or a string such as "4 g" '
+        "(and 1 more problem)",
+    ),
+}
+
+
+@pytest.mark.parametrize(("right", "wrong", "sentence"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, right: str, wrong: str, sentence: str) -> None:
+    assert CAMPAIGN.count(right) == 1
+    (tmp_path / "bad_hits.csv").write_text("hit_y,hit_z\n0,0\n0,oops\n")
+    header = struct.pack(">I4sII", 13, b"IHDR", 10**6, 10**6)
+    (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + header)
+    path = tmp_path / "wrong.toml"
+    path.write_text(CAMPAIGN.replace(right, wrong))
+    with pytest.raises(CampaignError) as caught:
+        Campaign.from_toml(path)
+    assert str(caught.value) == f"{path}: {sentence.format(folder=tmp_path)}"
+
+
+@pytest.mark.parametrize(
+    ("write", "sentence"),
+    [
+        (lambda path: None, "there is no such file"),
+        (lambda path: path.mkdir(), "cannot be read (Is a directory)"),
+        (lambda path: path.write_text("a = 1\nb 2"), "is not valid TOML: Expected '=' after a key"),
+        (lambda path: path.write_bytes(b"a = '\xff'"), "is not valid TOML: 'utf-8' codec can't decode"),
+    ],
+)
+def test_what_is_no_toml_file_is_told_in_one_sentence(tmp_path: Path, write: object, sentence: str) -> None:
+    path = tmp_path / "wrong.toml"
+    write(path)
+    with pytest.raises(CampaignError) as caught:
+        Campaign.from_toml(path)
+    assert str(caught.value).startswith(f"{path}: {sentence}")
+
+
+def test_the_slotted_plate_is_the_papers() -> None:
+    campaign = Campaign.from_toml(SLOTTED_PLATE)
+    assert isinstance(campaign.core, Core)
+    assert campaign.core.mass_properties.mass == 4e-3
+    assert campaign.plate.thickness == 4e-3
+    assert campaign.plate.pattern.period == (16e-3, 16e-3)
+    assert campaign.hits == Hits(sampling="sobol", count=4096, seed=1)
+    assert campaign.interaction == Interaction()
+    assert campaign.output.standoffs == (0.05, 0.13)
+    assert campaign.text == SLOTTED_PLATE.read_text()
+
+
+def test_file_names_count_from_the_campaign_file(tmp_path: Path) -> None:
+    (tmp_path / "profile.csv").write_text("s,r\n0,0\n0.02,0.003\n")
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n")
+    core = CAMPAIGN[CAMPAIGN.index("[core]") : CAMPAIGN.index("[plate]")]
+    text = CAMPAIGN.replace(core, '[core]\nshape = "profile"\nfile = "profile.csv"\ndensity = 7850\n')
+    text = text.replace(SAMPLING, 'sampling = "list"\nfile = "hits.csv"')
+    (tmp_path / "campaign.toml").write_text(text)
+    campaign = Campaign.from_toml(tmp_path / "campaign.toml")
+    assert campaign.core.length == 0.02
+    assert campaign.hits.listed["hit_z"].tolist() == [0.002]
+
+
+def test_the_count_can_be_given_instead(tmp_path: Path) -> None:
+    path = tmp_path / "campaign.toml"
+    path.write_text(CAMPAIGN)
+    assert Campaign.from_toml(path, count=3).hits.count == 3
+    with pytest.raises(CampaignError, match=r"hits\.count: got 0"):
+        Campaign.from_toml(path, count=0)
+
+
+def test_a_campaign_needs_no_file() -> None:
+    campaign = Campaign(
+        title="by hand",
+        core=PolynomialCore(coefficients=[3e-3], length="20 mm", density="7850 kg/m^3"),
+        plate=Plate(thickness="4 mm", resistance="2.6 GPa"),
+        impact=Impact(velocity="825 m/s"),
+        hits=Hits(count=4),
+    )
+    assert campaign.output.standoffs == (0.05, 0.13)
+    assert Campaign.model_validate_json(campaign.text) == campaign
+    with_tolerance = campaign.model_copy(update={"numerics": Numerics(tolerance={"tilt": "1 deg"})})
+    assert Campaign.model_validate_json(with_tolerance.text) == with_tolerance

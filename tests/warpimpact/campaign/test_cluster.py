@@ -1,0 +1,95 @@
+"""Runs on a cluster of worker processes: the bits of a local run, though a worker is killed on the way."""
+
+import os
+import signal
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from warpimpact import Campaign
+from warpimpact.campaign.run import Standing, run_to_file
+from warpimpact.campaign.team import _compute_alike, cluster_team
+from warpimpact.cli import main
+from warpimpact.solver.device import DeviceError
+
+distributed = pytest.importorskip("distributed")
+
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SCATTERED = (
+    SLOTTED_PLATE.replace('"825 m/s"  ', '{ distribution = "normal", mean = "825 m/s", std = "10 m/s" }  ')
+    .replace('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }')
+    .replace('"4 g"  ', '{ distribution = "normal", mean = "4 g", std = "50 mg" }  ')
+)
+
+pytestmark = pytest.mark.usefixtures("small_shards")
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[object]:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+    ) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    path = tmp_path_factory.mktemp("campaign") / "campaign.toml"
+    path.write_text(SCATTERED.replace("count = 4096", "count = 3000"), encoding="utf-8")
+    return Campaign.from_toml(path)
+
+
+def test_a_killed_worker_costs_nothing(
+    campaign: Campaign, cluster: object, tmp_path: Path, assert_same_bits: Callable[[Path, Path], None]
+) -> None:
+    with distributed.Client(cluster) as client:
+        workers = client.run(os.getpid)
+    assert len(set(workers.values())) == 2
+    victim = next(iter(workers.values()))
+    killed_at = []
+
+    def kill_one(standing: Standing) -> None:
+        if standing.done >= 512 and not killed_at:
+            os.kill(victim, signal.SIGKILL)
+            killed_at.append(standing.done)
+
+    output, local = tmp_path / "a.nc", tmp_path / "local.nc"
+    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
+    run_to_file(campaign, output, team=team, progress=kill_one)
+    assert killed_at
+    assert killed_at[0] < 2500  # in mid-run
+    with distributed.Client(cluster) as client:
+        client.wait_for_workers(2, timeout=30)
+        assert victim not in client.run(os.getpid).values()
+    run_to_file(campaign, local, device="cpu")
+    assert_same_bits(output, local)
+
+
+def test_the_command_starts_workers_and_a_local_run_resumes_them(
+    campaign: Campaign, tmp_path: Path, assert_same_bits: Callable[[Path, Path], None]
+) -> None:
+    path, output, local = tmp_path / "campaign.toml", tmp_path / "a.nc", tmp_path / "local.nc"
+    path.write_text(campaign.text.replace("count = 3000", "count = 400"), encoding="utf-8")
+    assert main(["run", str(path), "-o", str(output), "--device", "cpu", "--workers", "1"]) == 0
+    assert main(["run", str(path), "-o", str(local), "--device", "cpu"]) == 0
+    assert_same_bits(output, local)
+
+
+def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
+    cluster: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "campaign.toml"
+    path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 300"), encoding="utf-8")
+    command = ["run", str(path), "-o", str(tmp_path / "a.nc"), "--scheduler"]
+    assert main([*command, cluster.scheduler_address, "--device", "cuda:99"]) == 2
+    assert 'device: got "cuda:99", which this machine lacks' in capsys.readouterr().err
+    assert main([*command, "nonsense://nowhere"]) == 2
+    assert 'scheduler: got "nonsense://nowhere", which cannot be reached' in capsys.readouterr().err
+    assert [file.name for file in tmp_path.iterdir()] == ["campaign.toml"]
+
+
+def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -> None:
+    kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
+    with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
+        _compute_alike(campaign, campaign.sampler().shots(0, 1), None, "cpu", None, kind)

@@ -1,0 +1,103 @@
+"""Memory: bounded whatever the count, and less of it where an allocation fails."""
+
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign
+from warpimpact.campaign.run import run_to_file
+from warpimpact.kernels.status import Status
+from warpimpact.results import files
+from warpimpact.scene import Scene, Shots
+from warpimpact.solver import marching, simulate
+from warpimpact.solver.simulate import Outcomes
+
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Campaign:
+    path = tmp_path / "campaign.toml"
+    path.write_text(SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "256"), encoding="utf-8")
+    return Campaign.from_toml(path)
+
+
+def at_once(scene: Scene, shots: Shots, **_: object) -> Outcomes:
+    """Outcomes without computing: numbers that zlib cannot make smaller."""
+    numbers, n = np.random.default_rng(0), len(shots)
+    single = {
+        name: numbers.random(n) for name in ("residual_velocity", "deflection", "energy_loss", "contact_duration")
+    }
+    each = {name: numbers.random((n, len(scene.record.standoffs))) for name in ("tilt", "pitch", "yaw", "total_yaw")}
+    return Outcomes(np.zeros(n, dtype=np.int8), angular_velocity=numbers.random((n, 3)), **single, **each)
+
+
+def test_memory_does_not_grow_with_the_count(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("warpimpact.campaign.compute.simulate", at_once)
+    run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
+    monkeypatch.setattr("warpimpact.campaign.parts.SHARDS", 48)  # 32 shards of 4096, which is quicker than 128
+    count = 2**17
+    many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
+    output = tmp_path / "a.nc"
+    tracemalloc.start()
+    try:
+        run_to_file(many, output, device="cpu")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    numbers = 8 + 7 + 4 * 2  # of a shot, and of its outcome at two stand-offs
+    with files.opened(output) as dataset:
+        assert dataset.sizes["hit"] == count
+        assert dataset["tilt"].encoding["chunksizes"] == (files.CHUNK, 2)
+        assert (dataset["status"] == Status.PERFORATED).all()
+    assert peak < count * numbers * 8 / 3  # bytes; a third of what the result takes
+
+
+def test_scratch_is_halved_until_it_can_be_had() -> None:
+    def allocate(slots: int) -> str:
+        if slots > 100:
+            raise RuntimeError(f"Failed to allocate {slots} bytes on device 'cuda:0'")
+        return f"{slots} slots"
+
+    assert marching._halving(1000, allocate) == (62, "62 slots")
+
+
+@pytest.mark.parametrize("error", [RuntimeError("Failed to allocate 8 bytes"), MemoryError(), RuntimeError("other")])
+def test_what_halving_cannot_cure_is_told(error: Exception) -> None:
+    asked = []
+
+    def allocate(slots: int) -> None:
+        asked.append(slots)
+        raise error
+
+    with pytest.raises(type(error)):
+        marching._halving(8, allocate)
+    assert asked == ([8] if str(error) == "other" else [8, 4, 2, 1])
+
+
+def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    shots = campaign.sampler().shots(0, 64)
+
+    def computed() -> Outcomes:
+        return simulate.simulate(campaign.scene, shots, numerics=campaign.numerics, device="cpu", threads=4)
+
+    plenty, granted, original = computed(), 0, marching.March._scratch
+
+    def scarce(task: Any, *arguments: int) -> Any:
+        """Memory for one slot in the first two attempts and for two later."""
+        nonlocal granted
+        granted += 1
+        if granted in (2, 4):
+            raise RuntimeError("Failed to allocate 1000 bytes on device 'cpu'")
+        return original(task, *arguments)
+
+    monkeypatch.setattr(marching.March, "_scratch", scarce)
+    little = computed()
+    assert granted >= 5  # 4 slots fail at the second, 2 at the second, 1 does not; wider windows come after these
+    assert np.array_equal(plenty.residual_velocity, little.residual_velocity)
+    assert np.array_equal(plenty.tilt, little.tilt)

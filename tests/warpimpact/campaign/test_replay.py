@@ -1,0 +1,206 @@
+"""A replayed hit ends with the bits of the stored one, and its history is consistent with that end."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign, CirclePattern, Hits, Impact, NoPattern, Numerics, Plate, PolynomialCore
+from warpimpact.campaign.campaign import CampaignError, Output
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.cli import main
+from warpimpact.kernels.status import Status
+from warpimpact.results import files
+from warpimpact.results.files import ResultError
+from warpimpact.results.variables import HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.scene import Interaction
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+NOWHERE = Path("nowhere")
+CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
+HOLES = Plate(
+    thickness=4e-3,
+    resistance=2.6e9,
+    shear_coefficient=0.05,
+    degradation=0.8,
+    pattern=CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3)),
+)
+STRAIGHT, SLANTED = Impact(velocity=825.0), Impact(velocity=600.0, obliquity=0.3, azimuth=0.7, yaw=0.1, spin=1e4)
+DRAFT = Numerics(fidelity="draft")
+
+
+def campaign(**changes: Any) -> Campaign:
+    """A few hits on round holes, but for `changes`."""
+    usual: dict[str, Any] = {"title": "a test", "core": CORE, "plate": HOLES, "impact": STRAIGHT, "hits": Hits(count=3)}
+    usual |= {"interaction": Interaction(static=1.1), "numerics": DRAFT, "output": Output(standoff_point="nose")}
+    return Campaign(**usual | changes)
+
+
+def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
+    """The result as a file gives it back."""
+    files.write(result, path)
+    return files.read(path)
+
+
+@pytest.mark.parametrize(
+    ("impact", "numerics", "plate", "status"),
+    [
+        (STRAIGHT, DRAFT, HOLES, Status.PERFORATED),
+        (SLANTED, DRAFT, HOLES, Status.PERFORATED),
+        (SLANTED, Numerics(fidelity="draft", precision="double"), HOLES, Status.PERFORATED),
+        (SLANTED, Numerics(scheme="nodal", grid_spacing=5e-5), HOLES, Status.PERFORATED),
+        (STRAIGHT, DRAFT, HOLES.model_copy(update={"resistance": 1e11}), Status.ARRESTED),
+        (Impact(velocity=300.0, obliquity=1.3), DRAFT, HOLES, Status.RICOCHETED),
+    ],
+    ids=["straight", "slanted", "double", "nodal", "arrested", "grazing"],
+)
+def test_replay_ends_with_the_bits_of_the_stored_outcome(
+    impact: Impact, numerics: Numerics, plate: Plate, status: Status, tmp_path: Path
+) -> None:
+    result = stored(run(campaign(impact=impact, numerics=numerics, plate=plate), device="cpu"), tmp_path / "a.nc")
+    assert (result["status"] == status).any()
+    for hit in range(3):
+        history = replay(result, hit, folder=NOWHERE)
+        assert history.attrs["agreement"] == "bit-identical"
+        for name in OUTCOME_VARIABLES:
+            end = "residual_angular_velocity" if name == "angular_velocity" else name
+            np.testing.assert_array_equal(history[end], result[name][hit])
+
+
+@pytest.fixture(scope="module")
+def result() -> xarray.Dataset:
+    """Slanted hits in double precision, computed on the CPU."""
+    numerics = Numerics(fidelity="draft", precision="double")
+    return run(campaign(impact=SLANTED, numerics=numerics), device="cpu")
+
+
+@pytest.fixture(scope="module")
+def history(result: xarray.Dataset) -> xarray.Dataset:
+    return replay(result, 1, folder=NOWHERE)
+
+
+def test_history_leads_to_its_end(history: xarray.Dataset) -> None:
+    last, body = history.isel(time=-1), CORE.mass_properties
+    assert float(np.linalg.norm(last["velocity"])) == pytest.approx(float(history["residual_velocity"]), rel=1e-14)
+    np.testing.assert_allclose(last["angular_velocity"], history["residual_angular_velocity"], rtol=1e-12)
+    impact = 0.5 * (body.mass * SLANTED.velocity**2 + body.inertia_axial * SLANTED.spin**2)
+    end = float(last["translational_energy"] + last["rotational_energy"])
+    assert impact - end == pytest.approx(float(history["energy_loss"]), rel=1e-12)
+    energy = history["translational_energy"] + history["rotational_energy"]
+    assert (np.diff(energy) <= 1e-12 * impact).all()
+
+
+def test_history_tells_where_the_core_is(history: xarray.Dataset, result: xarray.Dataset) -> None:
+    moved = history["plate_position"] - history["position"]
+    hit = [0.0, result["hit_y"][1], result["hit_z"][1]]
+    np.testing.assert_allclose(moved, np.broadcast_to(hit, moved.shape), atol=1e-18)
+    np.testing.assert_allclose(np.linalg.norm(history["attitude"], axis=1), 1.0, rtol=1e-14)
+    x, y, z, w = history["attitude"].values.T
+    axis = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], axis=1)
+    np.testing.assert_allclose(history["core_axis"], axis, atol=1e-14)
+    assert dict(history.sizes)["quaternion"] == 4
+    for name, variable in (HISTORY_COORDINATES | HISTORY_VARIABLES).items():
+        assert history[name].dims == variable.dims
+        assert history[name].attrs == {"units": variable.units, "long_name": variable.long_name}
+
+
+def test_plate_starts_whole_and_weakens_where_the_core_goes(history: xarray.Dataset) -> None:
+    share = history["resistance_share"]
+    y, z = np.meshgrid(history["cell_y"], history["cell_z"], indexing="ij")
+    points = (np.arange(16) - 7.5) / 16 * float(history["cell_y"][1] - history["cell_y"][0])
+    solid = HOLES.is_solid(y[..., None, None] + points[:, None], z[..., None, None] + points).mean(axis=(2, 3))
+    np.testing.assert_allclose(share[0], solid, atol=2 / 256)  # points on an edge may fall on either side
+    assert (np.diff(share, axis=0) <= 0.0).all()
+    weakened = (share[-1] < 0.9 * share[0]).values
+    distance = np.hypot(y - float(history["hit_y"]), z - float(history["hit_z"]))
+    assert 3e-3 < distance[weakened].max() < CORE.bounding_radius
+    assert weakened[(solid == 1.0) & (distance < 1e-3)].all()
+
+
+def test_plate_has_been_exposed_by_the_area_that_advanced_for_as_long_as_it_did() -> None:
+    # Straight through a solid plate: exposure over the plate is the section πR² times the time h/v of its passage.
+    solid = HOLES.model_copy(update={"pattern": NoPattern()})
+    history = replay(run(campaign(plate=solid, hits=Hits(count=1)), device="cpu"), 0, folder=NOWHERE)
+    assert (history["resistance_share"][0] == 1.0).all()
+    exposure = np.log(history["resistance_share"][-1]) / np.log(solid.degradation) * solid.degradation_interval
+    cell = float(np.diff(history["cell_y"])[0] * np.diff(history["cell_z"])[0])
+    swept = np.pi * CORE.max_radius**2 * solid.thickness / (float(exposure.sum()) * cell)
+    assert float(history["residual_velocity"]) < swept < 825.0
+
+
+def test_snapshots_go_from_the_first_touch_to_the_end(history: xarray.Dataset) -> None:
+    assert history["snapshot"][0] == 0.0
+    assert history.sizes["snapshot"] == 6
+    step = float(history["time"][1] - history["time"][0])
+    assert float(history["snapshot"][-1]) == pytest.approx(float(history["time"][-1]) - 0.5 * step)
+
+
+def test_count_of_the_command_line_counts(tmp_path: Path) -> None:
+    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"').replace('"sobol"', '"grid"')
+    (tmp_path / "a.toml").write_text(text.replace("seed = 1\n", ""))
+    result = run(Campaign.from_toml(tmp_path / "a.toml", count=7), device="cpu")
+    assert result.sizes["hit"] == 6
+    result = stored(result, tmp_path / "a.nc")
+    assert replay(result, 5, folder=NOWHERE).attrs["agreement"] == "bit-identical"
+
+
+def test_another_end_is_told(result: xarray.Dataset) -> None:
+    for error, agreement in ((0.0, "bit-identical"), (1e-3, "within rounding"), (1.0, "different")):
+        other = result.assign(residual_velocity=result["residual_velocity"] + error)
+        assert replay(other, 0, folder=NOWHERE).attrs["agreement"] == agreement
+    other = result.assign(status=result["status"] * 0 + Status.RICOCHETED)
+    assert replay(other, 0, folder=NOWHERE).attrs["agreement"] == "different"
+
+
+def test_what_cannot_be_replayed_is_refused(result: xarray.Dataset) -> None:
+    for hit in (-1, 3):
+        with pytest.raises(ResultError, match=f"hit: got {hit}, but the result has hits 0 to 2"):
+            replay(result, hit, folder=NOWHERE)
+    moved = result.assign_coords(hit_y=result["hit_y"] + 1e-6)
+    with pytest.raises(ResultError, match="no longer what the campaign"):
+        replay(moved, 0, folder=NOWHERE)
+    anonymous = result.drop_attrs()
+    with pytest.raises(ResultError, match="does not carry its campaign"):
+        replay(anonymous, 0, folder=NOWHERE)
+
+
+def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> None:
+    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
+    head, tail = text.split("[hits]")
+    tail = "[numerics]" + tail.split("[numerics]")[1]
+    (tmp_path / "a.toml").write_text(f'{head}[hits]\nsampling = "list"\nfile = "hits.csv"\n\n{tail}')
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n")
+    result = run(Campaign.from_toml(tmp_path / "a.toml"), device="cpu")
+    assert replay(result, 0, folder=tmp_path).attrs["agreement"] == "bit-identical"
+    with pytest.raises(CampaignError, match=r"the campaign in the result: hits\.file: .* no file nowhere/hits\.csv"):
+        replay(result, 0, folder=NOWHERE)
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n0.002,0.002\n")
+    with pytest.raises(ResultError, match="got a result of 1 hits, but its campaign and the files it names give 2"):
+        replay(result, 0, folder=tmp_path)
+
+
+def test_command_writes_history_and_figures(
+    result: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files.write(result, tmp_path / "a.nc")
+    command = ["replay", str(tmp_path / "a.nc"), "--hit", "2"]
+    assert main(command) == 0
+    shown = capsys.readouterr().out
+    assert f"residual velocity{float(result['residual_velocity'][2]):11.1f} m/s\n" in shown
+    assert "The end is bit-identical to the stored outcome.\n" in shown
+    with xarray.open_dataset(tmp_path / "a_hit2.nc") as history:
+        assert history.attrs["hit"] == 2
+        np.testing.assert_array_equal(history["tilt"], result["tilt"][2])
+    figures = {"passage", "flight", "largest_load", "pressure", "course", "plate"}
+    assert {path.name for path in tmp_path.glob("*.png")} == {f"a_hit2_{figure}.png" for figure in figures}
+    for again, sentence in (
+        (command, "a_hit2.nc: exists already"),
+        ([*command[:-1], "9"], "hit: got 9, but the result has hits 0 to 2"),
+        (["replay", str(tmp_path / "a_hit2.nc"), "--hit", "0"], "is the history of a single hit"),
+    ):
+        assert main(again) == 2
+        assert sentence in capsys.readouterr().err
+    assert not (tmp_path / "a_hit9.nc").exists()

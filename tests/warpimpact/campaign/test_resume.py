@@ -1,0 +1,368 @@
+"""Runs that are killed, stopped or run out of disk lose nothing: what is resumed ends with the bits of an undisturbed
+run."""
+
+import multiprocessing
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.campaign import parts
+from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
+from warpimpact.cli import main
+from warpimpact.results import files
+from warpimpact.results.files import OutputError
+
+SameBits = Callable[[Path, Path], None]
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
+COUNT = 4000  # sixteen shards, the last one short
+KILLS = 20
+HERE = Path(__file__).parents[1]
+pytestmark = pytest.mark.usefixtures("small_shards")
+WARPIMPACT = (
+    sys.executable,
+    "-c",
+    "import small_shards; from warpimpact.cli import main; raise SystemExit(main())",
+)
+
+
+@pytest.fixture(scope="module")
+def campaign_file(tmp_path_factory: pytest.TempPathFactory, small_shards: None) -> Path:
+    path = tmp_path_factory.mktemp("campaign") / "campaign.toml"
+    path.write_text(DRAFT.replace("count = 4096", f"count = {COUNT}"), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def campaign(campaign_file: Path) -> Campaign:
+    return Campaign.from_toml(campaign_file)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(campaign: Campaign, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("undisturbed") / "a.nc"
+    run_to_file(campaign, path, device="cpu")
+    return path
+
+
+def test_runs_killed_at_any_moment_end_with_the_same_bits(
+    campaign_file: Path,
+    undisturbed: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    assert_same_bits: SameBits,
+) -> None:
+    # A server that has imported everything forks real processes without the second that imports take.
+    def command(path: Path) -> list[str]:
+        return ["run", str(campaign_file), "-o", str(path), "--device", "cpu", "--resume"]
+
+    monkeypatch.syspath_prepend(HERE)
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload(["small_shards", "warpimpact.campaign.run", "scipy.stats"])
+    moments, output = random.Random(1), tmp_path / "a.nc"
+    for _ in range(2):  # the first one waits for the imports
+        begin = time.monotonic()
+        whole = processes.Process(target=main, args=([*command(tmp_path / "timed.nc"), "--overwrite"],))
+        whole.start()
+        whole.join()
+        longest = time.monotonic() - begin
+    kills, completed, found = 0, 0, set()
+    while kills < KILLS or not output.exists():
+        run_process = processes.Process(target=main, args=(command(output),))
+        run_process.start()
+        run_process.join(moments.uniform(0.2, 1.0) * longest if kills < KILLS else None)
+        if run_process.is_alive():
+            run_process.kill()
+            run_process.join()
+            kills += 1
+            found.add(len(list(tmp_path.glob("a.nc.parts/hits_*.nc"))))
+        else:
+            assert run_process.exitcode == 0
+        if output.exists() and not (tmp_path / "a.nc.parts").exists():
+            assert_same_bits(output, undisturbed)
+            completed += 1
+            if kills < KILLS:
+                output.unlink()
+    assert completed >= 1
+    assert len(found) >= 2  # the moments were all over the run
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.nc", "timed.nc"]
+
+
+def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, output = tmp_path / "long.toml", tmp_path / "a.nc"
+    path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 100000"), encoding="utf-8")
+    command = ["run", str(path), "-o", str(output), "--device", "cpu"]
+    with subprocess.Popen(
+        [*WARPIMPACT, *command], env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.DEVNULL
+    ) as first:
+        try:
+            limit = time.monotonic() + 60.0
+            while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
+                assert first.poll() is None
+                assert time.monotonic() < limit
+                time.sleep(0.05)
+            for manner in ("--resume", "--overwrite"):
+                assert main([*command, manner]) == 2
+                sentence = f"warpimpact: error: {output}: another run is at work on it; wait for its end or name"
+                assert capsys.readouterr().err.startswith(sentence)
+            assert first.poll() is None
+        finally:
+            first.kill()
+    assert (tmp_path / "a.nc.parts" / "lock").exists()  # a killed process cleans nothing up, but holds nothing
+    assert main(["run", str(path), "-o", str(output), "--device", "cpu", "--count", "300", "--overwrite"]) == 0
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.nc", "long.toml"]
+
+
+def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: SameBits
+) -> None:
+    """Every call that changes a name on the disk is the last one in its turn."""
+    output, steps = tmp_path / "a.nc", 0
+    small = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": 300})})
+    straight = tmp_path / "straight.nc"
+    run_to_file(small, straight, device="cpu")
+
+    class Killed(BaseException):
+        pass
+
+    while not (output.exists() and not (tmp_path / "a.nc.parts").exists()):
+        left = steps
+
+        def dying(original):
+            def call(*arguments, **options):
+                nonlocal left
+                if left == 0:
+                    raise Killed
+                left -= 1
+                return original(*arguments, **options)
+
+            return call
+
+        with monkeypatch.context() as patched:
+            for name in ("replace", "rmdir", "unlink"):
+                patched.setattr(os, name, dying(getattr(os, name)))
+            patched.setattr("warpimpact.campaign.run._kept", lambda _: "")  # a killed process cleans nothing up
+            try:
+                run_to_file(small, output, device="cpu", resume=True)
+            except Killed:
+                steps += 1
+    assert steps >= 6
+    assert_same_bits(output, straight)
+
+
+def test_a_result_in_memory_has_the_same_bits(campaign: Campaign, undisturbed: Path) -> None:
+    dataset, stored = run(campaign, device="cpu"), files.read(undisturbed)
+    assert dataset.sizes == stored.sizes
+    for name in stored.variables:
+        assert np.array_equal(dataset[name], stored[name], equal_nan=dataset[name].dtype.kind == "f")
+
+
+def test_the_file_is_chunked_and_compressed(undisturbed: Path) -> None:
+    with netCDF4.Dataset(undisturbed) as file:
+        assert file["tilt"].chunking() == [COUNT, 2]
+        assert file["tilt"].filters()["zlib"]
+
+
+def stopped_after(shards: int, error: BaseException) -> object:
+    """A follower that breaks off."""
+
+    def follow(standing: Standing) -> None:
+        if standing.done >= 256 * shards and standing.done < standing.total:
+            raise error
+
+    return follow
+
+
+@pytest.fixture
+def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
+    """A result file whose run was interrupted."""
+    output = tmp_path / "a.nc"
+    with pytest.raises(Interrupted, match=r"^interrupted; \d+ of 16 shards are saved in .*a.nc.parts; continue with"):
+        run_to_file(campaign, output, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
+    assert not output.exists()
+    return output
+
+
+def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
+    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
+) -> None:
+    with pytest.raises(OutputError, match=r"holds a run that has not ended .* --resume or begin anew with --overwrite"):
+        run_to_file(campaign, broken_off, device="cpu")
+    standings: list[Standing] = []
+    run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
+    assert standings[0].resumed >= 256
+    assert standings[-1].done == standings[-1].total == COUNT
+    assert_same_bits(broken_off, undisturbed)
+    before = broken_off.stat()
+    run_to_file(campaign, broken_off, device="cpu", resume=True)  # a batch system that restarts what is complete
+    assert broken_off.stat() == before
+
+
+def test_overwriting_begins_anew(
+    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
+) -> None:
+    standings: list[Standing] = []
+    run_to_file(campaign, broken_off, device="cpu", overwrite=True, progress=standings.append)
+    assert standings[0].resumed == 0
+    assert_same_bits(broken_off, undisturbed)
+
+
+def test_an_old_result_stays_until_the_new_one_is_complete(
+    campaign: Campaign, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+):
+    output = tmp_path / "a.nc"
+    output.write_text("old")
+    with pytest.raises(Interrupted):
+        run_to_file(campaign, output, device="cpu", overwrite=True, progress=stopped_after(1, KeyboardInterrupt()))
+    assert output.read_text() == "old"
+    run_to_file(campaign, output, device="cpu", resume=True)  # may replace it: the run that began was allowed to
+    assert_same_bits(output, undisturbed)
+
+
+@pytest.mark.parametrize(
+    ("change", "difference"),
+    [
+        (("degradation = 0.8 ", "degradation = 0.7 "), "plate.degradation was 0.8 and is 0.7"),
+        (("seed = 1", "seed = 2"), "hits.seed was 1 and is 2"),
+        ((f"count = {COUNT}", "count = 4096"), f"hits.count was {COUNT} and is 4096"),
+        (('"825 m/s"', '{ distribution = "uniform", low = 824, high = 826 }'), "scatter.velocity was not given"),
+    ],
+)
+def test_another_campaign_is_refused_with_the_difference(
+    change: tuple[str, str], difference: str, broken_off: Path, campaign_file: Path, tmp_path: Path
+) -> None:
+    other = tmp_path / "other.toml"
+    text = campaign_file.read_text(encoding="utf-8")
+    assert change[0] in text
+    other.write_text(text.replace(*change), encoding="utf-8")
+    with pytest.raises(OutputError, match=rf"cannot be resumed: .*{difference}"):
+        run_to_file(Campaign.from_toml(other), broken_off, device="cpu", resume=True)
+    assert list(tmp_path.glob("a.nc.parts/hits_*.nc"))
+
+
+def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -> None:
+    head, tail = DRAFT.split("[hits]")
+    text = f'{head}[hits]\nsampling = "list"\nfile = "hits.csv"\n\n[numerics]{tail.split("[numerics]")[1]}'
+    for folder, row in (("a", "0.001,0.002"), ("b", "0.001,0.002"), ("c", "0.001,0.003")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "campaign.toml").write_text(text, encoding="utf-8")
+        (tmp_path / folder / "hits.csv").write_text(f"hit_y,hit_z\n{row}\n", encoding="utf-8")
+    a, b, c = (parts.manifest(Campaign.from_toml(tmp_path / f / "campaign.toml"), {"device": "cpu"}) for f in "abc")
+    assert parts.difference(a, b) is None
+    assert parts.difference(a, c).startswith("hits.file was ")
+    assert parts.difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
+
+
+def test_a_damaged_shard_is_computed_again(
+    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
+) -> None:
+    shard = min(broken_off.with_name("a.nc.parts").glob("hits_*.nc"))
+    shard.write_bytes(shard.read_bytes()[:1000])
+    run_to_file(campaign, broken_off, device="cpu", resume=True)
+    assert_same_bits(broken_off, undisturbed)
+
+
+def test_shards_are_results_that_xarray_opens_together(broken_off: Path, undisturbed: Path) -> None:
+    pytest.importorskip("dask")
+    paths = sorted(broken_off.with_name("a.nc.parts").glob("hits_*.nc"))
+    whole = files.read(undisturbed)
+    with xarray.open_mfdataset(
+        paths, combine="nested", concat_dim="hit", data_vars="minimal", coords="minimal", compat="override"
+    ) as together:
+        assert together.sizes["hit"] == 256 * len(paths)
+        first = int(paths[0].stem.split("_")[1])
+        np.testing.assert_array_equal(together["tilt"][:256], whole["tilt"][first : first + 256])
+
+
+def _with_files_up_to(size: int, *command: str) -> subprocess.CompletedProcess[str]:
+    """Run warpimpact where no file may grow beyond `size`: the system refuses to write, as on a full disk."""
+
+    limit = (
+        f"signal.signal(signal.SIGXFSZ, signal.SIG_IGN); resource.setrlimit(resource.RLIMIT_FSIZE, ({size}, {size}))"
+    )
+    return subprocess.run(
+        [*_after(limit), *WARPIMPACT, *command],
+        env=os.environ | {"PYTHONPATH": str(HERE)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def _after(setting: str) -> list[str]:
+    """What runs a command after a setting of its process. No preexec_fn: that hangs now and then where threads run."""
+    return [sys.executable, "-c", f"import os, resource, signal, sys; {setting}; os.execv(sys.argv[1], sys.argv[1:])"]
+
+
+def test_a_disk_that_is_full_at_the_end_loses_nothing(
+    campaign_file: Path, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+) -> None:
+    output = tmp_path / "a.nc"
+    command = ("run", str(campaign_file), "-o", str(output), "--device", "cpu")
+    # The kernels of this campaign are in Warp's cache: shards fit, the whole file does not.
+    done = _with_files_up_to(undisturbed.stat().st_size // 2, *command)
+    assert done.returncode == 2, done.stderr
+    assert "a.nc: cannot be written" in done.stderr
+    assert f"16 of 16 shards are saved in {output}.parts; continue with --resume" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not output.exists()
+    assert main([*command, "--resume"]) == 0
+    assert_same_bits(output, undisturbed)
+
+
+@pytest.mark.parametrize(("size", "saved"), [(20_000, "; nothing is saved"), (100, "manifest.json: cannot be written")])
+def test_a_disk_that_is_full_at_once_leaves_nothing(size: int, saved: str, campaign_file: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.nc"
+    done = _with_files_up_to(size, "run", str(campaign_file), "-o", str(output), "--device", "cpu")
+    assert done.returncode == 2, done.stderr
+    assert "cannot be written" in done.stderr
+    assert saved in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("by", "where"), [(signal.SIGINT, ["--workers", "1"]), (signal.SIGTERM, [])])
+def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: list[str], tmp_path: Path) -> None:
+    """A terminal sends Ctrl-C to all processes of the group; a batch system ends the first one."""
+    path, output = tmp_path / "long.toml", tmp_path / "a.nc"
+    path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 100000"), encoding="utf-8")
+    # A shell's background job ignores Ctrl-C.
+    listen = _after("signal.signal(signal.SIGINT, signal.SIG_DFL)")
+    command = [*listen, *WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu", *where]
+    with subprocess.Popen(
+        command,
+        env=os.environ | {"PYTHONPATH": str(HERE)},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        limit = time.monotonic() + 60.0
+        while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
+            assert process.poll() is None
+            assert time.monotonic() < limit
+            time.sleep(0.05)
+        if by == signal.SIGINT:
+            os.killpg(process.pid, by)
+        else:
+            process.send_signal(by)
+        begin = time.monotonic()
+        _, shown = process.communicate(timeout=30)
+    assert time.monotonic() - begin < 5.0  # it waits for no task
+    assert process.returncode == 130
+    assert "Traceback" not in shown
+    last = shown.splitlines()[-1]
+    assert last.startswith("warpimpact: interrupted; ")
+    assert last.endswith(f"shards are saved in {output}.parts; continue with --resume")
+    shutil.rmtree(f"{output}.parts")

@@ -1,0 +1,202 @@
+"""Scatter from a campaign file to its result, and a sentence for each mistake."""
+
+import math
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.compute import compute
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
+from warpimpact.cli import main
+from warpimpact.results import files
+from warpimpact.results.variables import OUTCOME_VARIABLES
+from warpimpact.scene import Numerics
+
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+
+
+def campaign_with(tmp_path: Path, *changes: tuple[str, str]) -> Campaign:
+    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "64")
+    for old, new in changes:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    return Campaign.from_toml(tmp_path / "campaign.toml")
+
+
+NORMAL = '{ distribution = "normal", mean = "820 m/s", std = "10 m/s" }'
+VELOCITY = '"825 m/s"                    # obliquity, azimuth, pitch, yaw, spin default to 0'
+
+
+def test_a_distribution_stands_in_the_place_of_its_value(tmp_path: Path) -> None:
+    campaign = campaign_with(
+        tmp_path,
+        (VELOCITY, f'{NORMAL}\nyaw = {{ distribution = "triangular", low = "-2 deg", mode = 0, high = "2 deg" }}'),
+    )
+    assert campaign.impact.velocity == 820.0  # the median
+    assert set(campaign.scatter.given) == {"velocity", "yaw"}
+    assert campaign.scatter.yaw.high == pytest.approx(math.radians(2))
+    dataset = run(campaign, device="cpu")
+    shots = campaign.sampler().shots(0, 64)
+    assert np.array_equal(dataset.impact_velocity, shots.velocity)
+    np.testing.assert_allclose(dataset.impact_yaw, np.degrees(shots.yaw), rtol=1e-15)
+    assert np.ptp(dataset.impact_velocity.values) > 30.0
+    assert replay(dataset, 40, folder=tmp_path).attrs["agreement"] == "bit-identical"
+
+
+def test_a_campaign_in_python_comes_back_from_its_text_and_from_another_process(tmp_path: Path) -> None:
+    campaign = campaign_with(tmp_path, (VELOCITY, NORMAL))
+    by_hand = Campaign(**{name: getattr(campaign, name) for name in Campaign.model_fields})
+    assert Campaign.from_text(by_hand.text, name="text", folder=tmp_path).model_dump() == by_hand.model_dump()
+    assert pickle.loads(pickle.dumps(campaign)).model_dump() == campaign.model_dump()
+
+
+def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
+    """The window on the plate is as large as the steepest shot of a batch needs."""
+    changes = 'obliquity = { distribution = "uniform", low = 0, high = "50 deg" }\nspin = 1e4'
+    campaign = campaign_with(tmp_path, (VELOCITY, f"{NORMAL}\n{changes}"))
+    whole = run(campaign, device="cpu")
+    for hit in range(0, 64, 9):
+        alone = compute(campaign, campaign.sampler().shots(hit, 1), device="cpu")
+        for name in OUTCOME_VARIABLES:
+            assert np.array_equal(alone[name][0], whole[name][hit], equal_nan=True), name
+
+
+OWN = {
+    "resistance": '{ distribution = "lognormal", median = "2600 MPa", sigma = 0.1 }',
+    "shear_coefficient": '{ distribution = "uniform", low = 0.02, high = 0.08 }',
+    "degradation": '{ distribution = "truncated_normal", mean = 0.8, std = 0.05, low = 0.6, high = 0.95 }',
+    "thickness": '{ distribution = "triangular", low = "3.6 mm", mode = "4 mm", high = "4.4 mm" }',
+    "mass": '{ distribution = "normal", mean = "4 g", std = "50 mg" }',
+}
+
+
+def line_of(name: str) -> str:
+    return next(line for line in SLOTTED_PLATE.splitlines() if line.startswith(f"{name} = "))
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Campaign:
+    """All that plate and core have scatters, and the velocity."""
+    changes = [(line_of(name), f"{name} = {distribution}") for name, distribution in OWN.items()]
+    return campaign_with(tmp_path, (VELOCITY, NORMAL), *changes)
+
+
+@pytest.mark.usefixtures("small_shards")
+def test_scatter_in_plate_and_core_from_file_to_result(
+    own: Campaign, tmp_path: Path, assert_same_bits: Callable[[Path, Path], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    count = 1000
+    campaign = own.model_copy(update={"hits": own.hits.model_copy(update={"count": count})})
+
+    def break_off(standing: Standing) -> None:
+        if standing.done >= 256:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted):
+        run_to_file(campaign, tmp_path / "a.nc", device="cpu", progress=break_off)
+    run_to_file(campaign, tmp_path / "a.nc", device="cpu", resume=True)
+    run_to_file(campaign, tmp_path / "straight.nc", device="cpu")
+    assert_same_bits(tmp_path / "a.nc", tmp_path / "straight.nc")
+
+    dataset, shots = files.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
+    for name in OWN:
+        assert np.array_equal(dataset[name], shots.columns[name])
+        assert len(np.unique(dataset[name])) == count
+    # What is lost in translation is no more than all that is lost, each core with its own mass.
+    energy = 0.5 * dataset.mass * (dataset.impact_velocity**2 - dataset.residual_velocity**2)
+    assert (np.abs(energy - dataset.energy_loss) < 0.15 * dataset.energy_loss).all()
+    assert (energy >= dataset.energy_loss * (1.0 - 1e-4)).all()  # what turns was taken from the flight
+    for hit in (3, 700):
+        history = replay(dataset, hit, folder=tmp_path)
+        assert history.attrs["agreement"] == "bit-identical"
+        assert history.attrs["plate_thickness"] == shots.thickness[hit]
+    assert main(["inspect", str(tmp_path / "a.nc")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == f"0 of {count} shots failed"
+
+
+def test_scatter_in_plate_and_core_beside_symmetry_and_tolerance(own: Campaign) -> None:
+    hits = own.hits.model_copy(update={"irreducible": True})
+    numerics = Numerics(tolerance={"residual_velocity": "5 m/s", "tilt": "5 deg"})
+    dataset = run(own.model_copy(update={"hits": hits, "numerics": numerics}), device="cpu")
+    assert dataset.attrs["computed_hits"] == 8
+    for name in (*OWN, "residual_velocity", "energy_loss", "tilt"):
+        values = dataset[name].values.reshape(8, 8, -1)
+        assert (values == values[:, :1]).all(), name  # a hit and its images
+        assert len(np.unique(values[:, 0, 0])) == 8
+    assert dataset.converged.mean() > 0.8
+
+
+def test_a_list_may_bring_its_own_plates(tmp_path: Path) -> None:
+    rows = ("hit_y,hit_z,degradation,mass", "0,0.006,1,4e-3", "0,0.006,0.8,4e-3", "0,0.006,0.8,8e-3")
+    (tmp_path / "hits.csv").write_text("\n".join(rows))
+    hits = SLOTTED_PLATE.split("[hits]\n")[1].split("[numerics]")[0].replace("4096", "64")
+    campaign = campaign_with(tmp_path, (hits, 'sampling = "list"\nfile = "hits.csv"\n'))
+    lasting, weakening, heavy = run(campaign, device="cpu").residual_velocity.values
+    assert lasting < weakening < heavy
+
+
+@pytest.mark.parametrize(
+    ("distribution", "sentence"),
+    [
+        (
+            '{ distribution = "normal", mean = "820 kg", std = 1 }',
+            'mean: got "820 kg", which is not a speed; give a number in m/s or a string such as "825 m/s"',
+        ),
+        (
+            '{ distribution = "normal", mean = "50 m/s", std = "10 m/s" }',
+            "got a normal distribution that reaches -11.2",
+        ),
+        ('{ distribution = "normal", mean = 820 }', "std: is missing, but must be given"),
+        ('{ distribution = "normal", mean = 820, std = 0 }', "std: got 0.0, but it must be greater than 0"),
+        ('{ distribution = "normal", mean = 820, sd = 1, std = 1 }', 'got the unknown key "sd"; did you mean "std"?'),
+        ('{ distribution = "gauss", mean = 820 }', 'distribution: got "gauss", but it must be one of'),
+        ("{ mean = 820 }", "distribution: is missing, but must be given"),
+        ('{ distribution = "uniform", low = 820, high = 810 }', "got low = 820 and high = 810, but high must be above"),
+        ('{ distribution = "discrete", values = [1, 2], weights = [1] }', "got 2 values and 1 weights"),
+        ('{ distribution = "triangular", low = 1, mode = 3, high = 2 }', "got mode = 3, but it must lie between"),
+    ],
+)
+def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, distribution: str, sentence: str) -> None:
+    with pytest.raises(CampaignError) as caught:
+        campaign_with(tmp_path, (VELOCITY, distribution))
+    shown = str(caught.value).removeprefix(f"{tmp_path / 'campaign.toml'}: ")
+    assert shown.startswith("impact.velocity")
+    assert sentence in shown
+    assert "\n" not in shown
+
+
+def test_attitude_does_not_scatter_beside_irreducible_hits(tmp_path: Path) -> None:
+    irreducible = ("seed = 1", "seed = 1\nirreducible = true")
+    assert campaign_with(tmp_path, (VELOCITY, NORMAL), irreducible).symmetries[1:]
+    yaw = '"825 m/s"\nyaw = { distribution = "normal", mean = 0, std = "1 deg" }'
+    with pytest.raises(CampaignError, match=r"campaign.toml: got hits.irreducible = true beside .* of impact.yaw, but"):
+        campaign_with(tmp_path, (VELOCITY, yaw), irreducible)
+
+
+def test_axes_that_would_flip_are_refused(tmp_path: Path) -> None:
+    steep = '825\nobliquity = { distribution = "uniform", low = 0, high = "60 deg" }\nyaw = "40 deg"'
+    with pytest.raises(CampaignError, match="yaw up to 40 deg and obliquity up to 60 deg, but their sum must"):
+        campaign_with(tmp_path, (VELOCITY, steep))
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("hit_y,hit_z,velocity\n0,0,-3\n", "a column velocity that reaches -3, but it must be greater than 0"),
+        ("hit_y,hit_z,speed\n0,0,3\n", 'line 1: got "hit_y,hit_z,speed", but the header must be hit_y,hit_z and then'),
+        ("hit_y,hit_z,spin,spin\n0,0,3,3\n", "line 1: got"),
+        ("hit_y,velocity\n0,0\n", "line 1: got"),
+    ],
+)
+def test_a_bad_list_is_told(tmp_path: Path, text: str, sentence: str) -> None:
+    (tmp_path / "hits.csv").write_text(text)
+    hits = SLOTTED_PLATE.split("[hits]\n")[1].split("[numerics]")[0].replace("4096", "64")
+    with pytest.raises(CampaignError, match=sentence):
+        campaign_with(tmp_path, (hits, 'sampling = "list"\nfile = "hits.csv"\n'))

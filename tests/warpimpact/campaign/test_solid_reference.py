@@ -1,0 +1,92 @@
+"""The solid plate of equal areal density, computed in the same run."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.campaign import run as run_module
+from warpimpact.campaign import team
+from warpimpact.campaign.run import run, run_to_file
+from warpimpact.kernels.status import Status
+from warpimpact.results import files
+
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SMALL = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 600")
+PATTERN = SMALL[SMALL.index("[plate.pattern]") : SMALL.index("[impact]")]
+pytestmark = pytest.mark.usefixtures("small_shards")
+
+
+def computed(tmp_path: Path, *changes: tuple[str, str]) -> xarray.Dataset:
+    text = SMALL
+    for change in changes:
+        assert change[0] in text
+        text = text.replace(*change)
+    (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+    return run(Campaign.from_toml(tmp_path / "a.toml"), device="cpu")
+
+
+def solids(dataset: xarray.Dataset) -> set[str]:
+    return {str(name) for name in dataset.variables if str(name).startswith("solid_")}
+
+
+def test_it_has_the_areal_density_of_the_perforated_one(tmp_path: Path) -> None:
+    plate = Campaign.from_text(SMALL, name="a", folder=tmp_path).plate
+    assert plate.solid.open_area == 0.0
+    assert plate.solid.areal_density == pytest.approx(plate.areal_density, rel=1e-14)
+    assert plate.solid.resistance == plate.resistance
+
+
+def test_a_shot_that_does_not_scatter_is_fired_once_and_meets_the_closed_form(tmp_path: Path) -> None:
+    """Without friction and degradation the work is Y·h·π R²."""
+    no_loss = [("shear_coefficient = 0.05", "shear_coefficient = 0.0"), ("degradation = 0.8 ", "degradation = 1.0 ")]
+    dataset = computed(tmp_path, *no_loss, ('fidelity = "draft"', 'fidelity = "reference"'), ("= 600", "= 4"))
+    assert dataset.sizes["solid_hit"] == 1
+    campaign = Campaign.from_toml(tmp_path / "a.toml")
+    thickness = 4e-3 * (1.0 - dataset.attrs["open_area"])
+    work = 2.6e9 * thickness * math.pi * campaign.core.max_radius**2
+    exact = math.sqrt(825.0**2 - 2.0 * work / 4e-3)
+    assert float(dataset["solid_residual_velocity"][0]) == pytest.approx(exact, abs=0.5)
+    assert float(dataset["solid_tilt"][0, 1]) == pytest.approx(0.0, abs=0.01)
+    assert int(dataset["solid_status"][0]) == Status.PERFORATED
+
+
+@pytest.mark.parametrize(
+    ("change", "shots"),
+    [
+        (('"825 m/s" ', '{ distribution = "uniform", low = 800, high = 850 } '), 256),
+        (("[plate.pattern]", 'size = ["80 mm", "80 mm"]\n\n[plate.pattern]'), 256),
+        (('["50 mm", "130 mm"]', '["50 mm", "130 mm"]\nsolid_reference = false'), 0),
+        ((PATTERN, ""), 0),
+    ],
+    ids=["scatter", "rim", "off", "solid already"],
+)
+def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_asked(
+    tmp_path: Path, change: tuple[str, str], shots: int
+) -> None:
+    dataset = computed(tmp_path, change)
+    assert dataset.sizes.get("solid_hit", 0) == shots
+    assert bool(solids(dataset)) == (shots > 0)
+
+
+def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run_module, "_MOST_SOLID", 100)
+    dataset = computed(tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '))
+    solid = dataset.solid_reference(dataset)
+    assert solid.sizes["hit"] == 100
+    np.testing.assert_array_equal(solid["impact_velocity"], dataset["impact_velocity"][:100])
+    order = np.argsort(solid["impact_velocity"].values)
+    assert (np.diff(solid["residual_velocity"].values[order]) > 0.0).all()  # the faster, the faster
+
+
+def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits):
+    (tmp_path / "a.toml").write_text(SMALL, encoding="utf-8")
+    campaign = Campaign.from_toml(tmp_path / "a.toml")
+    run_to_file(campaign, tmp_path / "one.nc", device="cpu")
+    monkeypatch.setattr(team, "_task_size", lambda kind: 2**17)
+    run_to_file(campaign, tmp_path / "many.nc", device="cpu")
+    assert_same_bits(tmp_path / "one.nc", tmp_path / "many.nc")
+    assert solids(files.read(tmp_path / "many.nc"))

@@ -1,0 +1,167 @@
+"""The stop rule of a campaign: intervals of Sobol replicates that hold as often as they say, and runs that it ends."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.analysis.summary import summary_text
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
+from warpimpact.kernels.status import Status
+from warpimpact.results import files
+from warpimpact.results.measures import Measure, Tally
+
+SameBits = Callable[[Path, Path], None]
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096\n", "")
+STOP = '[stop]\nquantity = "{}"\nhalf_width = "{}"\nmax_count = {}\n\n[output]'
+TRIALS = 150
+# 95 % of 150 trials: 142.5 ± 2.7. Three standard deviations below, and for the rule, which looks more than once, five.
+LEAST, LEAST_STOPPED = 134, 129
+pytestmark = pytest.mark.usefixtures("small_shards")
+
+
+def shard_of(values: np.ndarray, status: int = Status.PERFORATED) -> xarray.Dataset:
+    """A shard with these residual velocities [m/s], and as much tilt [degree] at its only stand-off."""
+    variables = dict.fromkeys(("residual_velocity", "deflection"), ("hit", values))
+    variables |= dict.fromkeys(("energy_loss", "contact_duration"), ("hit", values))
+    variables |= dict.fromkeys(("tilt", "pitch", "yaw", "total_yaw"), (("hit", "standoff"), values[:, None]))
+    variables["status"] = ("hit", np.full(len(values), status, dtype=np.int8))
+    return xarray.Dataset(variables, {"standoff": [0.13]}, {"compute_time": 1.0})
+
+
+def campaign(tmp_path: Path, quantity: str, half_width: str, max_count: int = 2**16, **hits: object) -> Campaign:
+    text = DRAFT.replace("[output]", STOP.format(quantity, half_width, max_count))
+    for name, value in hits.items():
+        text = text.replace(f'{name} = "sobol"' if name == "sampling" else "seed = 1", f"{name} = {value}")
+    (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
+    return Campaign.from_toml(tmp_path / "campaign.toml")
+
+
+TRUTHS = {
+    # Of U(0, 1) + U(0, 1): the triangular distribution on 0 to 2.
+    "mean(residual_velocity)": 1.0,
+    "quantile(residual_velocity, 0.125)": 0.5,
+    "P(residual_velocity > 1.5 m/s)": 0.125,
+    "P(tilt@130mm < 0.2 deg)": 0.02,
+}
+
+
+def surface(campaign: Campaign, first: int, count: int) -> np.ndarray:
+    """The sum of the two uniform numbers that a shot's hit point is made of."""
+    shots, (y, z) = campaign.sampler().shots(first, count), campaign.plate.sampled_cell
+    return shots.hit_y / y + shots.hit_z / z + 1.0
+
+
+@pytest.mark.parametrize("text", TRUTHS)
+def test_intervals_of_replicates_hold_as_often_as_they_say_and_are_narrower(text: str, tmp_path: Path) -> None:
+    scene = campaign(tmp_path, text, "0.1" if text.startswith("P") else "0.1 m/s")
+    assert scene.replicates == 16
+    held, widths = 0, []
+    for seed in range(TRIALS):
+        reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
+        tally = Tally(Measure.parse(text), replicates=16)
+        values = surface(reseeded, 0, 1024)
+        tally.add(shard_of(values[:500]))  # shards need not be multiples of the replicates
+        tally.add(shard_of(values[500:]))
+        estimate = tally.estimate()
+        held += estimate.low <= TRUTHS[text] <= estimate.high
+        widths.append(estimate.half_width)
+    alone = Tally(Measure.parse(text))
+    alone.add(shard_of(values))
+    assert held >= LEAST
+    assert np.median(widths) < 0.8 * alone.estimate().half_width
+
+
+@pytest.mark.parametrize("sampling", ["random", "sobol"])
+def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
+    half_width = {"random": "0.02 m/s", "sobol": "0.001 m/s"}[sampling]
+    scene = campaign(tmp_path, "mean(residual_velocity)", half_width, sampling=f'"{sampling}"')
+    held, ends = 0, []
+    for seed in range(TRIALS):
+        reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
+        watch = _Watch(reseeded, 2**16, _Held(256))
+        values = surface(reseeded, 0, 2**14)
+        while watch.end is None:
+            watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
+        low, high = watch.end.stop["estimate_interval"]
+        assert watch.end.stop["stop_reason"] == "half_width"
+        assert 0.5 * (high - low) <= float(half_width.split()[0])
+        held += low <= 1.0 <= high
+        ends.append(watch.end.shards)
+    assert held >= LEAST_STOPPED
+    assert np.median(ends) > 2
+
+
+@pytest.mark.parametrize(
+    ("quantity", "half_width", "sentence"),
+    [
+        ("median(tilt)", "1 deg", 'stop.quantity: got "median(tilt)", but it must be of the form mean(residual_vel'),
+        ("mean(speed)", "1 m/s", 'stop.quantity: got "speed", but it must be one of residual_velocity, deflection'),
+        ("mean(tilt)", "1 deg", 'stop.quantity: got "tilt", which needs a stand-off, as in tilt@130mm'),
+        ("mean(deflection@130mm)", "1 deg", 'stop.quantity: got "deflection", which has no stand-off'),
+        ("mean(tilt@100mm)", "1 deg", "got stop.quantity at 0.1 m, but output.standoffs are 0.05 m, 0.13 m"),
+        ("P(tilt@130mm > 30 m)", "0.01", 'stop.quantity: got "30 m", which is not an angle'),
+        ("P(broken)", "0.01", 'stop.quantity: got "broken", but it must be one of perforated, arrested'),
+        ("quantile(deflection, 1.5)", "1 deg", "stop.quantity: got the quantile 1.5, but it must lie between 0 and 1"),
+        ("mean(residual_velocity)", "1 deg", 'stop.half_width: got "1 deg", which is not a speed'),
+        ("mean(residual_velocity)", "-1 m/s", 'stop.half_width: got "-1 m/s", but it must be greater than 0'),
+    ],
+)
+def test_a_wrong_rule_is_told_in_one_sentence(quantity: str, half_width: str, sentence: str, tmp_path: Path) -> None:
+    with pytest.raises(CampaignError) as caught:
+        campaign(tmp_path, quantity, half_width)
+    assert sentence in str(caught.value)
+
+
+def test_a_rule_takes_the_place_of_the_count(tmp_path: Path) -> None:
+    scene = campaign(tmp_path, "mean(residual_velocity)", "1 m/s", max_count=3000)
+    assert len(scene.sampler()) == 3000
+    assert len(Campaign.from_toml(tmp_path / "campaign.toml", count=500).sampler()) == 500
+    again = Campaign.from_text(scene.model_dump_json(), name="text", folder=tmp_path)
+    assert again.model_dump() == scene.model_dump()
+    with pytest.raises(CampaignError, match=r"got hits.count = 7 beside stop.max_count = 3000"):
+        campaign(tmp_path, "mean(residual_velocity)", "1 m/s", max_count=3000, count="7\nseed = 1")
+    with pytest.raises(CampaignError, match=r'got stop beside hits.sampling = "grid"'):
+        campaign(tmp_path, "mean(residual_velocity)", "1 m/s", sampling='"grid"')
+
+
+def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, assert_same_bits: SameBits) -> None:
+    scene = campaign(tmp_path, "P(tilt@130mm > 30 deg)", "0.02", max_count=20000)
+    dataset = run(scene, device="cpu")
+    told = dataset.attrs
+    assert told["stop_reason"] == "half_width"
+    assert dataset.sizes["hit"] in (512, 1024, 2048, 4096)
+    low, high = told["estimate_interval"]
+    assert 0.0 < high - low <= 0.04
+    share = np.array([(dataset["tilt"].values[r::16, 1] > 30.0).mean() for r in range(16)])
+    assert told["estimate"] == pytest.approx(share.mean(), rel=1e-12)
+
+    def interrupt(standing: Standing) -> None:
+        if standing.done >= 256:
+            raise KeyboardInterrupt
+
+    straight, resumed = tmp_path / "straight.nc", tmp_path / "resumed.nc"
+    run_to_file(scene, straight, device="cpu,cpu")
+    with pytest.raises(Interrupted):
+        run_to_file(scene, resumed, device="cpu", progress=interrupt)
+    run_to_file(scene, resumed, device="cpu", resume=True)
+    assert_same_bits(straight, resumed)
+    stored = files.read(resumed)
+    assert stored.sizes == dataset.sizes
+    assert stored.attrs["estimate"] == told["estimate"]
+    assert "P(tilt@130mm > 30 deg) = 0." in summary_text(stored)
+    last = stored.sizes["hit"] - 1
+    assert replay(stored, last, folder=tmp_path).attrs["agreement"] == "bit-identical"
+
+
+def test_a_rule_that_is_never_met_ends_at_its_largest_count(tmp_path: Path) -> None:
+    dataset = run(campaign(tmp_path, "mean(residual_velocity)", "1 mm/s", max_count=600), device="cpu")
+    assert dataset.sizes["hit"] == 600
+    assert dataset.attrs["stop_reason"] == "max_count"
+    assert "max_count ended it" in summary_text(dataset)

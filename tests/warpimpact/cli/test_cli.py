@@ -1,0 +1,142 @@
+"""The command: help, version, and exit code 2 with one sentence and nothing written."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+import xarray
+
+from warpimpact.cli import main
+from warpimpact.results import files
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"], ["plate"]]
+)
+def test_help_shows_how(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main([*command, "--help"])
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith(" ".join(["usage: warpimpact", *command]))
+    assert "example: warpimpact" in shown
+
+
+def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--version"])
+    assert ended.value.code == 0
+    assert capsys.readouterr().out == f"warpimpact {version('warpimpact')}\n"
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, warpimpact.cli\n"
+        "try: warpimpact.cli.main(['run', '--help'])\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'pint', 'xarray', 'matplotlib', 'warp', 'tqdm'}\n"
+        "sys.stderr.write(' '.join(heavy & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["run"], ["run", "a.toml", "--count", "many"]])
+def test_a_wrong_command_line_ends_with_2(arguments: list[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    assert ended.value.code == 2
+
+
+def _refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The sentence of a command that must end with 2 and say one thing only."""
+    assert main(arguments) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.startswith("warpimpact: error: ")
+    assert shown.err.count("\n") == 1
+    return shown.err.removeprefix("warpimpact: error: ").rstrip("\n")
+
+
+def test_a_bad_campaign_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("wrong.toml").write_text(SLOTTED_PLATE.read_text().replace("= 0.8 ", "= 1.8 "))
+    sentence = _refusal(["run", "wrong.toml"], capsys)
+    assert sentence == "wrong.toml: plate.degradation: got 1.8, but it must be less than or equal to 1"
+    assert [path.name for path in folder.iterdir()] == ["wrong.toml"]
+
+
+def test_a_count_of_0_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sentence = _refusal(["run", str(SLOTTED_PLATE), "--count", "0"], capsys)
+    assert sentence == f"{SLOTTED_PLATE}: hits.count: got 0, but it must be greater than or equal to 1"
+    assert not list(folder.iterdir())
+
+
+def test_an_existing_output_is_kept(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("slotted_plate.nc").write_text("precious")
+    sentence = _refusal(["run", str(SLOTTED_PLATE)], capsys)
+    assert sentence == "slotted_plate.nc: exists already; name another file or give --overwrite"
+    assert Path("slotted_plate.nc").read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("output", "sentence"),
+    [
+        ("nowhere/a.nc", "nowhere: cannot be written into (No such file or directory)"),
+        ("file/a.nc", "file: cannot be written into (Not a directory)"),
+        (".", ".: is a folder, but the result is one file"),
+    ],
+)
+def test_an_output_that_cannot_be_written_is_refused_before_computing(
+    folder: Path, capsys: pytest.CaptureFixture[str], output: str, sentence: str
+) -> None:
+    Path("file").touch()
+    assert _refusal(["run", str(SLOTTED_PLATE), "-o", output, "--overwrite"], capsys) == sentence
+    assert [path.name for path in folder.iterdir()] == ["file"]
+
+
+def test_an_absent_device_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sentence = _refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"], capsys)
+    assert 'got "cuda:99"' in sentence
+    assert not list(folder.iterdir())
+
+
+def test_memory_that_cannot_be_had_is_told(
+    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def no_memory(*_: object, **__: object) -> None:
+        raise MemoryError("Unable to allocate 8 TiB")
+
+    monkeypatch.setattr("warpimpact.campaign.run.run_to_file", no_memory)
+    assert _refusal(["run", str(SLOTTED_PLATE)], capsys) == f"{SLOTTED_PLATE}: Unable to allocate 8 TiB"
+    assert not list(folder.iterdir())
+
+
+def test_what_is_no_result_is_not_plotted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("a.nc").write_text("no netCDF")
+    assert _refusal(["plot", "a.nc"], capsys).startswith("a.nc: cannot be read as a netCDF file")
+    assert [path.name for path in folder.iterdir()] == ["a.nc"]
+
+
+def test_results_are_drawn_beside_each_other(
+    folder: Path, capsys: pytest.CaptureFixture[str], make_result: Callable[..., xarray.Dataset]
+) -> None:
+    Path("b").mkdir()
+    for path in ("a.nc", "b/a.nc"):
+        files.write(make_result(100), Path(path))
+    assert main(["plot", "a.nc", "b/a.nc"]) == 0
+    assert capsys.readouterr().out.split() == [
+        f"a_a_{name}.png" for name in ("residual_velocity", "deflection", "tilt")
+    ]
+    assert _refusal(["plot", "a.nc", "a.nc"], capsys) == "the same result is given twice"

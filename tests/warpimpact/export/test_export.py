@@ -1,0 +1,116 @@
+"""Exports hold what the result holds: tables read back, and VTK files that VTK itself reads."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray
+
+from warpimpact import Campaign, to_dataframe
+from warpimpact.analysis import summary
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.cli import main
+from warpimpact.export.paraview import AROUND, write_vtk
+from warpimpact.kernels.status import Status
+from warpimpact.results import files
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
+ResultMaker = Callable[..., xarray.Dataset]
+
+
+def test_table_has_a_row_per_hit_and_a_column_per_standoff_and_axis(make_result: ResultMaker) -> None:
+    dataset = make_result(np.tile(MIXED, 5))
+    frame = to_dataframe(dataset)
+    assert list(frame.index) == list(range(20))
+    assert frame["status"].tolist() == ["perforated", "arrested", "ricocheted", "missed"] * 5
+    np.testing.assert_array_equal(frame["tilt_130mm"], dataset["tilt"][:, 1])
+    np.testing.assert_array_equal(frame["angular_velocity_y"], dataset["angular_velocity"][:, 1])
+    np.testing.assert_array_equal(frame["hit_z"], dataset["hit_z"])
+    per_hit = sum(
+        dataset[name].size // 20 for name in {*dataset.data_vars, "hit_y", "hit_z"} if "hit" in dataset[name].dims
+    )
+    assert frame.shape == (20, per_hit)
+
+
+def test_csv_holds_every_bit_whatever_the_slices(
+    make_result: ResultMaker, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dataset = make_result(np.tile(MIXED, 5))
+    files.write(dataset, tmp_path / "a.nc")
+    assert main(["export", str(tmp_path / "a.nc")]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'a.csv'}\n"
+    read = pd.read_csv(tmp_path / "a.csv", index_col="hit", engine="python")
+    pd.testing.assert_frame_equal(
+        read, to_dataframe(dataset), check_exact=True, check_categorical=False, check_dtype=False
+    )
+    monkeypatch.setattr(summary, "SLICE", 7)
+    assert main(["export", str(tmp_path / "a.nc"), "-o", str(tmp_path / "b.csv")]) == 0
+    assert (tmp_path / "b.csv").read_bytes() == (tmp_path / "a.csv").read_bytes()
+    assert main(["export", str(tmp_path / "a.nc")]) == 2
+    assert "a.csv: exists already" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def history() -> xarray.Dataset:
+    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
+    return replay(run(Campaign.from_text(text, name="a", folder=Path(), count=2), device="cpu"), 1, folder=Path())
+
+
+def series(path: Path) -> list[tuple[float, Path]]:
+    return [
+        (float(e.attrib["timestep"]), path.parent / e.attrib["file"]) for e in ElementTree.parse(path).iter("DataSet")
+    ]
+
+
+def test_vtk_reads_the_core_and_the_plate_back(history: xarray.Dataset, tmp_path: Path) -> None:
+    pyvista = pytest.importorskip("pyvista")
+    core, plate = (series(path) for path in write_vtk(history, tmp_path / "hit"))
+    assert [time for time, _ in core] == history["time"].values.tolist()
+    assert [time for time, _ in plate] == history["snapshot"].values.tolist()
+    for step in (0, -1):
+        surface, now = pyvista.read(core[step][1]), history.isel(time=step)
+        nose = float(history["station"].max()) * now["core_axis"].values + now["plate_position"].values
+        np.testing.assert_allclose(surface.points[:AROUND].mean(axis=0), nose, atol=1e-7)
+        stations, radius = history["station"].values, history["core_radius"].values
+        polygon = 0.5 * AROUND * np.sin(2.0 * np.pi / AROUND) / np.pi
+        cut = (np.diff(-stations) * (radius[1:] ** 2 + radius[1:] * radius[:-1] + radius[:-1] ** 2)).sum() / 3.0
+        assert surface.is_manifold
+        assert surface.volume == pytest.approx(np.pi * polygon * cut, rel=1e-3)  # closed, normals outwards
+        np.testing.assert_allclose(surface.field_data["core_force"][0], now["force"], rtol=1e-12)
+        np.testing.assert_allclose(surface["velocity"].mean(axis=0)[0], float(now["velocity"][0]), rtol=0.02)
+    layer = pyvista.read(plate[-1][1])
+    assert layer.bounds[:2] == (0.0, pytest.approx(4e-3))
+    centres = layer.cell_centers().points
+    share = history["resistance_share"][-1].sel(
+        cell_y=xarray.DataArray(centres[:, 1], dims="cell"),
+        cell_z=xarray.DataArray(centres[:, 2], dims="cell"),
+        method="nearest",
+    )
+    np.testing.assert_array_equal(layer["resistance_share"], share)
+
+
+def test_command_writes_a_new_folder_for_a_hit(
+    history: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("pyvista")
+    files.write(history, tmp_path / "hit.nc")
+    assert main(["export", str(tmp_path / "hit.nc")]) == 0
+    assert capsys.readouterr().out == "".join(f"{tmp_path / 'hit_vtk' / name}.pvd\n" for name in ("core", "plate"))
+    assert main(["export", str(tmp_path / "hit.nc")]) == 2
+    assert "hit_vtk: exists already; name a new folder" in capsys.readouterr().err
+    assert {path.name for path in tmp_path.iterdir()} == {"hit.nc", "hit_vtk"}
+
+
+def test_without_pyvista_the_way_to_it_is_told(
+    history: xarray.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(files.OutputError, match=r"hit: VTK needs PyVista: pip install 'warpimpact\[vtk\]'"):
+        write_vtk(history, tmp_path / "hit")
+    assert not list(tmp_path.iterdir())

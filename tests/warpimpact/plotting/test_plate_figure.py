@@ -1,0 +1,129 @@
+"""The picture of a plate: to scale, holes where they are, its numbers; and the campaigns that come with the package."""
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+
+from warpimpact import Campaign
+from warpimpact.campaign.plates import read_plates
+from warpimpact.cli import main
+from warpimpact.plotting import plate_figure
+from warpimpact.scene import ConeCore, MaskPattern, NoPattern, Plate, SlotPattern
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+MM = 1e-3
+SLOTS = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
+CORE = ConeCore(diameter="6 mm", length="20 mm", mass="4 g")
+STEEL, HOLE = to_rgb("0.72"), (1.0, 1.0, 1.0)
+
+
+def plate(**changes: object) -> Plate:
+    return Plate(**{"thickness": "4 mm", "resistance": "2 GPa", "pattern": SLOTS} | changes)
+
+
+def colours(figure: plt.Figure, *points: tuple[float, float]) -> np.ndarray:
+    """Colours of a picture at points y, z [mm] of its plate, shape [points, 3]."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3] / 255
+    across, up = figure.axes[0].transData.transform(points).round().astype(int).T
+    return pixels[-1 - up, across]
+
+
+def test_holes_are_where_they_are_and_to_scale() -> None:
+    figure = plate_figure(plate())
+    shown = colours(figure, (0, 5), (0, 7), (9, 9), (9, 0), (1.5, 0), (2.6, 0), (-16, 21), (20, 1))
+    np.testing.assert_allclose(shown, [HOLE, STEEL, HOLE, STEEL, HOLE, STEEL, HOLE, STEEL], atol=0.01)
+    axes = figure.axes[0]
+    assert axes.get_xlim() == pytest.approx((-24, 24))
+    box = axes.get_window_extent()
+    assert box.width / 48 == pytest.approx(box.height / np.ptp(axes.get_ylim()), rel=1e-3)
+
+
+def test_the_core_is_drawn_as_wide_as_it_is() -> None:
+    figure = plate_figure(plate(), CORE)
+    tinted = colours(figure, (0, 2.7), (0, 3.4), (2.8, 0), (3.3, 0))
+    assert np.ptp(tinted, axis=1).round(2).astype(bool).tolist() == [True, False, True, False]
+    assert any("largest section of the core, ⌀ 6.00 mm" in text.get_text() for text in figure.legends[0].get_texts())
+
+
+def test_a_finite_plate_is_drawn_to_its_rim_without_what_the_margin_leaves_out() -> None:
+    figure = plate_figure(plate(size=["50 mm", "44 mm"], margin="3 mm"), title="a plate")
+    axes = figure.axes[0]
+    assert (*axes.get_xlim(), *axes.get_ylim()) == pytest.approx((-25, 25, -22, 22))
+    np.testing.assert_allclose(colours(figure, (0, 16), (16, 1), (8, 9)), [STEEL, HOLE, HOLE], atol=0.01)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
+        "plate, 4 mm thick",
+        "hole",
+        "unit cell",
+        "margin, 3 mm",
+    ]
+    assert figure.get_suptitle() == "a plate"
+
+
+def test_numbers_stand_above_the_picture() -> None:
+    title = plate_figure(plate()).axes[0].get_title()
+    # (32 + 4π)/128 of 31.4 kg/m² is hole.
+    assert " ".join(title.split()) == "open area 34.8%, smallest ligament 4.00 mm, areal density 20.5 kg/m²"
+
+
+def test_islands_of_a_mask_are_steel_and_its_resolution_is_told(tmp_path: Path) -> None:
+    cells = np.ones((16, 16))
+    cells[3:13, 3:13] = 0
+    cells[6:10, 6:10] = 1
+    np.save(tmp_path / "a.npy", cells)
+    figure = plate_figure(plate(pattern=MaskPattern(file=tmp_path / "a.npy", cell_size="1 mm")))
+    np.testing.assert_allclose(colours(figure, (0.5, 0.5), (-4, 1), (-6, 1)), [STEEL, HOLE, STEEL], atol=0.01)
+    title = " ".join(figure.axes[0].get_title().split())
+    assert "smallest ligament 6.00 mm (resolved to 1 mm)" in title
+
+
+def test_a_solid_plate_is_steel_as_far_as_the_core_needs() -> None:
+    figure = plate_figure(plate(pattern=NoPattern()), CORE)
+    assert figure.axes[0].get_xlim() == pytest.approx((-6, 6))
+    np.testing.assert_allclose(colours(figure, (0, 5), (4, 0)), [STEEL, STEEL], atol=0.01)
+    assert "ligament" not in figure.axes[0].get_title()
+
+
+@pytest.mark.parametrize(
+    ("name", "ligament"),
+    [
+        ("slotted_plate", "4.00 mm"),
+        ("round_holes_9mm", "3.50 mm"),
+        ("round_holes_11mm", "4.50 mm"),
+        ("triangular_holes", "4.00 mm"),
+    ],
+)
+def test_plates_of_the_library_have_the_ligaments_that_they_say(
+    name: str, ligament: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["plate", str(CAMPAIGNS / f"{name}.toml")]) == 0
+    title, thickness, area, smallest, density, picture = capsys.readouterr().out.splitlines()
+    assert title == Campaign.from_toml(CAMPAIGNS / f"{name}.toml").title
+    assert thickness.split() == ["thickness", "4", "mm"]
+    assert smallest.split("ligament")[1].strip() == ligament
+    # Of 31.4 kg/m² of steel what the holes leave, in the digits shown.
+    share = float(area.split()[-1].rstrip("%")) / 100
+    assert float(density.split()[-2]) == pytest.approx(31.4 * (1 - share), abs=0.07)
+    assert picture == f"{name}_plate.png"
+    assert plt.imread(picture).shape[2] == 4
+
+
+def test_every_campaign_of_the_library_can_be_read_and_says_its_question() -> None:
+    for path in CAMPAIGNS.glob("*.toml"):
+        text = path.read_text(encoding="utf-8")
+        read_plates(path) if "[[plate]]" in text else Campaign.from_toml(path)
+        assert text.startswith("# ")
+
+
+def test_a_picture_has_a_name_of_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml"), "-o", str(tmp_path / "a.gif")]) == 2
+    assert "a.gif: must end with .png, .pdf or .svg" in capsys.readouterr().err
+    assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml"), "-o", str(tmp_path / "none" / "a.png")]) == 2
+    assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml"), "-o", str(tmp_path / "a.svg")]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["a.svg"]

@@ -1,0 +1,297 @@
+"""The report: its choice of hits, what it says and escapes, and how it works in a real browser."""
+
+import html
+import json
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.analysis.comparison import compare, comparison_text
+from warpimpact.analysis.effectiveness import effectiveness, number_text
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.cli import main
+from warpimpact.kernels.status import Status
+from warpimpact.plotting.trajectory import poses_behind, poses_in_plate, silhouette
+from warpimpact.report import hits, report
+from warpimpact.results import files
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+TRAJECTORIES = 6
+ResultMaker = Callable[..., xarray.Dataset]
+
+
+def data_of(path: Path) -> dict:
+    """What the page's script reads."""
+    (found,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', path.read_text())
+    return json.loads(found)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Holds the results of two plates and their report."""
+    folder = tmp_path_factory.mktemp("report")
+    text = SLOTTED_PLATE.read_text().replace('"standard"', '"draft"')
+    for name, width in (("narrow", "4 mm"), ("<b>wide", "5 mm")):
+        changed = text.replace('width = "4 mm"', f'width = "{width}"').replace("7.62 mm", f"{name} </script>")
+        files.write(
+            run(Campaign.from_text(changed, name=name, folder=folder, count=400), device="cpu"), folder / f"{name}.nc"
+        )
+    command = ["report", *(str(folder / f"{name}.nc") for name in ("narrow", "<b>wide")), "-o", str(folder / "a.html")]
+    assert main([*command, "--trajectories", str(TRAJECTORIES)]) == 0
+    return folder
+
+
+def test_page_holds_the_hits_of_each_result(folder: Path) -> None:
+    page = data_of(folder / "a.html")
+    for name, shown in zip(("narrow", "<b>wide"), page["results"], strict=True):
+        dataset = files.read(folder / f"{name}.nc")
+        assert shown["number"] == list(range(400))
+        np.testing.assert_allclose(shown["y"], dataset["hit_y"] * 1e3, rtol=1e-4)
+        np.testing.assert_allclose(shown["columns"]["tilt at 130 mm"], dataset["tilt"][:, 1], rtol=1e-4)
+        assert np.shape(shown["nearest"]) == (160, 160)
+        assert len(shown["trajectories"]) == TRAJECTORIES
+        fastest = dataset["residual_velocity"].values.argmax()
+        assert str(fastest) in shown["trajectories"]
+        assert str(shown["first"]) in shown["trajectories"]
+        history = shown["trajectories"][str(fastest)]
+        assert [len(history[part]) for part in ("inside", "behind")] == [5, 2]
+        y, tilt = history["behind"][1]["y"], dataset["tilt"][fastest, 1]
+        assert np.ptp(y[0]) == pytest.approx(27.86 * np.cos(np.radians(tilt)), abs=3.0)
+
+
+def test_outlines_keep_the_shape_with_few_points(folder: Path) -> None:
+    history = replay(files.read(folder / "narrow.nc"), 3, folder=folder)
+    drawn = hits.trajectory_data(history)
+    for part, poses in (("inside", poses_in_plate(history)), ("behind", poses_behind(history))):
+        for core, pose in zip(drawn[part], poses.values(), strict=True):
+            for view in "yz":
+                whole, few = silhouette(history, pose, view) * 1e3, np.array(core[view]).T
+                assert len(few) < 150
+                np.testing.assert_allclose([few.min(0), few.max(0)], [whole.min(0), whole.max(0)], atol=0.02)
+                assert area(few) == pytest.approx(area(whole), rel=4e-3)
+
+
+def area(polygon: np.ndarray) -> float:
+    x, y = polygon.T
+    return abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1))) / 2
+
+
+def test_page_says_how_well_each_plate_protects(folder: Path) -> None:
+    text = html.unescape(re.sub(r"<[^>]*>", " ", (folder / "a.html").read_text()))
+    for name in ("narrow", "<b>wide"):
+        for measure in effectiveness(files.read(folder / f"{name}.nc")):
+            numbers = (measure.value, measure.solid, measure.ratio)
+            row = r"\s+.*\s+".join(re.escape(number_text(number)) for number in numbers)
+            assert re.search(rf"{re.escape(measure.label)}.*\s+{row}", text)
+            assert measure.definition in text
+
+
+def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_path: Path) -> None:
+    text = html.unescape((folder / "a.html").read_text())
+    names = ["narrow", "<b>wide"]
+    with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
+        assert comparison_text(compare([narrow, wide], names)) in text
+    assert text.count('<img src="data:image/png;base64,') == 1
+    files.write(make_result(100), tmp_path / "other.nc")
+    page = tmp_path / "a.html"
+    command = ["report", str(folder / "narrow.nc"), str(tmp_path / "other.nc"), "-o", str(page), "--trajectories", "0"]
+    assert main(command) == 0
+    assert "<pre>other: " in page.read_text()
+
+
+def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
+    text = (folder / "a.html").read_text()
+    own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
+    assert not re.search(r'(src|href)="(?!data:)', own)
+    assert "default-src 'none'" in own
+    assert "&lt;b&gt;wide" in own
+    assert "<b>" not in own
+    assert own.count("</script>") == 1  # that of the data; titles hold others
+    assert len(text) < 10e6
+
+
+def test_large_results_are_thinned_evenly_and_it_is_said(
+    make_result: ResultMaker, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dataset = make_result(5000)
+    files.write(dataset, tmp_path / "a.nc")
+    monkeypatch.setattr(report, "MOST_HITS", 1000)
+    assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
+    assert "the map shows 1000 of the 5000 hits" in (tmp_path / "a.html").read_text()
+    (shown,) = data_of(tmp_path / "a.html")["results"]
+    np.testing.assert_allclose(shown["y"], dataset["hit_y"][shown["number"]] * 1e3, rtol=1e-4)
+    counts, *_ = np.histogram2d(shown["y"], shown["z"], bins=4)
+    assert counts.min() > 30  # 62.5 each
+
+
+def test_thinning_keeps_parts_of_no_sampling_out() -> None:
+    # Every fifth hit of a grid with rows of five lies on one line.
+    y, z = np.meshgrid(np.arange(5.0), np.arange(200.0))
+    grid = xarray.Dataset({"y": ("hit", y.ravel()), "z": ("hit", z.ravel())})
+    kept = hits.thinned(grid, 200)
+    assert kept.sizes["hit"] == 200
+    assert (kept["y"] == grid["y"][kept["hit"].values]).all()
+    assert np.bincount(kept["y"].astype(int)).min() > 20
+    assert hits.thinned(grid, 1000)["hit"].values.tolist() == list(range(1000))
+    assert {3, 999} <= set(hits.thinned(grid, 10, keep=[3, 999])["hit"].values.tolist())
+
+
+def test_trajectories_are_of_the_worst_and_of_evenly_spread_hits(make_result: ResultMaker) -> None:
+    dataset = make_result(np.where(np.arange(512) % 2, Status.PERFORATED, Status.ARRESTED))
+    chosen = hits.worst_and_spread(dataset, 16)
+    assert chosen[:4] == [511, 509, 507, 505]  # the velocity rises with the number
+    assert len(set(chosen)) == 16
+    points = np.stack([dataset["hit_y"], dataset["hit_z"]], axis=-1)
+    offset = points[:, None] - points[chosen]
+    offset -= dataset.attrs["plate_period"] * np.round(offset / dataset.attrs["plate_period"])
+    assert np.linalg.norm(offset, axis=-1).min(axis=1).max() < 4e-3  # of a cell of 16 mm x 8 mm
+    assert len(hits.worst_and_spread(dataset.isel(hit=slice(5)), 16)) == 5
+    assert hits.worst_and_spread(dataset, 16, first=[7, 509])[:5] == [7, 509, 511, 507, 505]
+    some = dataset.isel(hit=slice(7, None)).assign_coords(hit=np.arange(7, 512))
+    assert hits.worst_and_spread(some, 16, first=[7])[:5] == [7, 511, 509, 507, 505]
+
+
+@pytest.mark.parametrize("status", [Status.ARRESTED, Status.MISSED])
+def test_hits_without_values_or_cover_are_reported(make_result: ResultMaker, tmp_path: Path, status: Status) -> None:
+    files.write(make_result([status] * 8), tmp_path / "a.nc")
+    assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
+    (shown,) = data_of(tmp_path / "a.html")["results"]
+    assert shown["nearest"] is None
+    assert (shown["columns"]["residual velocity"][0] is None) == (status == Status.ARRESTED)
+
+
+def test_what_is_missing_is_told_and_nothing_written(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result, page = str(folder / "narrow.nc"), str(tmp_path / "a.html")
+
+    def lost(*_: object, **__: object) -> None:
+        raise CampaignError("the campaign in the result: hits.file: there is no file hits.csv")
+
+    monkeypatch.setattr(report, "replay", lost)
+    for command, sentence in (
+        (["-o", page, "--study", result], 'not a study of warpimpact, it has no variable "'),
+        (["-o", str(folder / "a.html")], "a.html: exists already"),
+        ([result, "-o", page], "the same result is given twice"),
+        (["-o", page], "hits.csv; --campaign-folder tells where the campaign's files are, --trajectories 0 needs none"),
+    ):
+        assert main(["report", result, *command]) == 2
+        assert sentence in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator["Browser"]:
+    programs = shutil.which("chromium"), shutil.which("chromedriver")
+    if None in programs:
+        pytest.skip("needs the programs chromium and chromedriver (Debian: chromium, chromium-driver)")
+    browser = Browser(*programs)
+    yield browser
+    browser.driver.quit()
+
+
+class Browser:
+    """A headless Chromium."""
+
+    def __init__(self, chromium: str, chromedriver: str) -> None:
+        from selenium import webdriver
+
+        options = webdriver.ChromeOptions()
+        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+            options.add_argument(argument)
+        options.binary_location = chromium
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(chromedriver))
+
+    def open(self, page: Path, width: int) -> None:
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600},
+        )
+        self.driver.get(page.as_uri())
+        self.wait(lambda: self.find("#map-1 .nsewdrag") and self.find("#map-0 .nsewdrag"))
+
+    def find(self, selector: str) -> list:
+        return self.driver.find_elements("css selector", selector)
+
+    def text(self, selector: str) -> str:
+        return "\n".join(element.text for element in self.find(selector))
+
+    def wait(self, condition: Callable[[], object]) -> None:
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        WebDriverWait(self.driver, 30).until(lambda _: condition())
+
+    def point_at(self, y: float, z: float, *, click: bool = False) -> None:
+        """Move to a place [mm] of the first map, 16 mm x 16 mm in size."""
+        from selenium.webdriver.common.action_chains import ActionChains
+
+        (place,) = self.find("#map-0 .nsewdrag")
+        self.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", place)
+        right, down = y / 16 * place.size["width"], -z / 16 * place.size["height"]
+        action = ActionChains(self.driver).move_to_element_with_offset(place, round(right) - 2, round(down))
+        action = action.pause(0.2).move_by_offset(2, 0).pause(0.2)
+        (action.click() if click else action).perform()
+
+    def errors(self) -> list[str]:
+        return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Browser, folder: Path, width: int) -> None:
+    dataset = files.read(folder / "narrow.nc")
+    points = np.stack([dataset["hit_y"], dataset["hit_z"]], axis=-1)
+    place = np.array([-3e-3, 2.5e-3])
+    near = np.argsort(np.linalg.norm(points - place, axis=1))[:6].tolist()
+    browser.open(folder / "a.html", width)
+    assert "Trajectory of hit" in browser.text("#note-0")
+
+    browser.point_at(*place * 1e3)
+    browser.wait(lambda: "hit " in browser.text("#map-0 .hovertext"))
+    shown = browser.text("#map-0 .hovertext")
+    hit = int(re.search(r"hit (\d+): perforated", shown)[1])
+    assert hit in near
+    assert f"residual velocity: {float(dataset['residual_velocity'][hit]):.4g} m/s" in shown
+
+    browser.point_at(*place * 1e3, click=True)
+    browser.wait(lambda: browser.text("#told-0").startswith("hit ") and "nearest" in browser.text("#note-0"))
+    picked = int(re.match(r"hit (\d+): perforated", browser.text("#told-0"))[1])
+    assert picked in near
+    trajectories = [int(hit) for hit in data_of(folder / "a.html")["results"][0]["trajectories"]]
+    away = points[trajectories] - points[picked]
+    away -= 16e-3 * np.round(away / 16e-3)
+    nearest = trajectories[int(np.linalg.norm(away, axis=1).argmin())]
+    assert f"Hit {picked} has no trajectory in this report. Shown is hit {nearest}," in browser.text("#note-0")
+    for views, cores in (("#passage-0", 10), ("#flight-0", 6)):
+        assert len(browser.find(f"{views} .scatterlayer .trace")) == cores
+    assert browser.errors() == []
+    page = browser.driver.execute_script("return document.documentElement.scrollWidth")
+    assert page <= width
+
+
+def test_browser_changes_the_map_and_keeps_one_scale(browser: Browser, folder: Path) -> None:
+    browser.open(folder / "a.html", 1280)
+    for key in ("tilt at 130 mm", "pitch at 50 mm", "status"):
+        browser.driver.execute_script(
+            "const picker = document.getElementById('variable'); picker.value = arguments[0];"
+            "picker.dispatchEvent(new Event('change'))",
+            key,
+        )
+        scales = browser.driver.execute_script(
+            "return [0, 1].map((k) => document.getElementById(`map-${k}`).data[0]).map((t) => [t.zmin, t.zmax])"
+        )
+        assert scales[0] == scales[1]
+        if key == "tilt at 130 mm":
+            largest = max(float(files.read(folder / f"{name}.nc")["tilt"].max()) for name in ("narrow", "<b>wide"))
+            assert scales[0][1] == pytest.approx(largest, rel=1e-4)
+        if key == "pitch at 50 mm":
+            assert scales[0][0] == -scales[0][1]
+    assert browser.errors() == []

@@ -1,0 +1,113 @@
+"""Scatter: the distribution asked for, and shot k a function of seed and k alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from warpimpact import Impact, Plate
+from warpimpact.scene import Hits, NoPattern, Sampler, Scatter, Shots
+from warpimpact.scene.scatter import QUANTITIES
+
+PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=NoPattern())
+IMPACT = Impact(velocity=820.0)
+SCATTER = Scatter(
+    velocity={"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"},
+    obliquity={"distribution": "uniform", "low": "0 deg", "high": "10 deg"},
+    resistance={"distribution": "lognormal", "median": "2 GPa", "sigma": 0.05},
+)
+
+
+def sampler(sampling: str, count: int, *, scatter: Scatter = SCATTER, replicates: int = 1, **hits: int) -> Sampler:
+    return Sampler(IMPACT, Hits(sampling=sampling, count=count, **hits), PLATE, scatter, replicates)
+
+
+def same(one: Shots, other: Shots) -> bool:
+    return one.columns.keys() == other.columns.keys() and all(
+        np.array_equal(one.columns[name], other.columns[name]) for name in one.columns
+    )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "expected"),
+    [
+        ({"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"}, stats.norm(820, 10)),
+        (
+            {"distribution": "truncated_normal", "mean": 820, "std": 10, "low": "0.81 km/s", "high": 840},
+            stats.truncnorm(-1, 2, 820, 10),
+        ),
+        ({"distribution": "uniform", "low": 800, "high": 840}, stats.uniform(800, 40)),
+        ({"distribution": "triangular", "low": 800, "mode": 830, "high": 840}, stats.triang(0.75, 800, 40)),
+        ({"distribution": "lognormal", "median": 820, "sigma": 0.1}, stats.lognorm(0.1, scale=820)),
+    ],
+    ids=lambda value: value["distribution"] if isinstance(value, dict) else "",
+)
+@pytest.mark.parametrize("sampling", ["sobol", "random", "grid"])
+def test_draws_follow_the_distribution(parameters: dict[str, object], expected: object, sampling: str) -> None:
+    shots = sampler(sampling, 4096, scatter=Scatter(velocity=parameters)).shots(0, 4096)
+    assert stats.kstest(shots.velocity, expected.cdf).pvalue > 1e-3
+    assert abs(stats.spearmanr(shots.velocity, shots.hit_y).statistic) < 0.06  # 4096 independent pairs: ± 0.016
+
+
+def test_a_discrete_distribution_gives_its_values_as_often_as_its_weights_say() -> None:
+    scatter = Scatter(velocity={"distribution": "discrete", "values": ["830 m/s", 810], "weights": [1, 3]})
+    values, counts = np.unique(sampler("sobol", 4096, scatter=scatter).shots(0, 4096).velocity, return_counts=True)
+    assert values.tolist() == [810.0, 830.0]
+    assert counts.tolist() == [3072, 1024]  # a net is exact
+
+
+@pytest.mark.parametrize(("sampling", "replicates"), [("sobol", 1), ("sobol", 8), ("random", 1)])
+def test_a_shot_depends_on_the_seed_and_its_number_alone(sampling: str, replicates: int) -> None:
+    whole = sampler(sampling, 1000, seed=3, replicates=replicates).shots(0, 1000)
+    asked = sampler(sampling, 1000, seed=3, replicates=replicates)
+    for first, count in ((600, 100), (0, 7), (997, 50), (7, 300), (999, 1), (6, 1)):  # any order, any batch
+        assert same(asked.shots(first, count), whole[first : first + count])
+    longer = sampler(sampling, 5000, seed=3, replicates=replicates)
+    assert same(longer.shots(0, 1000), whole)
+    assert not same(sampler(sampling, 1000, seed=4, replicates=replicates).shots(0, 1000), whole)
+
+
+def test_what_else_scatters_changes_no_draw() -> None:
+    for sampling in ("sobol", "random"):
+        alone = sampler(sampling, 64, scatter=Scatter(velocity=SCATTER.velocity)).shots(0, 64)
+        assert np.array_equal(alone.velocity, sampler(sampling, 64).shots(0, 64).velocity)
+
+
+def test_far_shots_cost_what_near_ones_do() -> None:
+    for sampling in ("sobol", "random"):
+        far = sampler(sampling, 2**26).shots(2**26 - 10, 100)
+        assert len(far) == 10
+        assert len(np.unique(far.velocity)) == 10
+
+
+def test_replicates_are_independent_nets() -> None:
+    shots = sampler("sobol", 8 * 256, replicates=8).shots(0, 8 * 256)
+    for replicate in range(8):
+        y, z = (values[replicate::8] for values in (shots.hit_y, shots.hit_z))
+        counts = np.histogram2d(y / PLATE.sampled_cell[0], z / PLATE.sampled_cell[1], bins=16, range=[[-0.5, 0.5]] * 2)
+        assert (counts[0] == 1).all()
+    assert len(np.unique(shots.hit_y)) == 8 * 256
+
+
+def test_a_grid_is_shot_again_with_other_draws() -> None:
+    shots = sampler("grid", 16, repeats=3).shots(0, 100)
+    assert len(shots) == 48
+    assert np.array_equal(shots.hit_y[:16], shots.hit_y[32:])
+    assert len(np.unique(shots.velocity)) == 48
+    assert same(sampler("grid", 16, repeats=2).shots(0, 32), shots[:32])
+
+
+def test_columns_of_a_list_override(tmp_path: Path) -> None:
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z,velocity,yaw\n0,0,700,0.1\n0.001,0,710,0.2\n")
+    hits = Hits(sampling="list", file=tmp_path / "hits.csv", seed=2, repeats=2)
+    shots = Sampler(Impact(velocity=820, yaw=0.3), hits, PLATE, SCATTER).shots(0, 4)
+    assert shots.velocity.tolist() == [700.0, 710.0] * 2
+    assert shots.yaw.tolist() == [0.1, 0.2] * 2
+    assert len(np.unique(shots.obliquity)) == 4
+
+
+def test_every_quantity_has_its_place() -> None:
+    assert list(Scatter.model_fields) == list(QUANTITIES)
+    assert all(name in Impact.model_fields for name, quantity in QUANTITIES.items() if quantity.table == "impact")
+    assert all(name in Plate.model_fields for name, quantity in QUANTITIES.items() if quantity.table == "plate")

@@ -1,0 +1,127 @@
+"""Rings of the core: a closed surface, whose areas and volume are the core's."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact.scene import (
+    ConeCore,
+    Core,
+    OgiveCore,
+    PolynomialCore,
+    ProfileCore,
+)
+from warpimpact.solver.rings import BEHIND, azimuths_of, rings_of
+
+PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, density=7850.0)
+CONE = ConeCore(diameter=6.0e-3, length=20.0e-3, cone_length=12.0e-3, density=7850.0)
+TABLE = ProfileCore(s=(0.0, 3e-3, 11e-3, 20e-3), r=(1e-3, 2e-3, 3e-3, 2.5e-3), density=7850.0)
+CORES = pytest.mark.parametrize("core", [PAPER, OGIVE, CONE, TABLE], ids=["paper", "ogive", "cone", "table"])
+
+
+@CORES
+def test_rings_close_the_surface(core: Core) -> None:
+    around = 16
+    rings = rings_of(core, 20, around)
+    assert around * rings.area_axial.sum() == pytest.approx(0.0, abs=1e-12 * np.pi * core.max_radius**2)
+    # Seen from the side a core shows 2 ∫ r ds; azimuths of the patches are those of their middles.
+    s, weights = np.polynomial.legendre.leggauss(200)
+    shadow = core.length * core.radius(core.length * (1 + s) / 2) @ weights
+    facing = np.cos(2 * np.pi * (np.arange(around) + 0.5) / around).clip(0).sum()
+    assert facing * rings.area_radial.sum() == pytest.approx(shadow, rel=1e-4)
+
+
+@pytest.mark.parametrize("core", [OGIVE, CONE], ids=["ogive", "cone"])
+def test_forward_areas_make_the_disc_of_the_largest_radius(core: Core) -> None:
+    rings = rings_of(core, 20, 16)
+    forward = 16 * rings.area_axial.clip(0).sum()
+    assert forward == pytest.approx(np.pi * core.max_radius**2, rel=1e-12)
+
+
+@CORES
+def test_volume_of_the_rings_converges_to_the_core_s(core: Core) -> None:
+    # V = ⅓ ∮ x·dA with one point per patch: second order in the rings.
+    volume = core.mass_properties.mass / 7850.0
+    errors = []
+    for axial in (16, 32, 64):
+        rings = rings_of(core, axial, 256)
+        found = 256 / 3 * (rings.station @ rings.area_axial + rings.radius @ rings.area_radial)
+        errors.append(abs(found / volume - 1))
+    assert errors[0] < 0.01
+    assert errors[2] < max(errors[0] / 8, 1e-4)
+
+
+@CORES
+def test_rings_lie_end_to_end_with_the_breaks_on_their_edges(core: Core) -> None:
+    rings = rings_of(core, 20, 16)
+    station = core.mass_properties.centre_of_mass - rings.station
+    lateral = rings.half_axial != 0
+    low, high = (station[lateral] + sign * rings.half_axial[lateral] for sign in (1, -1))
+    np.testing.assert_allclose(low[1:], high[:-1], atol=1e-15)
+    assert low[0] == pytest.approx(0.0, abs=1e-15)
+    assert high[-1] == pytest.approx(core.length)
+    for station_of_break in core.breaks:
+        assert np.abs(high - station_of_break).min() < 1e-12
+    np.testing.assert_allclose(rings.radius[lateral], core.radius(station[lateral]), rtol=1e-12)
+    np.testing.assert_allclose(-rings.half_radial[lateral], (core.radius(low) - core.radius(high)) / 2, atol=1e-12)
+
+
+def test_discs_are_rings_from_the_axis_to_the_rim() -> None:
+    rings = rings_of(TABLE, 20, 16)
+    disc = rings.half_axial == 0
+    station = TABLE.mass_properties.centre_of_mass - rings.station[disc]
+    for at, radius, facing in ((0.0, 1e-3, 1), (20e-3, 2.5e-3, -1)):
+        here = np.abs(station - at) < 1e-12
+        assert 16 * rings.area_axial[disc][here].sum() == pytest.approx(facing * np.pi * radius**2)
+        outer = (rings.radius + np.abs(rings.half_radial))[disc][here]
+        assert outer.max() == pytest.approx(radius)
+    np.testing.assert_array_equal(rings.area_radial[disc], 0.0)
+    assert len(rings_of(TABLE, 20, 16, discs=False).station) == 20
+
+
+@pytest.mark.parametrize("around", [4, 5, 16])
+def test_azimuths_are_their_own_mirror_images_half_a_patch_on_from_ring_to_ring(around: int) -> None:
+    even, odd = azimuths_of(around).reshape(2, around)
+    np.testing.assert_allclose(np.diff(even), 2 * np.pi / around)
+    np.testing.assert_allclose(even - odd, np.pi / around)
+    for azimuths in (even, odd):
+        directions = np.exp(1j * azimuths)
+        mirrored = directions.conj()
+        apart = np.abs(directions[:, None] - mirrored)
+        np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-12)
+
+
+@CORES
+def test_turns_are_half_the_change_of_the_normal_over_a_ring(core: Core) -> None:
+    # From the middles of neighbouring rings: exact to second order within a smooth stretch of the profile.
+    rings = rings_of(core, 400, 16)
+    lateral = rings.half_axial != 0
+    station = core.mass_properties.centre_of_mass - rings.station[lateral]
+    half = np.abs(rings.half_axial[lateral])
+    inside = 1e-4 * half
+
+    def normals(at: Any) -> Any:
+        slope = (core.radius(at + inside) - core.radius(at - inside)) / (2 * inside)
+        return np.stack([slope, np.ones_like(slope)]) / np.hypot(slope, 1.0)
+
+    low, high = normals(station - 0.99 * half), normals(station + 0.99 * half)
+    turns = np.stack([rings.turn_axial, rings.turn_radial])[:, lateral]
+    np.testing.assert_allclose(turns, (high - low) / 2, rtol=0.02, atol=1e-6)
+    np.testing.assert_array_equal(np.stack([rings.turn_axial, rings.turn_radial])[:, ~lateral], 0.0)
+
+
+@CORES
+def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
+    count = 40
+    rings = rings_of(core, count, 16, discs=True)
+    lateral = rings.half_axial != 0
+    station = core.mass_properties.centre_of_mass - rings.station[lateral]
+    length = -2 * rings.half_axial[lateral]
+    stations = np.linspace(0.0, core.length, 100_001)
+    widest = stations[np.argmax(core.radius(stations) >= (1 - 1e-9) * core.max_radius)]
+    assert length.sum() == pytest.approx(core.length)
+    for part, longest in ((station < widest, 1.0), (station > widest, BEHIND)):
+        if part.any():
+            assert length[part].mean() == pytest.approx(longest * core.length / count, rel=0.15)

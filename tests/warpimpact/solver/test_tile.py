@@ -1,0 +1,119 @@
+"""Tile of the plate: material by area, and the filter of the exposure."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from warpimpact.scene import (
+    CirclePattern,
+    MaskPattern,
+    Plate,
+    SlotPattern,
+    TrianglePattern,
+)
+from warpimpact.solver.tile import BLUR, FINER, SUBSAMPLES, tent_taps, tile_of
+
+PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
+PATTERNS = [
+    SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True),
+    CirclePattern(diameter=5e-3, spacing=(7.1e-3, 9.3e-3)),
+    TrianglePattern(side=6e-3, spacing=(8e-3, 8e-3), staggered=True),
+]
+
+
+@pytest.mark.parametrize("pattern", PATTERNS, ids=lambda pattern: pattern.shape)
+def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
+    plate = PLATE.model_copy(update={"pattern": pattern})
+    spacing = 0.25e-3 / FINER  # the tile's, where the grid's is 0.25 mm
+    tile = tile_of(plate, spacing)
+    assert tile.material.mean() == pytest.approx(1 - pattern.open_area, abs=5e-4)
+    assert tile.material.min() == 0.0
+    assert tile.material.max() == 1.0
+    assert max(tile.dy, tile.dz) <= spacing
+    extent = np.array(tile.material.shape) * (tile.dy, tile.dz)
+    np.testing.assert_allclose(extent, pattern.period, rtol=1e-12)
+
+
+def test_tile_looks_closely_only_where_edges_are_and_misses_none() -> None:
+    holes = [["0 mm", "0 mm", "20 deg"], ["6 mm", "3 mm", "-70 deg"]]
+    hairlines = SlotPattern(length="6 mm", width="0.05 mm", spacing=["12 mm", "8 mm"], holes=holes)
+    plate = PLATE.model_copy(update={"pattern": hairlines})
+    tile = tile_of(plate, 0.25e-3)
+    samples = SUBSAMPLES
+    y, z = (
+        (np.arange(samples * n) + 0.5) * d / samples
+        for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True)
+    )
+    solid = ~hairlines.is_hole(y[:, None], z)
+    sharp = solid.reshape(tile.material.shape[0], samples, -1, samples).mean(axis=(1, 3))
+    shares = ndimage.uniform_filter(sharp, BLUR, mode="wrap")
+    np.testing.assert_allclose(tile.material, shares, rtol=0, atol=1.5 / samples**2)  # rounding decides on edges
+    assert (~np.isclose(tile.material, shares)).mean() < 1e-2
+    assert 0.0 < 1.0 - tile.material.mean() < 0.01
+
+
+def test_tile_is_kept_for_the_next_shots_but_not_for_another_mask_of_the_same_name(tmp_path: Path) -> None:
+    def masked(hole: tuple[int, int]) -> Plate:
+        mask = np.ones((4, 4), dtype=np.uint8)
+        mask[hole] = 0
+        np.save(tmp_path / "mask.npy", mask)
+        pattern = MaskPattern(file=str(tmp_path / "mask.npy"), cell_size=1e-3)
+        return PLATE.model_copy(update={"pattern": pattern})
+
+    one, other = masked((0, 0)), masked((2, 1))
+    assert tile_of(one, 0.5e-3) is tile_of(one.model_copy(update={"thickness": 1.0}), 0.5e-3)
+    assert (tile_of(one, 0.5e-3).material != tile_of(other, 0.5e-3).material).any()
+
+
+def test_tile_tells_material_from_holes_by_area() -> None:
+    # A 5 mm hole on the origin, which is a corner of cell (0, 0); cells near the edge are fractions.
+    plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 10e-3))})
+    tile = tile_of(plate, 0.5e-3)
+    y, z = ((np.arange(n) + 0.5) * 0.5e-3 for n in tile.material.shape)
+    distance = np.hypot(np.minimum(y, 8e-3 - y)[:, None], np.minimum(z, 10e-3 - z))
+    diagonal = BLUR * 0.5e-3 / np.sqrt(2)
+    assert (tile.material[distance < 2.5e-3 - diagonal] == 0).all()
+    assert (tile.material[distance > 2.5e-3 + diagonal] == 1).all()
+    assert ((tile.material > 0) & (tile.material < 1)).sum() > 8
+    np.testing.assert_array_equal(tile.material, tile.material[::-1, ::-1])  # the pattern's own symmetry
+
+
+def test_sharp_tile_takes_the_cells_centres() -> None:
+    plate = PLATE.model_copy(update={"pattern": PATTERNS[2]})
+    tile = tile_of(plate, 0.1e-3, sharp=True)
+    y, z = ((np.arange(n) + 0.5) * d for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True))
+    np.testing.assert_array_equal(tile.material, ~PATTERNS[2].is_hole(y[:, None], z))
+
+
+def test_spacing_that_fits_the_period_is_kept() -> None:
+    plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(7e-3, 9.1e-3))})
+    assert tile_of(plate, 0.1e-3, sharp=True).material.shape == (70, 91)
+    assert tile_of(plate, 0.1e-3).material.shape == (70, 92)  # even, for a lattice staggered by half a period
+
+
+@pytest.mark.parametrize("ratio", [2, 3, 8])
+def test_taps_are_a_tent_of_the_half_width_that_scattering_and_reading_leave(ratio: int) -> None:
+    # A tent of half-width m cells has (m² − 1)/6 at the nodes and, scattered into and read bilinearly, (m² + 1)/6.
+    length = np.sqrt(ratio**2 + 1.0)
+    offsets = np.arange(-ratio + 1, ratio)
+    np.testing.assert_allclose(tent_taps(length * 0.1, 0.1), (1 - np.abs(offsets) / ratio) / ratio, rtol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1.415, 1.5, 1.9, 2.5, 3.7, 7.99])
+def test_taps_keep_mass_and_second_moment(ratio: float) -> None:
+    taps = tent_taps(ratio, 1.0)
+    offsets = np.arange(len(taps)) - len(taps) // 2
+    assert len(taps) % 2 == 1
+    assert (taps > 0).all()
+    np.testing.assert_allclose(taps, taps[::-1], rtol=1e-12)
+    assert taps.sum() == pytest.approx(1.0)
+    # Bilinear scattering and bilinear reading add a sixth of the cell's square each, on average.
+    assert taps @ offsets**2 + 1 / 3 == pytest.approx(ratio**2 / 6, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [0.2, 1.0, 1.414])
+def test_length_within_scattering_and_reading_is_not_filtered(ratio: float) -> None:
+    np.testing.assert_array_equal(tent_taps(ratio, 1.0), [1.0])

@@ -1,0 +1,37 @@
+"""Intervals of differences and ratios against closed forms."""
+
+import math
+
+import numpy as np
+import pytest
+
+from warpimpact.statistics.comparisons import Ratio, confidence_of_each, difference_of_independent
+from warpimpact.statistics.intervals import Estimate, estimate_of
+
+
+def estimate(value: float, low: float, high: float) -> Estimate:
+    return Estimate(value, low, high, 10, 1.0)
+
+
+def test_half_widths_of_independent_estimates_add_in_quadrature() -> None:
+    # Each end takes the parts of both intervals that push it outwards: 3, 4 below and 1, 2 above.
+    low, high = difference_of_independent(estimate(10.0, 7.0, 11.0), estimate(6.0, 4.0, 10.0))
+    assert low == pytest.approx(4.0 - 5.0)
+    assert high == pytest.approx(4.0 + math.sqrt(5.0))
+
+
+def test_the_error_is_shared_out_over_the_intervals() -> None:
+    assert confidence_of_each(0.95, 5) == pytest.approx(0.99)
+    assert confidence_of_each(0.95, 0) == 0.95
+
+
+def test_a_ratio_to_numbers_that_differ_has_an_interval_of_its_own() -> None:
+    reference = np.random.default_rng(1).uniform(1.0, 2.0, 200)
+    numbers = 3.0 * reference  # the ratio is 3 without any error
+    told = Ratio.of(estimate_of("mean", numbers), numbers, reference, {})
+    assert told.value == pytest.approx(3.0)
+    assert told.high - told.low == pytest.approx(0.0, abs=1e-12)
+    one = Ratio.of(estimate(6.0, 5.0, 7.0), numbers, np.array([2.0]), {})
+    assert one == (2.0, 3.0, 2.5, 3.5)
+    assert math.isnan(Ratio.of(estimate(6.0, 5.0, 7.0), numbers, None, {}).value)
+    assert Ratio.of(estimate(6.0, 5.0, 7.0), numbers, np.array([0.0]), {}).reference == 0.0

@@ -1,0 +1,37 @@
+"""Intervals of numbers: their values where they are known, and how often they hold."""
+
+import numpy as np
+import pytest
+
+from warpimpact.statistics.intervals import Dealt, estimate_of
+
+TRIALS = 500
+LEAST = 460  # 95 % of 500 trials: 475 ± 4.9, three standard deviations below
+
+
+def test_what_never_happens_in_any_replicate_is_not_certain() -> None:
+    dealt = Dealt("share", replicates=8)
+    dealt.add(np.zeros(800))
+    estimate = dealt.estimate()
+    assert estimate.value == 0.0
+    assert estimate.high == pytest.approx(1.96**2 / (800 + 1.96**2), rel=1e-3)  # Wilson's for 0 of 800
+
+
+def test_moments_are_those_of_all_numbers_at_once() -> None:
+    values, dealt = np.random.default_rng(3).normal(1e6, 1.0, 1000), Dealt("mean")
+    for part in np.split(values, [1, 7, 500]):
+        dealt.add(part)
+    assert dealt.estimate().value == pytest.approx(values.mean(), rel=1e-14)
+    assert dealt.estimate().spread == pytest.approx(values.std(), rel=1e-9)
+
+
+def test_differences_of_rare_shares_are_not_certain() -> None:
+    """Agresti and Min's interval where nothing differs: half a shot more in each of four cells."""
+    estimate = estimate_of("difference", np.zeros(98))
+    assert estimate.value == 0.0
+    assert estimate.high == pytest.approx(1.959964 / 100.0)
+    held, numbers = 0, np.random.default_rng(2)
+    for _ in range(TRIALS):
+        drawn = numbers.choice([-1.0, 0.0, 1.0], p=[0.01, 0.96, 0.03], size=200)
+        held += (told := estimate_of("difference", drawn)).low <= 0.02 <= told.high
+    assert held >= LEAST

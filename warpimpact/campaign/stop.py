@@ -1,0 +1,46 @@
+"""The stop rule of a campaign."""
+
+from typing import Annotated
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from ..results.measures import Measure
+from ..scene.model import Model
+from ..scene.units import Number, quoted
+
+
+class Stop(Model):
+    """When a campaign is good enough: the half width of a confidence interval.
+
+    Attributes:
+        quantity: see `Measure.parse`.
+        half_width: at most this, SI.
+        confidence: of the interval.
+        max_count: shots after which it ends anyhow.
+    """
+
+    quantity: str
+    half_width: float
+    confidence: Annotated[Number, Field(gt=0, lt=1)] = 0.95
+    max_count: Annotated[int, Field(strict=True, ge=1, le=2**30)]
+
+    @field_validator("quantity")
+    @classmethod
+    def _is_a_measure(cls, text: str) -> str:
+        Measure.parse(text)
+        return text
+
+    @field_validator("half_width", mode="before")
+    @classmethod
+    def _in_si(cls, value: object, info: ValidationInfo) -> float:
+        if "quantity" not in info.data:
+            raise ValueError(f"got {quoted(value)}, which means nothing without a quantity")
+        number = Measure.parse(info.data["quantity"]).in_units(value)
+        if number <= 0.0:
+            raise ValueError(f"got {quoted(value)}, but it must be greater than 0")
+        return number
+
+    @property
+    def measure(self) -> Measure:
+        """The quantity."""
+        return Measure.parse(self.quantity)

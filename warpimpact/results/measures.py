@@ -1,0 +1,167 @@
+"""Measures: the numbers of a Dataset that a person can ask for (means, quantiles, probabilities) and their tallies."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from warpimpact.kernels.status import Status
+from warpimpact.results.dataset import failed, passed
+from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
+from warpimpact.statistics.intervals import Dealt, Estimate
+
+Array = NDArray[np.float64]
+
+_KINDS: dict[str, Any] = {
+    "m s-1": Speed,
+    "degree": Angle,
+    "J": Energy,
+    "s": Time,
+    "N m": Moment,
+    "Pa": Stress,
+    "m": Length,
+    "1": Number,
+}
+"""Types of the quantities that have these units in the Dataset."""
+_VARIABLES = OUTCOME_VARIABLES | BENDING_VARIABLES
+MEASURED = tuple(
+    name
+    for name, variable in _VARIABLES.items()
+    if name != "status" and variable.dims in {("hit",), ("hit", "standoff")}
+)
+STATUSES = {status.name.lower(): status for status in Status if not status.failed}
+
+_VARIABLE = r"(?P<variable>[a-z_]+)(?:\s*@\s*(?P<standoff>[^<>,]+?))?"
+_FORMS = {
+    "mean": re.compile(rf"mean\(\s*{_VARIABLE}\s*\)"),
+    "quantile": re.compile(rf"quantile\(\s*{_VARIABLE}\s*,\s*(?P<share>[\d.eE+-]+)\s*\)"),
+    "probability": re.compile(rf"P\(\s*{_VARIABLE}\s*(?P<relation>[<>])\s*(?P<limit>.+?)\s*\)"),
+    "share": re.compile(r"P\(\s*(?P<variable>[a-z_]+)\s*\)"),
+}
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One number of a result.
+
+    Attributes:
+        text: as it was asked for.
+        kind: "mean", "quantile", "probability" (that a variable lies beyond a limit) or "share" (of a status).
+        variable: of the Dataset, or the status of a share.
+        standoff: distance behind the rear face [m] for a variable that has one.
+        share: of a quantile.
+        above, limit: of a probability, the limit in the units of the Dataset.
+
+    A share counts all shots but those whose computation failed; the others count the cores that passed the plate.
+    """
+
+    text: str
+    kind: str
+    variable: str
+    standoff: float | None = None
+    share: float = 0.5
+    above: bool = True
+    limit: float = 0.0
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """Read ``mean(v)``, ``quantile(v, 0.05)``, ``P(v > limit)`` or ``P(status)``; v may be ``tilt@130mm``.
+
+        Raises:
+            ValueError: says what is allowed.
+        """
+        for kind, form in _FORMS.items():
+            if (match := form.fullmatch(text.strip())) is not None:
+                return cls._from(text, kind, match.groupdict())
+        raise ValueError(
+            f"got {quoted(text)}, but it must be of the form mean(residual_velocity), "
+            "quantile(residual_velocity, 0.05), P(tilt@130mm > 30 deg) or P(perforated)"
+        )
+
+    @classmethod
+    def _from(cls, text: str, kind: str, parts: dict[str, str]) -> Self:
+        name, allowed = parts["variable"], tuple(STATUSES) if kind == "share" else MEASURED
+        if name not in allowed:
+            raise ValueError(f'got "{name}", but it must be one of {", ".join(allowed)}')
+        if kind == "share":
+            return cls(text, kind, name)
+        variable = _VARIABLES[name]
+        has_standoff = "standoff" in variable.dims
+        if has_standoff != (parts["standoff"] is not None):
+            raise ValueError(
+                f'got "{name}", which {"needs a" if has_standoff else "has no"} stand-off, as in tilt@130mm'
+            )
+        standoff = quantity(Length)(parts["standoff"]) if has_standoff else None
+        if kind == "quantile":
+            share = quantity(Number)(parts["share"])
+            if not 0.0 < share < 1.0:
+                raise ValueError(f"got the quantile {share:g}, but it must lie between 0 and 1")
+            return cls(text, kind, name, standoff, share=share)
+        if kind == "probability":
+            limit = _shown(variable.units, quantity(_KINDS[variable.units])(parts["limit"]))
+            return cls(text, kind, name, standoff, above=parts["relation"] == ">", limit=limit)
+        return cls(text, kind, name, standoff)
+
+    @property
+    def is_binary(self) -> bool:
+        """Whether the values of single shots are 0 or 1."""
+        return self.kind in ("probability", "share")
+
+    @property
+    def units(self) -> str:
+        """Those of the Dataset; "1" for a probability."""
+        return "1" if self.is_binary else _VARIABLES[self.variable].units
+
+    def in_units(self, value: object) -> float:
+        """SI value of what a person wrote for a difference of this measure."""
+        return quantity(_KINDS[self.units])(value)
+
+    def shown(self, value: float) -> float:
+        """An SI value in the units of the Dataset."""
+        return _shown(self.units, value)
+
+    def values(self, dataset: xarray.Dataset) -> Array:
+        """What every shot says, NaN where it does not count; shape [hits]."""
+        if self.kind == "share":
+            return np.where(failed(dataset), np.nan, dataset["status"].values == STATUSES[self.variable])
+        column = dataset[self.variable]
+        if self.standoff is not None:
+            column = column.sel(standoff=self.standoff, method="nearest")
+        values = np.where(passed(dataset), column.values, np.nan)
+        if self.kind != "probability":
+            return values
+        beyond = values > self.limit if self.above else values < self.limit
+        return np.where(np.isnan(values), np.nan, beyond)
+
+
+def _shown(units: str, value: float) -> float:
+    return math.degrees(value) if units == "degree" else value
+
+
+class Tally:
+    """Gathers a measure over shots, in the order of their numbers.
+
+    Means and probabilities take a few numbers whatever the count; a quantile keeps one number per shot.
+
+    Args:
+        dealt: `replicates`, `images` and `confidence` as in `Dealt`.
+    """
+
+    def __init__(self, measure: Measure, **dealt: Any) -> None:
+        kind = "share" if measure.is_binary else measure.kind
+        self.measure, self._dealt = measure, Dealt(kind, share=measure.share, **dealt)
+
+    def add(self, dataset: xarray.Dataset) -> None:
+        """Take in the shots that follow."""
+        self._dealt.add(self.measure.values(dataset))
+
+    def estimate(self) -> Estimate:
+        """What the shots so far say."""
+        return self._dealt.estimate()

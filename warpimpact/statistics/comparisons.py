@@ -1,0 +1,67 @@
+"""Intervals of what compares two numbers: differences and ratios."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from warpimpact.statistics.intervals import Array, Estimate, estimate_of
+
+
+def difference_of_independent(one: Estimate, other: Estimate) -> tuple[float, float]:
+    """Interval of the difference of two independent estimates, from the intervals of both.
+
+    Source: G. Y. Zou, A. Donner, Statistics in Medicine 27 (2008) 1693.
+    """
+    difference = one.value - other.value
+    below = math.hypot(one.value - one.low, other.high - other.value)
+    above = math.hypot(one.high - one.value, other.value - other.low)
+    return difference - below, difference + above
+
+
+def confidence_of_each(together: float, count: int) -> float:
+    """Confidence that each of some intervals needs so that all of them hold together (Bonferroni)."""
+    return 1.0 - (1.0 - together) / max(1, count)
+
+
+class Ratio(NamedTuple):
+    """A reference number, the ratio of an estimate to it, and the interval of the ratio; NaN where there is none."""
+
+    reference: float = math.nan
+    value: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+
+    @classmethod
+    def of(cls, estimate: Estimate, numbers: Array, reference: Array | None, dealt: dict[str, Any]) -> Ratio:
+        """Ratio to the mean of other numbers.
+
+        Args:
+            estimate: of the numerator.
+            numbers: whose mean it is, shape [shots].
+            reference: numbers of the first shots, or one number for all; None where there are none.
+            dealt: the arguments of `Dealt` after the kind.
+        """
+        known = np.empty(0) if reference is None else reference[~np.isnan(reference)]
+        if reference is None or not len(known):
+            return cls()
+        if (mean := float(known.mean())) <= 0.0:
+            return cls(mean)
+        ratio, low, high = (number / mean for number in (estimate.value, estimate.low, estimate.high))
+        if np.ptp(known) > 0.0 and not math.isnan(low):
+            linear = estimate_of("mean", _linearised(numbers, reference, ratio), **dealt)
+            low, high = linear.low, linear.high
+        return cls(mean, ratio, low, high)
+
+
+def _linearised(numbers: Array, reference: Array, ratio: float) -> Array:
+    """Numbers of the shots whose mean is the ratio of two means, with its error to first order (the delta method).
+
+    Number k of the reference belongs to shot k. Where there are fewer, each stands for several.
+    """
+    mean, weight = np.nanmean(reference), np.isfinite(numbers).sum() / np.isfinite(reference).sum()
+    linear = numbers / mean
+    linear[: len(reference)] -= np.nan_to_num(ratio * weight * (reference / mean - 1.0))
+    return linear
