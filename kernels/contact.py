@@ -82,7 +82,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 immersed *= grid.on_plate(plate, window, patch.y, patch.z)
             area = grip.share * immersed
             write(touches.area, first + j, area)
-            write(touches.slope, first + j, wp.where(grip.share > zero, grip.slope * immersed, zero))
+            write(touches.slope, first + j, grip.slope * immersed)
             write(touches.shift, first + j, grip.shift)
             write(touches.gain, first + j, per_node * area * wp.abs(grips.normal_along_x(pose, patch, face)))
             write_index(touches.tile, first + j, grid.tile_at(plate, window, patch.y, patch.z))

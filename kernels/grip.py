@@ -13,20 +13,8 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a patch's contact for one variant."""
     real = variant.real
-    zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, laws = core_surface.build(variant), interaction.build(variant)
     Pose, Ring, Patch, Law = surfaces.Pose, surfaces.Ring, surfaces.Patch, laws.Law
-    tiny = real(1.0e-30)
-
-    @wp.struct
-    class Grip:
-        """How a patch touches: the share of it in contact, its derivative by the closing speed [s/m], and how far the
-        middle of that share is from the patch's own, in halves of the patch and per variation of the closing speed
-        over it [s/m]."""
-
-        share: real
-        slope: real
-        shift: real
 
     @wp.struct
     class Face:
@@ -48,15 +36,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Contact of a curved patch: normal and closing speed vary linearly over it, and only the part that closes in
         touches. Without this, contact along a shank would come and go by whole patches."""
         meridian, around = variations(ring, patch)
-        variation = wp.sqrt(meridian * meridian + around * around)
-        per_variation = one / (variation + tiny)
-        rate = laws.onset_rate(law, per_variation)
-        grip = Grip()
-        grip.share = laws.contact_fraction(patch.closing, variation, rate, pose.speed)
-        grip.slope = wp.where(grip.share < one, rate, zero)
-        # 0 if all of it touches.
-        grip.shift = wp.clamp(half - half * patch.closing * per_variation, zero, one) * per_variation
-        return grip
+        return laws.contact_of(law, patch.closing, wp.sqrt(meridian * meridian + around * around), pose.speed)
 
     @wp.func
     def face_of(ring: Ring, patch: Patch, shift: real):
@@ -73,4 +53,4 @@ def build(variant: Variant) -> SimpleNamespace:
     def normal_along_x(pose: Pose, patch: Patch, face: Face):
         return face.axial * pose.axis[0] + face.outward * patch.outward_x + face.around * patch.around_x
 
-    return SimpleNamespace(Grip=Grip, Face=Face, grip_of=grip_of, face_of=face_of, normal_along_x=normal_along_x)
+    return SimpleNamespace(Face=Face, grip_of=grip_of, face_of=face_of, normal_along_x=normal_along_x)

@@ -12,7 +12,8 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the contact law for one variant."""
     real = variant.real
-    zero, half, one = real(0.0), real(0.5), real(1.0)
+    zero, sixth, half, one = real(0.0), real(1.0 / 6.0), real(0.5), real(1.0)
+    tiny = real(1.0e-30)
     # A wall sliding along itself has v_p·n = 0 up to rounding; below this share of |v_p| it does not touch.
     at_rest = real(1.0e-5)
     smallest_onset = real(1.0e-4)  # of the impact velocity: keeps the ramp's slope finite
@@ -22,8 +23,9 @@ def build(variant: Variant) -> SimpleNamespace:
         """Normal stress a0 + a1 v_n + a2 v_n² [Pa], friction η and ln(β)/Δt_β [1/s]; β itself, which the literal scheme
         takes once a step.
 
-        `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): a multiple, `onset_jump`
-        [m/s²], of the time step, and at most the share `onset_limit` of the core's velocity.
+        `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): the law's own, the share
+        `onset_share` of the core's velocity; or, where the step needs a wider one, a multiple, `onset_jump` [m/s²], of
+        the time step, and at most the share `onset_limit` of the core's velocity.
         """
 
         a0: real
@@ -32,31 +34,55 @@ def build(variant: Variant) -> SimpleNamespace:
         friction: real
         decay_rate: real
         degradation: real
+        onset_share: real
         onset_jump: real
         onset_limit: real
         onset: real
 
+    @wp.struct
+    class Contact:
+        """How a patch touches: its mean share of contact, the derivative of that by the closing speed [s/m], and how
+        far the middle of what touches is from the patch's own, in halves of the patch and per variation of the closing
+        speed over it [s/m]."""
+
+        share: real
+        slope: real
+        shift: real
+
     @wp.func
     def onset_speed(law: Law, dt: real, velocity: real, impact_velocity: real):
-        """Closing speed over which contact sets in [m/s]: vanishes with the time step, and follows a core that
-        slows down, so that it is arrested where it should be."""
-        return wp.max(wp.min(law.onset_jump * dt, law.onset_limit * velocity), smallest_onset * impact_velocity)
+        """Closing speed over which contact sets in [m/s]: follows a core that slows down, so that it is arrested where
+        it should be."""
+        wider = wp.min(law.onset_jump * dt, law.onset_limit * velocity)
+        return wp.max(wp.max(law.onset_share * velocity, wider), smallest_onset * impact_velocity)
 
     @wp.func
-    def onset_rate(law: Law, per_variation: real):
-        """Share of a patch that comes into contact per closing speed [s/m]: it does over its own range of closing
-        speeds, ±variation, or over the onset speed if that is wider. The law jumps at v_p·n = 0; a wall pressed
-        sideways rests on the ramp.
+    def contact_of(law: Law, closing: real, variation: real, speed: real):
+        """Contact of a patch whose closing speeds are spread evenly over closing ± variation [m/s].
+
+        Each part of it is in contact by min(1, v_p·n / onset) where v_p·n > 0 (MODEL.md §4); this is the exact mean
+        over the patch, and the mean place of what touches, each part weighed by its share. The part that moves away,
+        the part on the ramp and the part in full contact are three pieces of the patch, on which the share is 0,
+        linear and 1.
 
         Args:
-            per_variation: 1/variation [s/m].
+            speed: no point of the core is faster [m/s].
         """
-        return wp.min(half * per_variation, one / law.onset)
-
-    @wp.func
-    def contact_fraction(closing: real, variation: real, onset_rate: real, speed: real):
-        """Share of a patch in contact, its closing speeds spread evenly over closing ± variation."""
-        return wp.clamp((closing + variation - at_rest * speed) * onset_rate, zero, one)
+        middle = closing - at_rest * speed
+        per_variation = one / (variation + tiny)
+        away = wp.clamp(half - half * middle * per_variation, zero, one)
+        full = wp.clamp(half + half * (middle - law.onset) * per_variation, zero, one)
+        ramp = wp.max(zero, one - away - full)
+        per_onset = one / law.onset
+        low = wp.clamp((middle - variation) * per_onset, zero, one)
+        high = wp.clamp((middle + variation) * per_onset, zero, one)
+        mean = half * (low + high)
+        found = Contact()
+        found.share = full + ramp * mean
+        found.slope = ramp * per_onset
+        moment = full * (one - full) + ramp * (mean * (away - full) + sixth * ramp * (high - low))
+        found.shift = moment * per_variation / (found.share + tiny)
+        return found
 
     @wp.func
     def normal_stress(law: Law, closing: real):
@@ -106,9 +132,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     return SimpleNamespace(
         Law=Law,
+        Contact=Contact,
         onset_speed=onset_speed,
-        onset_rate=onset_rate,
-        contact_fraction=contact_fraction,
+        contact_of=contact_of,
         normal_stress=normal_stress,
         stress_slope=stress_slope,
         friction_per_speed=friction_per_speed,

@@ -148,7 +148,7 @@ def build(variant: Variant) -> SimpleNamespace:
             found = prints.footprint_of(surface, plate, window, pose, dt)
             status = ended(surface, body, state, pose, found, touched, initial_energy, window.thickness)
             if status == RUNNING:
-                law.onset = laws.onset_speed(law, dt, wp.length(state.velocity), real(speed))
+                law.onset = laws.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
                 load = Load()
                 before = state
                 if found.last_ring >= 0:

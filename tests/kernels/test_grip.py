@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
 surfaces, laws, contacts = (part.build(VARIANT) for part in (core_surface, interaction, grip))
-Ring, Patch, Law, Grip, Face = surfaces.Ring, surfaces.Patch, laws.Law, contacts.Grip, contacts.Face
+Ring, Patch, Law, Grip, Face = surfaces.Ring, surfaces.Patch, laws.Law, laws.Contact, contacts.Face
 
 SLIDING = 100.0  # [m/s]
 

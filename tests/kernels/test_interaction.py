@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
 laws = interaction.build(VARIANT)
-Law = laws.Law
+Law, Contact = laws.Law, laws.Contact
 
 FRICTION, ONSET = 0.05, 4.0
 A0, A1, A2 = 2.6e9, 4.5e6, 7850.0
@@ -36,15 +36,14 @@ def law(
     sliding: wp.array(dtype=real),
     speed: wp.array(dtype=real),
     exposures: wp.array(dtype=real),
-    fractions: wp.array(dtype=real),
+    contacts: wp.array(dtype=Contact),
     stresses: wp.array(dtype=real),
     slopes: wp.array(dtype=real),
     frictions: wp.array(dtype=real),
     remaining: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
-    rate = laws.onset_rate(law, real(1.0) / (variation[i] + real(1.0e-30)))
-    fractions[i] = laws.contact_fraction(closing[i], variation[i], rate, speed[i])
+    contacts[i] = laws.contact_of(law, closing[i], variation[i], speed[i])
     stresses[i] = laws.normal_stress(law, closing[i])
     slopes[i] = laws.stress_slope(law, closing[i])
     frictions[i] = laws.friction_per_speed(law, sliding[i], speed[i])
@@ -81,11 +80,18 @@ def applied(
     closing: Any, device: str, *, variation: Any = 0.0, sliding: Any = 0.0, speed: Any = 1.0, exposure: Any = 0.0
 ) -> SimpleNamespace:
     given = [np.array(a) for a in np.broadcast_arrays(closing, variation, sliding, speed, exposure)]
-    names = ("fraction", "stress", "slope", "friction", "remaining")
+    names = ("stress", "slope", "friction", "remaining")
     outputs = {name: poisoned(len(given[0]), real, device) for name in names}
+    contacts = poisoned(len(given[0]), Contact, device)
     inputs = [filled(Law), *(wp.array(a, dtype=real, device=device) for a in given)]
-    wp.launch(LAW, len(given[0]), inputs=inputs, outputs=list(outputs.values()), device=device)
-    return SimpleNamespace(**{name: array.numpy() for name, array in outputs.items()})
+    wp.launch(LAW, len(given[0]), inputs=inputs, outputs=[contacts, *outputs.values()], device=device)
+    found = contacts.numpy()
+    return SimpleNamespace(
+        fraction=found["share"],
+        rise=found["slope"],
+        shift=found["shift"],
+        **{name: array.numpy() for name, array in outputs.items()},
+    )
 
 
 def random_elements(count: int = 2000) -> tuple[Array, Array, Array]:
@@ -104,21 +110,56 @@ def test_contact_sets_in_over_the_onset_speed(device: str) -> None:
     np.testing.assert_allclose(fraction, [0, 0, 0, 0.25, 0.5, 1, 1, 1], rtol=0, atol=1.1e-5)
 
 
-@pytest.mark.parametrize("variation", [0.5 * ONSET, ONSET, 50.0 * ONSET])
-def test_patch_touches_with_the_part_that_closes_in(variation: float, device: str) -> None:
-    # Closing speeds evenly over closing ± variation, at least as wide as the onset: the share of them above 0.
-    closing = variation * np.linspace(-2, 2, 401)
-    spread = closing[:, None] + variation * (2 * (np.arange(4000) + 0.5) / 4000 - 1)
+VARIATIONS = pytest.mark.parametrize("variation", [1e-3 * ONSET, 0.1 * ONSET, 0.5 * ONSET, ONSET, 50.0 * ONSET])
+
+
+def spread(closing: Array, variation: float) -> tuple[Array, Array, Array]:
+    """Places within patches, in halves of them, their closing speeds and their shares of contact; [patches, places]."""
+    places = (2 * (np.arange(4000) + 0.5) / 4000 - 1)[None, :]
+    speeds = closing[:, None] + variation * places
+    return places, speeds, (speeds / ONSET).clip(0, 1)
+
+
+@VARIATIONS
+def test_share_of_a_patch_is_the_mean_of_its_parts(variation: float, device: str) -> None:
+    # Mean of min(1, x/w) for x > 0 over x = closing ± variation. The numerical mean is good to 1/4000 of the slope; the
+    # threshold is 1e-5 of a speed of 1 m/s.
+    closing = (variation + ONSET) * np.linspace(-2, 2, 401)
+    _, _, shares = spread(closing, variation)
     fraction = applied(closing, device, variation=variation).fraction
-    # 1/4000 of the numerical average, and the threshold, 1e-5 of a speed of 1 m/s, over the range of 2 × variation.
-    np.testing.assert_allclose(fraction, (spread > 0).mean(axis=1), atol=1 / 4000 + 1e-5 / variation)
+    np.testing.assert_allclose(fraction, shares.mean(axis=1), rtol=0, atol=1e-5 / ONSET + 1e-6 * variation / ONSET)
 
 
-def test_slightly_curved_patch_sets_in_over_the_onset_speed_from_where_its_first_part_closes_in(device: str) -> None:
-    variation = 0.1 * ONSET
+@VARIATIONS
+def test_what_touches_lies_where_the_mean_of_the_patch_weighed_by_its_shares_lies(
+    variation: float, device: str
+) -> None:
+    closing = (variation + ONSET) * np.linspace(-1, 2, 301)
+    places, speeds, shares = spread(closing, variation)
+    found = applied(closing, device, variation=variation)
+    some = shares.mean(axis=1) > 0.002
+    place = (places * shares).mean(axis=1)[some] / shares.mean(axis=1)[some]
+    np.testing.assert_allclose(found.shift[some] * variation, place, rtol=0, atol=2e-3)
+    # Where all of it touches fully it is the patch's own middle, to the last bit.
+    np.testing.assert_array_equal(found.shift[(speeds > 1.01 * ONSET + 1e-3 * variation).all(axis=1)], 0.0)
+
+
+@VARIATIONS
+def test_slope_is_the_derivative_of_the_share(variation: float, device: str) -> None:
+    closing, dv = (variation + ONSET) * np.linspace(-1.5, 1.5, 401), 1e-6 * ONSET
+    low, here, high = (applied(closing + d, device, variation=variation) for d in (-dv, 0.0, dv))
+    difference = (high.fraction - low.fraction) / (2 * dv)
+    # A patch that turns by little has kinks.
+    kinks = np.abs(difference - here.rise) > 2e-3 / ONSET
+    assert kinks.mean() < 0.02
+
+
+def test_small_variation_leaves_the_ramp_as_it_is(device: str) -> None:
     closing = ONSET * np.linspace(-1, 2, 301)
-    fraction = applied(closing, device, variation=variation).fraction
-    np.testing.assert_allclose(fraction, ((closing + variation) / ONSET).clip(0, 1), atol=1e-5)
+    for variation in (0.0, 1e-30, 1e-12):
+        found = applied(closing, device, variation=variation)
+        np.testing.assert_allclose(found.fraction, (closing / ONSET).clip(0, 1), rtol=0, atol=1e-5)
+        assert np.abs(found.shift * variation).max() < 1e-9
 
 
 def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
@@ -131,7 +172,7 @@ def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
 
 def test_contact_grows_with_the_closing_speed(device: str) -> None:
     for variation in (0.0, 1.0, 3.0):
-        fraction = applied(np.linspace(-5, 6, 200), device, variation=variation, speed=10.0).fraction
+        fraction = applied(np.linspace(-5, 8, 200), device, variation=variation, speed=10.0).fraction
         assert (np.diff(fraction) >= 0).all()
         assert fraction[0] == 0.0
         assert fraction[-1] == 1.0
@@ -146,6 +187,10 @@ def test_onset_follows_the_step_and_a_core_that_slows_down(device: str) -> None:
     wp.launch(ONSET_SPEED, 4, inputs=inputs, outputs=[onsets], device=device)
     # The jump times the step, at most 2 % of the velocity, at least 1e-4 of the impact velocity.
     np.testing.assert_allclose(onsets.numpy(), [2.0, 2.0, 0.08, 0.08], rtol=1e-12)
+    # The law's own where that is wider.
+    law.onset_share = 0.005
+    wp.launch(ONSET_SPEED, 4, inputs=inputs, outputs=[onsets], device=device)
+    np.testing.assert_allclose(onsets.numpy(), [4.0, 2.0, 0.08, 0.08], rtol=1e-12)
 
 
 def test_stress_is_the_quadratic_of_the_closing_speed(device: str) -> None:

@@ -16,7 +16,7 @@ from math import atan, ceil, exp, log, log1p, pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from scipy.special import exprel
@@ -37,24 +37,62 @@ def paper_radius(s: ArrayLike) -> Array:
     return np.polynomial.polynomial.polyval(np.asarray(s, dtype=float), PAPER_COEFFICIENTS)
 
 
+@dataclass(frozen=True)
+class Nose:
+    """A nose before what is not in contact in straight flight: a cylindrical shank or a boat tail."""
+
+    radius: Callable[[float], float]  # r(s) [m]
+    slope: Callable[[float], float]  # dr/ds
+    length: float  # [m]
+
+
+PAPER_NOSE = Nose(
+    radius=lambda s: float(paper_radius(s)),
+    slope=lambda s: PAPER_COEFFICIENTS[1] + 2 * PAPER_COEFFICIENTS[2] * s,
+    length=PAPER_SHOULDER,
+)
+
 # --- The paper's core through a solid plate: normal stress Y, friction η Y (§6.1 to 6.3) ---
 
 
-def solid_plate_residual(*, velocity: float, thickness: float, resistance: float, shear_coefficient: float) -> float:
+def solid_plate_residual(
+    *,
+    velocity: float,
+    thickness: float,
+    resistance: float,
+    shear_coefficient: float,
+    onset: float = 0.0,
+    nose: Nose | None = None,
+    mass: float = PAPER_MASS,
+) -> float:
     """Residual velocity [m/s] without degradation (§6.1, 6.2), from the work of the contact:
 
-        m (v0² − v²)/2 = Y h [πR² + 2πη ∫₀^{s_R} r ds].
+        m (v0² − v²)/2 = Y h 2π [r(0)²/2 + ∫₀^{s_R} share (r' + η) r ds],    share = min(1, r'/(κ √(1 + r'²))),
+
+    κ the `onset`, s_R the end of the nose, by default the paper's up to its shoulder. What is parallel to the flight,
+    as a shank is, does not touch. With κ → 0 it is m (v0² − v²)/2 = Y h [πR² + 2πη ∫₀^{s_R} r ds].
 
     Raises ValueError where the core is arrested.
     """
-    c0, c1, c2 = PAPER_COEFFICIENTS
-    end = PAPER_SHOULDER
-    radius_integral = c0 * end + c1 * end**2 / 2 + c2 * end**3 / 3
-    area = pi * PAPER_LARGEST_RADIUS**2 + 2 * pi * shear_coefficient * radius_integral
-    square = velocity**2 - 2 * resistance * thickness * area / PAPER_MASS
+    nose = nose or PAPER_NOSE
+
+    def per_station(s: float) -> float:
+        return share_of_contact(nose.slope(s), onset) * (nose.slope(s) + shear_coefficient) * nose.radius(s)
+
+    # Where the share gets less than 1 it has a kink: within the last tenth in any nose that runs into its shoulder.
+    panels = (0.0, *nose.length * (1.0 - 0.1 * np.linspace(1.0, 0.0, 64) ** 2))
+    integral = sum(quad(per_station, low, high)[0] for low, high in pairwise(panels))
+    area = 2 * pi * (nose.radius(0.0) ** 2 / 2 + integral)
+    square = velocity**2 - 2 * resistance * thickness * area / mass
     if square < 0:
         raise ValueError("the core is arrested")
     return sqrt(square)
+
+
+def share_of_contact(slope: float, onset: float) -> float:
+    """Share of a ring of slope r' in straight flight that is in contact (§4): min(1, n_x/κ), n_x = r'/√(1 + r'²)."""
+    normal = max(slope, 0.0) / sqrt(1 + slope**2)
+    return 1.0 if normal >= onset and normal > 0.0 else normal / onset if onset else 0.0
 
 
 def local_degradation_residual(
@@ -196,15 +234,6 @@ def _paper_force_per_station(s: ArrayLike, shear_coefficient: float) -> Array:
 # --- Velocity-dependent stress σ = a0 + a2 (v·n)² on a pointed core in a thick plate (§4, 6.4; Poncelet) ---
 
 
-@dataclass(frozen=True)
-class Nose:
-    """A pointed nose before a cylindrical shank, which in straight flight is not in contact."""
-
-    radius: Callable[[float], float]  # r(s) [m]
-    slope: Callable[[float], float]  # dr/ds
-    length: float  # [m]
-
-
 def cone_nose(*, diameter: float, length: float) -> Nose:
     """A cone: r = s · diameter / (2 length)."""
     slope = diameter / (2 * length)
@@ -232,7 +261,9 @@ class Poncelet:
 
     A ring's normal has the axial part n_x = r'/√(1 + r'²), the ring carries σ = a0 + a2 v² n_x² and η σ:
 
-        F0 = ∫ a0 2πr (r' + η) ds,        F2 = ∫ a2 2πr (r' + η) r'²/(1 + r'²) ds        over the nose.
+        F0 = ∫ a0 2πr (r' + η) ds,        F2 = ∫ a2 2πr (r' + η) r'²/(1 + r'²) ds        over the nose,
+
+    each ring by its share of contact where there is an onset κ.
 
     While the nose enters or leaves, the integrals run over the stations inside the plate. a0 > 0; a2, η ≥ 0.
     """
@@ -243,6 +274,7 @@ class Poncelet:
     static_stress: float  # a0 [Pa]
     quadratic_stress: float  # a2 [kg/m³]
     shear_coefficient: float = 0.0
+    onset: float = 0.0
 
     @cached_property
     def nose_in(self) -> tuple[float, ...]:
@@ -290,7 +322,8 @@ class Poncelet:
         def rate(s: float, state: Array) -> list[float]:
             v, static, quadratic, _ = state
             slope = self.nose.slope(s)
-            ring = sign * 2 * pi * self.nose.radius(s) * (slope + self.shear_coefficient)
+            share = share_of_contact(slope, self.onset)
+            ring = sign * 2 * pi * self.nose.radius(s) * share * (slope + self.shear_coefficient)
             return [
                 -(static + quadratic * v**2) / (self.mass * v),
                 ring * self.static_stress,

@@ -12,7 +12,8 @@ from . import references
 from .scenes import History, histories, shots_at, simulate, solid_plate
 
 VELOCITY, RESISTANCE, DENSITY = 825.0, 1.2e9, 7850.0
-PONCELET = Interaction(static=1.0, quadratic=1.0)
+ONSET = 0.005
+PONCELET = Interaction(static=1.0, quadratic=1.0, onset=ONSET)
 AT_REST = 0.01
 """Share of the impact velocity at which a core counts as arrested."""
 
@@ -24,7 +25,7 @@ class Case:
 
     def reference(self, shear_coefficient: float) -> references.Poncelet:
         mass = self.core.mass_properties.mass
-        return references.Poncelet(self.nose, mass, VELOCITY, RESISTANCE, DENSITY, shear_coefficient)
+        return references.Poncelet(self.nose, mass, VELOCITY, RESISTANCE, DENSITY, shear_coefficient, ONSET)
 
 
 CONE = Case(
@@ -84,8 +85,9 @@ def test_arrest_in_a_plate_thicker_than_the_depth_of_rest(case: Case, shear_coef
 
     depth, speed = tip_depth(case.core, history), 0.5 * (history.velocity[1:, 0] + history.velocity[:-1, 0])
     creep = 0.5 * AT_REST * VELOCITY * early
-    # Measured: 0.03 mm of the 36 to 45 mm, second order in the rings of 0.8 mm.
-    assert depth[-1] == pytest.approx(expected.depth_of_rest - creep, abs=0.06e-3)
+    # Measured: 0.03 mm of the 36 to 45 mm, second order in the rings of 0.8 mm; with friction on the ogive 0.061 mm, as
+    # a slow core needs a ramp wider than κ for its step, which takes friction from the shoulder.
+    assert depth[-1] == pytest.approx(expected.depth_of_rest - creep, abs=0.08e-3)
     # On the way the energy counts, as v itself falls steeply at the end. Measured: 4e-4 of the impact's.
     inside = (depth > 1.1 * case.nose.length) & (depth < expected.depth_of_rest)
     square = np.square([speed[inside], expected.velocity_at(depth[inside])]) / VELOCITY**2

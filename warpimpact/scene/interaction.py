@@ -11,11 +11,17 @@ class Interaction(Model):
 
     The default is the paper's constant stress Y; (A, 0, B) is Poncelet's law, (A, C, B) the three-term
     law of spherical cavity expansion.
+
+    Attributes:
+        onset: κ, closing speed over which contact sets in, as a share of the speed of the centre of mass: normal stress,
+            friction and exposure are multiplied by min(1, v_n / (κ |v|)). With 0 contact jumps, and where a wall with
+            friction slides along itself, as a shank does, the outcome has no limit: it depends on the numerics.
     """
 
     static: NonNegativeNumber = 1.0
     linear: NonNegativeNumber = 0.0
     quadratic: NonNegativeNumber = 0.0
+    onset: NonNegativeNumber = 0.005
 
     def coefficients(self, resistance: Array, density: float) -> tuple[Array, Array, float]:
         """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material.

@@ -59,6 +59,7 @@ class Arrays:
         sections: of the core behind the rings; None where it does not bend.
         grid: the plate.
         rate_stress: a2 of the law [Pa s²/m²].
+        onset: κ of the law.
         shots: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         rows: of the trace of each shot; 0 for none.
     """
@@ -71,6 +72,7 @@ class Arrays:
     sections: Sections | None
     grid: Grid
     rate_stress: float
+    onset: float
     shots: dict[str, Array]
     rows: int
 
@@ -114,6 +116,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         sections=sections_of(core, rings) if scene.record.bending else None,
         grid=_grid(plate, resolution),
         rate_stress=scene.interaction.quadratic * plate.density,
+        onset=scene.interaction.onset,
         shots=conditions,
         rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
     )
