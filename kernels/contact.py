@@ -1,4 +1,4 @@
-"""One step's load on a core: the consistent law (MODEL.md §4), exposure taken at mid-step.
+"""One step's load on a core: the consistent law (docs/model.md §4), exposure taken at mid-step.
 
 Two passes over the patches in the slab: the first finds what touches and tells the plate, the second reads the
 weakened plate and sums the load. Their inner loops run over the patches of a ring without a branch, so that a CPU

@@ -1,4 +1,4 @@
-"""One step's load: its force and damping, and what it does to the plate (MODEL.md §4)."""
+"""One step's load: its force and damping, and what it does to the plate (docs/model.md §4)."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""The cells and rings that one step may touch (MODEL.md §4)."""
+"""The cells and rings that one step may touch (docs/model.md §4)."""
 
 from typing import Any
 

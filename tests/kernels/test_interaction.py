@@ -1,4 +1,4 @@
-"""The contact law: when a surface element touches, what it carries, and that it takes power (MODEL.md §4)."""
+"""The contact law: when a surface element touches, what it carries, and that it takes power (docs/model.md §4)."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -122,7 +122,7 @@ def test_slightly_curved_patch_sets_in_over_the_onset_speed_from_where_its_first
 
 
 def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
-    # Rounding in float32 gives v_p·n of some 1e-7 of the speed (MODEL.md §4: a small stated threshold).
+    # Rounding in float32 gives v_p·n of some 1e-7 of the speed (docs/model.md §4: a small stated threshold).
     speed = 800.0
     fraction = applied(speed * np.array([1e-7, -1e-7, 1e-6, 1e-4]), device, sliding=speed, speed=speed).fraction
     np.testing.assert_array_equal(fraction[:3], 0.0)

@@ -1,5 +1,5 @@
 """The plate: where a shot finds the periodic tile and the rim, its own grid of exposure, and the tent filter
-(MODEL.md §4)."""
+(docs/model.md §4)."""
 
 from dataclasses import dataclass
 from typing import Any
