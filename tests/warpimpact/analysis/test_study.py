@@ -14,15 +14,14 @@ from PIL import Image
 from warpimpact.analysis import study as studies
 from warpimpact.analysis.study import (
     Answer,
-    advantage,
     converged,
     default_settings,
     extrapolated,
     front,
     label,
     study,
-    study_text,
 )
+from warpimpact.analysis.study_text import advantage, study_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status

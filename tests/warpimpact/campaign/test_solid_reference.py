@@ -77,6 +77,7 @@ def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(run_module, "_MOST_SOLID", 100)
     dataset = computed(tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '))
     solid = solid_reference(dataset)
+    assert solid is not None
     assert solid.sizes["hit"] == 100
     np.testing.assert_array_equal(solid["impact_velocity"], dataset["impact_velocity"][:100])
     order = np.argsort(solid["impact_velocity"].values)
