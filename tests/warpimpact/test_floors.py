@@ -14,21 +14,13 @@ import pytest
 CHECKOUT = Path(__file__).parents[2]
 ROOMS = [path.parent for path in CHECKOUT.glob("warpimpact/*/__init__.py")]
 MOST_LINES, MOST_ARGUMENTS = 350, 8
-# Not within the limits yet; strict, so that a file that comes within them leaves this list.
-LONG = {"kernels/contact.py", "kernels/march.py", "kernels/plate_grid.py"}
-MANY_ARGUMENTS = {"solver/marching.py", "solver/refinement.py", "solver/simulate.py"}
 SOURCES = sorted(path for top in ("warpimpact", "kernels") for path in (CHECKOUT / top).rglob("*.py"))
 
 
-def files(exceptions: set[str], *, kernels: bool) -> list[Any]:
-    """The source files as parameters of a test, some of them expected to fail."""
-    parameters = []
-    for file in SOURCES:
-        name = str(file.relative_to(CHECKOUT))
-        marks = [pytest.mark.xfail(strict=True)] if name.removeprefix("warpimpact/") in exceptions else []
-        if kernels or not name.startswith("kernels/"):
-            parameters.append(pytest.param(file, id=name, marks=marks))
-    return parameters
+def files(*, kernels: bool) -> list[Any]:
+    """The source files as parameters of a test."""
+    names = {str(file.relative_to(CHECKOUT)): file for file in SOURCES}
+    return [pytest.param(file, id=name) for name, file in names.items() if kernels or not name.startswith("kernels/")]
 
 
 @pytest.fixture
@@ -87,7 +79,7 @@ def test_a_room_says_what_it_is_for_what_may_change_and_what_it_imports(room: Pa
     assert "It imports " in told
 
 
-@pytest.mark.parametrize("file", files(LONG, kernels=True))
+@pytest.mark.parametrize("file", files(kernels=True))
 def test_a_long_file_gives_its_reason(file: Path) -> None:
     text = file.read_text(encoding="utf-8")
     if len(text.splitlines()) > MOST_LINES:
@@ -103,7 +95,7 @@ def signatures(file: Path) -> Iterator[tuple[str, int]]:
             yield node.name, sum(argument.arg not in ("self", "cls") for argument in taken)
 
 
-@pytest.mark.parametrize("file", files(MANY_ARGUMENTS, kernels=False))
+@pytest.mark.parametrize("file", files(kernels=False))
 def test_signatures_are_short(file: Path) -> None:
     long = {name: count for name, count in signatures(file) if count > MOST_ARGUMENTS}
     assert not long, f"more than {MOST_ARGUMENTS} arguments"
