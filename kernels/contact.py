@@ -1,4 +1,4 @@
-"""One step's load on a core: the consistent law (MODEL.md §4), exposure taken at mid-step.
+"""One step's load on a core: the consistent law (docs/model.md §4), exposure taken at mid-step.
 
 Two passes over the patches in the slab: the first finds what touches and tells the plate, the second reads the
 weakened plate and sums the load. Their inner loops run over the patches of a ring without a branch, so that a CPU
@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, damping, footprint, grip, interaction, memory, plate_grid, rigid_body
+from . import core_surface, damping, exposure, footprint, grip, interaction, memory, plate_grid, rigid_body
 from .variant import Variant
 
 
@@ -20,10 +20,10 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    grips, resistances = grip.build(variant), damping.build(variant)
+    grips, resistances, memories = grip.build(variant), damping.build(variant), exposure.build(variant)
     Footprint, Sums, Slopes = footprint.build(variant).Footprint, resistances.Sums, resistances.Slopes
     Surface, Pose, Ring = surfaces.Surface, surfaces.Pose, surfaces.Ring
-    Plate, Fields, Window = grid.Plate, grid.Fields, grid.Window
+    Plate, Fields, Window = grid.Plate, memories.Fields, grid.Window
     Law, Load = laws.Law, motion.Load
     ring_at, patch_at = surfaces.ring_at, surfaces.patch_at
     reals, integers = memory.build(real), memory.build(wp.int32)
@@ -54,7 +54,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """A slot's window about a hit, on a plate that nothing has touched."""
         window = grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
         if wp.static(variant.degrades):
-            grid.blank(fields, window)
+            memories.blank(fields, window)
         return window
 
     @wp.func
@@ -103,7 +103,7 @@ def build(variant: Variant) -> SimpleNamespace:
             for k in range(4):
                 i = j + k * quarter
                 cell, y, z = read_index(touches.cell, i), read(touches.y, i), read(touches.z, i)
-                grid.scatter(fields.gain, fields.cells_z, cell, y, z, read(touches.gain, i))
+                memories.scatter(fields.gain, fields.cells_z, cell, y, z, read(touches.gain, i))
             j += 1
 
     @wp.func
@@ -121,7 +121,7 @@ def build(variant: Variant) -> SimpleNamespace:
             if wp.static(variant.degrades):
                 cell = read_index(touches.cell, first + j)
                 y, z = read(touches.y, first + j), read(touches.z, first + j)
-                left = laws.remaining(law, grid.gather(fields.exposure, fields.cells_z, cell, y, z))
+                left = laws.remaining(law, memories.gather(fields.exposure, fields.cells_z, cell, y, z))
             area = left * read(touches.area, first + j)
             stress = laws.normal_stress(law, face.closing)
             slope = left * read(touches.slope, first + j) * stress
@@ -199,7 +199,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 for index in range(found.first_ring, found.last_ring + 1):
                     if touches.ring_area[slot * surface.rings + index] > zero:
                         expose(surface, fields, touches, base + index * surface.around)
-                grid.spread(plate, fields, window, found.box)
+                memories.spread(plate, fields, window, found.box)
             slopes = Slopes()
             for index in range(found.first_ring, found.last_ring + 1):
                 if touches.ring_area[slot * surface.rings + index] > zero:
@@ -215,7 +215,7 @@ def build(variant: Variant) -> SimpleNamespace:
             load.damping_vw = half * resistances.damping_vw(slopes)
             load.damping_ww = half * resistances.damping_ww(slopes)
             if wp.static(variant.degrades):
-                grid.settle(plate, fields, window, found.box)
+                memories.settle(plate, fields, window, found.box)
         return load
 
     return SimpleNamespace(Fields=Fields, Touches=Touches, open_window=open_window, load_on=load_on)

@@ -1,4 +1,4 @@
-"""Torque-free flight behind the plate: what a shot looks like when it passes the stand-offs (MODEL.md §1)."""
+"""Torque-free flight behind the plate: what a shot looks like when it passes the stand-offs (docs/model.md §1)."""
 
 from functools import cache
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""What a surface element in contact carries (MODEL.md §4; the paper's eq. 5, general form of Ben-Dor et al.)."""
+"""What a surface element in contact carries (docs/model.md §4; the paper's eq. 5, general form of Ben-Dor et al.)."""
 
 from functools import cache
 from types import SimpleNamespace

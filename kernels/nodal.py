@@ -1,6 +1,6 @@
 """The paper's literal scheme (its eqs. 4 to 6): points, nearest nodes, β once per node and step.
 
-Kept because the published rows came from it. It has no limit in the time step or the grid (MODEL.md §4),
+Kept because the published rows came from it. It has no limit in the time step or the grid (docs/model.md §4),
 has no condition on the direction of motion. Its forces may feed energy into the core: what a step would add beyond
 the kinetic energy that was there, the kick withholds (rigid_body.restraint), as in every scheme here.
 """

@@ -1,4 +1,4 @@
-"""Motion of a rigid body of revolution (MODEL.md §5; the paper's eqs. 1 and 3).
+"""Motion of a rigid body of revolution (docs/model.md §5; the paper's eqs. 1 and 3).
 
 The state carries the angular momentum in the plate frame rather than the angular velocity: between contacts
 it is constant, so a drift is exact for any time step and the rotational energy cannot creep.

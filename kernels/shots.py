@@ -25,8 +25,8 @@ def build(variant: Variant) -> SimpleNamespace:
     class Shots:
         """Arrays of shape [1] or [shots], SI and radians.
 
-        Where the core hits and how it arrives (MODEL.md §1); the thickness of the plate [m], the members of Body and
-        Law, and those of Pace that follow from them.
+        Where the core hits and how it arrives (docs/model.md §1); the thickness of the plate [m], the members of Body
+        and Law, and those of Pace that follow from them.
         """
 
         hit_y: wp.array(dtype=wp.float64)

@@ -44,7 +44,7 @@ def copied(shots: Shots, copies: int) -> Shots:
 
 def launch_state(core: Core, shots: Shots) -> tuple[Array, Array, Array]:
     """Line of flight, axis, and position of the centre of mass relative to the hit [m], each of shape [shots, 3], when
-    the foremost point is at the front face (MODEL.md §1)."""
+    the foremost point is at the front face (docs/model.md §1)."""
     sine = np.sin(shots.obliquity)
     flight = np.stack([np.cos(shots.obliquity), sine * np.cos(shots.azimuth), sine * np.sin(shots.azimuth)], axis=1)
     yaw = np.arctan2(flight[:, 1], flight[:, 0]) + shots.yaw

@@ -1,4 +1,4 @@
-"""The floor: what the consistent law asks for per patch and step, and how many of these a hit has (MODEL.md §4).
+"""The floor: what the consistent law asks for per patch and step, and how many of these a hit has (docs/model.md §4).
 
 Counted from the formulas on the patches of rings that reach into the slab: each of them is looked at, those that
 advance into the slab also act. An addition, product, comparison, root, quotient or exponential counts as one. Nothing

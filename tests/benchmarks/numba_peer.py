@@ -1,4 +1,4 @@
-"""The consistent law (MODEL.md §4) as a good Numba programmer would write it: the peer of the CPU kernels.
+"""The consistent law (docs/model.md §4) as a good Numba programmer would write it: the peer of the CPU kernels.
 
 float32 and fast-math; hits in parallel, each thread with its own window of the plate; rings outside the slab are
 skipped; what does not depend on the ring is computed once per azimuth and step, what the second pass needs of the

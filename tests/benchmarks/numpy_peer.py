@@ -1,4 +1,4 @@
-"""The paper's literal scheme (its eqs. 1 to 6; MODEL.md §4) in NumPy, vectorised over points and hits.
+"""The paper's literal scheme (its eqs. 1 to 6; docs/model.md §4) in NumPy, vectorised over points and hits.
 
 36 × 36 points, every one in the slab pushed with Y (−n + η t), t the meridian tangent; the nearest node of a 10 µm
 grid weakens by β once per step in which it is touched. What the points touched is counted per node, so that the plate

@@ -1,4 +1,4 @@
-"""One step's load: its force and damping, and what it does to the plate (MODEL.md §4)."""
+"""One step's load: its force and damping, and what it does to the plate (docs/model.md §4)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels import contact, core_surface, footprint, interaction, plate_grid, rigid_body
+from warpimpact.kernels import contact, core_surface, exposure, footprint, interaction, plate_grid, rigid_body
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore, OgiveCore, ProfileCore
 
@@ -19,10 +19,10 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-surfaces, grid, laws, motion, contacts, prints = (
-    part.build(VARIANT) for part in (core_surface, plate_grid, interaction, rigid_body, contact, footprint)
+surfaces, grid, memories, laws, motion, contacts, prints = (
+    part.build(VARIANT) for part in (core_surface, plate_grid, exposure, interaction, rigid_body, contact, footprint)
 )
-Surface, Plate, Fields, Law, Load = surfaces.Surface, grid.Plate, grid.Fields, laws.Law, motion.Load
+Surface, Plate, Fields, Law, Load = surfaces.Surface, grid.Plate, memories.Fields, laws.Law, motion.Load
 Touches = contacts.Touches
 
 CELL = 0.25e-3

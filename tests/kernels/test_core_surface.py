@@ -1,4 +1,4 @@
-"""Rings and patches in a pose: areas, velocities, and how much of a patch is in the slab (MODEL.md §4)."""
+"""Rings and patches in a pose: areas, velocities, and how much of a patch is in the slab (docs/model.md §4)."""
 
 from typing import Any
 

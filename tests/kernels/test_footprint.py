@@ -1,4 +1,4 @@
-"""The cells and rings that one step may touch (MODEL.md §4)."""
+"""The cells and rings that one step may touch (docs/model.md §4)."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import contact, core_surface, footprint, plate_grid
+from warpimpact.kernels import contact, core_surface, exposure, footprint, plate_grid
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore
 
@@ -17,8 +17,10 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-surfaces, grid, contacts, prints = (part.build(VARIANT) for part in (core_surface, plate_grid, contact, footprint))
-Surface, Plate, Fields, Footprint = surfaces.Surface, grid.Plate, grid.Fields, prints.Footprint
+surfaces, grid, memories, contacts, prints = (
+    part.build(VARIANT) for part in (core_surface, plate_grid, exposure, contact, footprint)
+)
+Surface, Plate, Fields, Footprint = surfaces.Surface, grid.Plate, memories.Fields, prints.Footprint
 
 CELL = 0.25e-3
 THICKNESS = wp.constant(4.0e-3)

@@ -1,4 +1,4 @@
-"""How a curved patch touches: the part of it that closes in, its normal and its closing speed (MODEL.md §4)."""
+"""How a curved patch touches: the part of it that closes in, its normal and its closing speed (docs/model.md §4)."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The contact law: when a surface element touches, what it carries, and that it takes power (MODEL.md §4)."""
+"""The contact law: when a surface element touches, what it carries, and that it takes power (docs/model.md §4)."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -163,7 +163,7 @@ def test_small_variation_leaves_the_ramp_as_it_is(device: str) -> None:
 
 
 def test_wall_that_slides_along_itself_does_not_touch(device: str) -> None:
-    # Rounding in float32 gives v_p·n of some 1e-7 of the speed (MODEL.md §4: a small stated threshold).
+    # Rounding in float32 gives v_p·n of some 1e-7 of the speed (docs/model.md §4: a small stated threshold).
     speed = 800.0
     fraction = applied(speed * np.array([1e-7, -1e-7, 1e-6, 1e-4]), device, sliding=speed, speed=speed).fraction
     np.testing.assert_array_equal(fraction[:3], 0.0)

@@ -1,4 +1,4 @@
-"""The march: how a shot starts, how it ends, and that its window is its own affair (MODEL.md §1)."""
+"""The march: how a shot starts, how it ends, and that its window is its own affair (docs/model.md §1)."""
 
 from dataclasses import fields
 from typing import Any

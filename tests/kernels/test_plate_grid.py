@@ -1,5 +1,5 @@
 """The plate: where a shot finds the periodic tile and the rim, its own grid of exposure, and the tent filter
-(MODEL.md §4)."""
+(docs/model.md §4)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from warpimpact.kernels import plate_grid
+from warpimpact.kernels import exposure, plate_grid
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.tile import tent_taps
 
@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 VARIANT, SINGLE = Variant(double=True), Variant()
 real = VARIANT.real
 grid, single_grid = plate_grid.build(VARIANT), plate_grid.build(SINGLE)
-Plate, Fields, Window, Cell, Box = grid.Plate, grid.Fields, grid.Window, grid.Cell, grid.Box
+memories, single_memories = exposure.build(VARIANT), exposure.build(SINGLE)
+Plate, Fields, Window, Cell, Box = grid.Plate, memories.Fields, grid.Window, grid.Cell, grid.Box
 
 CELL = 0.25e-3
 CELLS_Y, CELLS_Z = 24, 30
@@ -43,7 +44,7 @@ def lay(
     windows[slot] = grid.window_at(
         plate, real(THICKNESS), fields.cells_y, fields.cells_z, slot, hit_y[slot], hit_z[slot]
     )
-    grid.blank(fields, windows[slot])
+    memories.blank(fields, windows[slot])
 
 
 def look_up(
@@ -57,7 +58,7 @@ def look_up(
 ) -> None:
     i = wp.tid()
     cell = grid.cell_at(windows[slot], y[i], z[i])
-    values[i] = grid.gather(field, fields.cells_z, cell.index, cell.y, cell.z)
+    values[i] = memories.gather(field, fields.cells_z, cell.index, cell.y, cell.z)
 
 
 def scatters(
@@ -70,8 +71,8 @@ def scatters(
     native: wp.array(dtype=wp.float32),
 ) -> None:
     for i in range(len(index)):
-        single_grid.scatter_plain(plain, stride, index[i], y[i], z[i], amount[i])
-        single_grid.scatter(native, stride, index[i], y[i], z[i], amount[i])
+        single_memories.scatter_plain(plain, stride, index[i], y[i], z[i], amount[i])
+        single_memories.scatter(native, stride, index[i], y[i], z[i], amount[i])
 
 
 def meet(
@@ -94,15 +95,15 @@ def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, fou
 
 def gain(fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, y: real, z: real, amount: real) -> None:
     cell = grid.cell_at(windows[slot], y, z)
-    grid.scatter(fields.gain, fields.cells_z, cell.index, cell.y, cell.z, amount)
+    memories.scatter(fields.gain, fields.cells_z, cell.index, cell.y, cell.z, amount)
 
 
 def spread(plate: Plate, fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, box: Box) -> None:
-    grid.spread(plate, fields, windows[slot], box)
+    memories.spread(plate, fields, windows[slot], box)
 
 
 def settle(plate: Plate, fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, box: Box) -> None:
-    grid.settle(plate, fields, windows[slot], box)
+    memories.settle(plate, fields, windows[slot], box)
 
 
 LAY, LOOK_UP, CELLS, GAIN, SPREAD, SETTLE = (
@@ -113,11 +114,10 @@ LAY, LOOK_UP, CELLS, GAIN, SPREAD, SETTLE = (
 def beneath_kernel(variant: Variant) -> Any:
     """Kernel of the material under points, and of the share of a grid cell about them that lies on the plate."""
     part, real = plate_grid.build(variant), variant.real
-    Plate, Fields = part.Plate, part.Fields
+    Plate = part.Plate
 
     def beneath(
         plate: Plate,
-        fields: Fields,
         hit_y: wp.float64,
         hit_z: wp.float64,
         y: wp.array(dtype=real),
@@ -126,7 +126,7 @@ def beneath_kernel(variant: Variant) -> Any:
         shares: wp.array(dtype=real),
     ) -> None:
         i = wp.tid()
-        window = part.window_at(plate, real(THICKNESS), fields.cells_y, fields.cells_z, 0, hit_y, hit_z)
+        window = part.window_at(plate, real(THICKNESS), 2, 2, 0, hit_y, hit_z)
         material[i] = plate.tile[part.tile_at(plate, window, y[i], z[i])]
         shares[i] = part.on_plate(plate, window, y[i], z[i])
 
@@ -176,7 +176,6 @@ def beneath(variant: Variant, hit: Array, y: Array, z: Array, device: str, **pla
     outputs = [poisoned(len(y), variant.real, device) for _ in range(2)]
     inputs = [
         plate_of(part.Plate, TILE, PERIOD, CELL, device, real=variant.real, **plate),
-        part.Fields(),
         *hit,
         *(wp.array(a, dtype=variant.real, device=device) for a in (y, z)),
     ]

@@ -1,4 +1,4 @@
-"""Rigid-body motion: closed forms of the symmetric top, and what a kick may and may not do (MODEL.md §5)."""
+"""Rigid-body motion: closed forms of the symmetric top, and what a kick may and may not do (docs/model.md §5)."""
 
 from types import SimpleNamespace
 from typing import Any

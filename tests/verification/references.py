@@ -1,6 +1,6 @@
 """Closed forms and quadratures that the simulation is held against; nothing here knows warpimpact.
 
-Section numbers (§) are those of the model's description. Everything is SI, angles are radians. A core that
+Section numbers (§) are those of docs/model.md. Everything is SI, angles are radians. A core that
 meets a plate here flies straight along the plate's normal, so one coordinate is enough: the depth X of its
 tip below the front face. Station s counts from the tip, and section s lies at depth X − s. Plates take the
 keywords of a scene: thickness h [m], resistance Y [Pa], shear_coefficient η, degradation β,

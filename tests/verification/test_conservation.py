@@ -1,4 +1,4 @@
-"""Every step of hard, glancing and tumbling shots: energy never grows, and momentum is impulse (MODEL.md §4, 5)."""
+"""Each step of hard, glancing and tumbling shots: energy never grows, and momentum is impulse (docs/model.md §4, 5)."""
 
 from dataclasses import dataclass, field
 from functools import cache

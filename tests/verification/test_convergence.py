@@ -1,4 +1,4 @@
-"""Halving the step, the patches and the cells shrinks the error (MODEL.md §4): differences between neighbours."""
+"""Halving the step, the patches and the cells shrinks the error (docs/model.md §4): differences between neighbours."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""A hit on the straight edge of a plate too weak to turn the core: force, moment and exposure (MODEL.md §4, 5)."""
+"""A hit on the straight edge of a plate too weak to turn the core: force, moment and exposure (docs/model.md §4, 5)."""
 
 import numpy as np
 import pytest

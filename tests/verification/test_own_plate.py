@@ -96,7 +96,7 @@ def test_a_shot_is_the_same_in_any_company(double: bool, device: str) -> None:
 
 
 def test_every_shot_does_the_work_of_its_own_plate(device: str) -> None:
-    # m (v0² − v²)/2 = Y h π R² at η = 0, β = 1 (MODEL.md §6.1), each shot with its Y, h and m.
+    # m (v0² − v²)/2 = Y h π R² at η = 0, β = 1 (docs/model.md §6.1), each shot with its Y, h and m.
     own = own_numbers() | {"shear_coefficient": np.zeros(COUNT), "degradation": np.ones(COUNT)}
     shots = Shots(**shots_at(np.zeros(COUNT)).columns | own)
     outcomes = simulate(solid_plate(**FAR), shots, device=device)

@@ -1,4 +1,4 @@
-"""Velocity-dependent stress on a pointed core: Poncelet's closed forms, arrest included (MODEL.md §6.4)."""
+"""Velocity-dependent stress on a pointed core: Poncelet's closed forms, arrest included (docs/model.md §6.4)."""
 
 from dataclasses import dataclass
 

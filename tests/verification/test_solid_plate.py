@@ -1,4 +1,4 @@
-"""Straight through a solid plate: the work of the contact, and what degradation leaves of it (MODEL.md §6.1 to 6.3)."""
+"""The work of a straight shot through a solid plate, and what degradation leaves of it (docs/model.md §6.1 to 6.3)."""
 
 from math import pi
 

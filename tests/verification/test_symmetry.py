@@ -1,4 +1,4 @@
-"""Mirrored, shifted and turned scenes have mirrored, shifted and turned outcomes (MODEL.md §6.7)."""
+"""Mirrored, shifted and turned scenes have mirrored, shifted and turned outcomes (docs/model.md §6.7)."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Torque-free flight of the spinning core: through a hole, and behind a plate (MODEL.md §5, 6.5, 6.6)."""
+"""Torque-free flight of the spinning core: through a hole, and behind a plate (docs/model.md §5, 6.5, 6.6)."""
 
 import numpy as np
 import pytest

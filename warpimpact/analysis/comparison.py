@@ -21,12 +21,14 @@ from typing import Any
 import numpy as np
 import xarray
 
-from warpimpact.analysis.effectiveness import ANGLE, SHOWN_UNITS, Evidence, Measure, dealing, gather, interval_text
+from warpimpact.analysis.effectiveness import ANGLE, SHOWN_UNITS, Evidence, Measure, gather, interval_text
 from warpimpact.analysis.effectiveness import number_text as number
 from warpimpact.analysis.summary import sampling_note
 from warpimpact.campaign.parts import first_difference
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
-from warpimpact.results.variables import SHOT_VARIABLES
+from warpimpact.results.measures import dealing
 from warpimpact.statistics.comparisons import confidence_of_each, difference_of_independent
 from warpimpact.statistics.intervals import estimate_of
 
@@ -130,7 +132,7 @@ def compare(
                 value, low, high = interval or _paired(evidences[i], evidences[j], dealt[0])
                 differences.append(Difference(evidences[i].measure.name, names[i], names[j], value, low, high))
     plates = tuple(
-        Contestant(name, dataset.attrs["areal_density"], dataset.attrs["open_area"], tuple(told))
+        Contestant(name, dataset.attrs[attr.AREAL_DENSITY], dataset.attrs[attr.OPEN_AREA], tuple(told))
         for name, dataset, told in zip(names, datasets, measures, strict=True)
     )
     return Comparison(plates, tuple(differences), hits, independent, confidence, tuple(_notes(datasets)))
@@ -168,31 +170,32 @@ def _check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, 
 def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     """What must be the same for plates to be compared."""
     told = dataset.attrs
-    if not {"core", "impact"} <= told.keys():
+    if not {attr.CORE, attr.IMPACT} <= told.keys():
         raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
-    output = {"standoffs": dataset["standoff"].values.tolist(), "standoff_point": told["standoff_point"]}
-    return {"core": json.loads(told["core"]), "impact": json.loads(told["impact"]), "output": output}
+    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
+    return {"core": json.loads(told[attr.CORE]), "impact": json.loads(told[attr.IMPACT]), "output": output}
 
 
 def _other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
     """Why the shots of two results are not the same ones; empty where they are."""
     if dealing(one) != dealing(other):
         return "their shots have other replicates or symmetries"
-    for axis, coordinate in enumerate(("hit_y", "hit_z")):
-        here, there = (dataset[coordinate].values / dataset.attrs["plate_period"][axis] for dataset in (one, other))
+    for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
+        here, there = (dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (one, other))
         if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
             return "their shots hit other places of the cell"
-    for name in (*SHOT_VARIABLES, "mass"):
+    for name in (*v.SHOT_VARIABLES, v.MASS):
         if name in one and not (name in other and np.array_equal(one[name], other[name])):
             return f"their shots differ in {name}"
     return ""
 
 
 def _notes(datasets: Sequence[xarray.Dataset]) -> Iterator[str]:
-    densities = [dataset.attrs["areal_density"] for dataset in datasets]
+    densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
     if max(densities) > 1.01 * min(densities):
         yield "The plates differ in weight; the ratio to the solid plate of the same areal density allows for it."
-    asked = [json.loads(dataset.attrs["numerics_given"]) for dataset in datasets if "numerics_given" in dataset.attrs]
+    texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]
+    asked = [json.loads(text) for text in texts]
     differences = (first_difference(one, other) for one, other in pairwise(asked))
     if (found := next(filter(None, differences), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)

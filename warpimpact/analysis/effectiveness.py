@@ -17,7 +17,9 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.effects import Effect, effects
-from warpimpact.results.dataset import images, solid_reference
+from warpimpact.results import attributes as attr
+from warpimpact.results.dataset import solid_reference
+from warpimpact.results.measures import dealing
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
@@ -122,11 +124,6 @@ def gather(
             yield _worst_point(effect, values, solid)
 
 
-def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
-    """How the shots of a result were dealt out, for `intervals.Dealt`."""
-    return {"replicates": int(dataset.attrs.get("replicates", 1)), "images": images(dataset)}
-
-
 def _averaged(
     effect: Effect, statistic: _Statistic, numbers: Array, solid: Array | None, dealt: dict[str, Any]
 ) -> Evidence:
@@ -195,9 +192,9 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
 def plate_text(dataset: xarray.Dataset) -> str:
     """Areal density and open area, where a result carries them."""
     told = dataset.attrs
-    if "areal_density" not in told:
+    if attr.AREAL_DENSITY not in told:
         return ""
-    return f", {told['areal_density']:.4g} kg/m², {told['open_area']:.1%} open"
+    return f", {told[attr.AREAL_DENSITY]:.4g} kg/m², {told[attr.OPEN_AREA]:.1%} open"
 
 
 def _second(measure: Measure) -> str:

@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from warpimpact.analysis.summary import slices
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 from warpimpact.results.files import ResultError
 from warpimpact.scene import AnyCore, Core
 
 Array = NDArray[np.float64]
 
-_NEEDED = ("status", "impact_velocity", "residual_velocity", "tilt", "mass")
+_NEEDED = (v.STATUS, v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS)
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
         kind="mean",
         values=_energy_fraction,
     )
-    if "core" in dataset.attrs:
+    if attr.CORE in dataset.attrs:
         yield Effect(
             name="residual_energy_density",
             label=f"proxy: energy per presented area at {at}",
@@ -87,7 +89,7 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
             "a convex body is Cauchy's",
             higher_is_better=False,
             kind="mean",
-            values=_energy_density(TypeAdapter[Core](AnyCore).validate_json(dataset.attrs["core"]), standoff),
+            values=_energy_density(TypeAdapter[Core](AnyCore).validate_json(dataset.attrs[attr.CORE]), standoff),
         )
     yield Effect(
         name="tilted_share",
@@ -116,7 +118,7 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
 
 def _at_standoff(dataset: xarray.Dataset, standoff: float | None) -> float:
     """The stand-off of a result that is meant [m]."""
-    distances = dataset["standoff"].values
+    distances = dataset[v.STANDOFF].values
     if standoff is None:
         return float(distances[-1])
     nearest = float(distances[np.argmin(np.abs(distances - standoff))])
@@ -132,13 +134,13 @@ def _of_passed(part: xarray.Dataset, values: Array, otherwise: float) -> Array:
 
 
 def _energy_fraction(part: xarray.Dataset) -> Array:
-    fraction = (part["residual_velocity"].values / part["impact_velocity"].values) ** 2
+    fraction = (part[v.RESIDUAL_VELOCITY].values / part[v.IMPACT_VELOCITY].values) ** 2
     return _of_passed(part, fraction, 0.0)
 
 
 def _inclination(part: xarray.Dataset, standoff: float) -> Array:
     """Between axis and line of fire, nose or base first alike [degree], shape [hits]."""
-    tilt = part["tilt"].sel(standoff=standoff, method="nearest").values
+    tilt = part[v.TILT].sel(standoff=standoff, method="nearest").values
     return np.minimum(tilt, 180.0 - tilt)
 
 
@@ -148,8 +150,8 @@ def _energy_density(core: Core, standoff: float) -> Callable[[xarray.Dataset], A
     silhouette = core.presented_area(np.radians(table)) * 1e6
 
     def values(part: xarray.Dataset) -> Array:
-        mass = part["mass"].values if "mass" in part else core.mass_properties.mass
-        energy = 0.5 * mass * part["residual_velocity"].values ** 2
+        mass = part[v.MASS].values if v.MASS in part else core.mass_properties.mass
+        energy = 0.5 * mass * part[v.RESIDUAL_VELOCITY].values ** 2
         return _of_passed(part, energy / np.interp(_inclination(part, standoff), table, silhouette), 0.0)
 
     return values

@@ -5,6 +5,8 @@ from __future__ import annotations
 import xarray
 
 from warpimpact.kernels.status import Status
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 
 _AGREEMENT = {
     "bit-identical": "The end is bit-identical to the stored outcome.",
@@ -15,15 +17,15 @@ _AGREEMENT = {
 
 def hit_text(history: xarray.Dataset) -> str:
     """How a replayed hit ended, as a few lines."""
-    place = ", ".join(f"{axis} = {float(history[f'hit_{axis}']) * 1e3:.3f} mm" for axis in "yz")
+    place = ", ".join(f"{axis} = {float(history[v.HIT_POINT[axis]]) * 1e3:.3f} mm" for axis in "yz")
     lines = [
-        f"hit {history.attrs['hit']} at {place}",
-        Status(int(history["status"])).sentence,
-        f"{'residual velocity':<20}{float(history['residual_velocity']):>8.1f} m/s",
+        f"hit {history.attrs[attr.HIT]} at {place}",
+        Status(int(history[v.STATUS])).sentence,
+        f"{'residual velocity':<20}{float(history[v.RESIDUAL_VELOCITY]):>8.1f} m/s",
     ]
     lines += [
         f"{f'tilt at {float(tilt.standoff) * 1e3:g} mm':<20}{float(tilt):>8.1f} °"
-        for tilt in history["tilt"]
+        for tilt in history[v.TILT]
         if tilt.notnull()
     ]
-    return "\n".join([*lines, _AGREEMENT[history.attrs["agreement"]]])
+    return "\n".join([*lines, _AGREEMENT[history.attrs[attr.AGREEMENT]]])

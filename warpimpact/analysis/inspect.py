@@ -13,16 +13,17 @@ from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
     UNITS,
     estimated,
-    main_measures,
+    means_of,
     sampling_note,
     slices,
     stop_lines,
     symmetry_text,
 )
 from warpimpact.kernels.status import Status
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import STATUSES, Measure
-from warpimpact.results.variables import shot_variables
 from warpimpact.statistics.intervals import Estimate
 
 _QUANTILES = (0.05, 0.5, 0.95)
@@ -39,23 +40,24 @@ def inspect_text(dataset: xarray.Dataset) -> str:
 def _origin(dataset: xarray.Dataset) -> Iterator[str]:
     told = dataset.attrs
     hits = f"{dataset.sizes['hit']} hits"
-    if "sampling" in told:
-        hits += f", {told['sampling']} sampling, seed {told['seed']}"
-        hits += f", {told['replicates']} replicates" if told["replicates"] > 1 else ""
-    yield told.get("title", "untitled")
+    if attr.SAMPLING in told:
+        hits += f", {told[attr.SAMPLING]} sampling, seed {told[attr.SEED]}"
+        hits += f", {told[attr.REPLICATES]} replicates" if told[attr.REPLICATES] > 1 else ""
+    yield told.get(attr.TITLE, "untitled")
     yield f"{'hits':<12}{hits}"
-    if "symmetries" in told:
+    if attr.SYMMETRIES in told:
         yield f"{'symmetry':<12}{symmetry_text(dataset)}"
-    if "areal_density" in told:
-        numbers = plate_numbers(told["open_area"], told.get("ligament", math.inf), told["areal_density"])
+    if attr.AREAL_DENSITY in told:
+        numbers = plate_numbers(told[attr.OPEN_AREA], told.get(attr.LIGAMENT, math.inf), told[attr.AREAL_DENSITY])
         yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}"
-    for label, name in (("numerics", "numerics"), ("device", "device"), ("history", "history")):
+    for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY):
         if name in told:
-            yield f"{label:<12}{told[name]}"
-    if "warpimpact_version" in told:
-        yield f"{'made by':<12}warpimpact {told['warpimpact_version']}, Warp {told['warp_version']}"
-    if "compute_time" in told:
-        yield f"{'took':<12}{told['compute_time']:.4g} s of computing, {told['hits_per_second']:.4g} hits per second"
+            yield f"{name:<12}{told[name]}"
+    if attr.WARPIMPACT_VERSION in told:
+        yield f"{'made by':<12}warpimpact {told[attr.WARPIMPACT_VERSION]}, Warp {told[attr.WARP_VERSION]}"
+    if attr.COMPUTE_TIME in told:
+        rate = f"{told[attr.HITS_PER_SECOND]:.4g} hits per second"
+        yield f"{'took':<12}{told[attr.COMPUTE_TIME]:.4g} s of computing, {rate}"
 
 
 def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
@@ -69,9 +71,8 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
     """Means and quantiles of the cores that passed the plate, with intervals."""
     yield f"{'passed the plate':<41}{'':>10}   95 % interval"
-    means = main_measures(dataset["standoff"].values.tolist())
-    bending = (name for name in ("largest_bending_moment", "bending_stress") if name in dataset)
-    for mean in (*means, *(Measure.parse(f"mean({name})") for name in bending)):
+    shown = [name for name in v.shown_by("inspect") if name in dataset]
+    for mean in means_of(shown, dataset[v.STANDOFF].values.tolist()):
         name = mean.text.removeprefix("mean(").removesuffix(")")
         quantiles = [Measure.parse(f"quantile({name}, {share})") for share in _QUANTILES]
         for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
@@ -95,16 +96,16 @@ def _row(measure: Measure, estimate: Estimate) -> str:
 
 def failures(dataset: xarray.Dataset) -> Iterator[str]:
     """Every shot whose computation failed: its number, status and inputs."""
-    inputs = ["hit_y", "hit_z", *shot_variables(dataset)]
+    inputs = [v.HIT_Y, v.HIT_Z, *v.shot_variables(dataset)]
     first = count = 0
-    for part in slices(dataset[["status", *inputs]]):
+    for part in slices(dataset[[v.STATUS, *inputs]]):
         for place in np.flatnonzero(failed(part)):
             shot = part.isel(hit=place)
             if not count:
                 yield "failed shots: " + ", ".join(["hit", "status", *(_labelled(dataset, name) for name in inputs)])
             count += 1
             values = "".join(f"{float(shot[name]):>14.6g}" for name in inputs)
-            yield f"{first + place:>10d}  {Status(int(shot['status'])).name.lower():<14}{values}"
+            yield f"{first + place:>10d}  {Status(int(shot[v.STATUS])).name.lower():<14}{values}"
         first += part.sizes["hit"]
     yield f"{count} of {first} shots failed"
 

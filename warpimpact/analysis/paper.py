@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import xarray
 
+from warpimpact.results import variables as v
+
 
 class Row(NamedTuple):
     """Residual velocity [m/s], and pitch and yaw [degree] at 50 and 130 mm behind the plate."""
@@ -45,9 +47,9 @@ def computed_row(dataset: xarray.Dataset, hit: int) -> Row:
     The hit's mirror images turn the other way, so the paper's signs can always be had.
     """
     shot = dataset.isel(hit=hit).sel(standoff=list(STANDOFFS), method="nearest")
-    angles = [_positive_at_last(shot[name].values.tolist()) for name in ("yaw", "pitch")]
+    angles = [_positive_at_last(shot[name].values.tolist()) for name in (v.YAW, v.PITCH)]
     (pitch_50, pitch_130), (yaw_50, yaw_130) = angles
-    return Row(float(shot["residual_velocity"]), pitch_50, yaw_50, pitch_130, yaw_130)
+    return Row(float(shot[v.RESIDUAL_VELOCITY]), pitch_50, yaw_50, pitch_130, yaw_130)
 
 
 def _positive_at_last(angles: list[float]) -> list[float]:

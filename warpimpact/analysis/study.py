@@ -17,12 +17,12 @@ from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 import numpy as np
-import warp
 import xarray
 from numpy.typing import NDArray
 
-import warpimpact
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import study_dataset
 from warpimpact.scene import Hits, Numerics, Shots, make_shots
 from warpimpact.solver.device import find_device
@@ -58,7 +58,7 @@ SWEEP = (
 NODAL_STEPS = (1.0e-6, 0.5e-6)
 """Time steps of the paper's literal scheme [s]."""
 
-QUANTITIES = ("residual_velocity", "tilt")
+QUANTITIES = (v.RESIDUAL_VELOCITY, v.TILT)
 QUANTILES = (0.5, 0.9, 1.0)
 QUOTED = 0.9
 MEASURED_TIME = 1.0
@@ -115,7 +115,7 @@ def study(
         levels: refinements behind the converged answer, at least two, coarse to fine.
 
     Returns:
-        The Dataset of results.py with dimensions setting, quantile, standoff, level and hit.
+        The Dataset of results/dataset.py with dimensions setting, quantile, standoff, level and hit.
 
     Raises:
         DeviceError: the device is absent.
@@ -129,28 +129,28 @@ def study(
     rates = np.array([rate for _, rate in measured])
     values = _numerics_values(campaign, settings) | _error_values([answer for answer, _ in measured], truth)
     values |= _converged_values(truth) | {
-        "setting": list(settings),
-        "quantile": np.array(QUANTILES),
-        "level": [label(campaign, numerics) for _, numerics in pairs],
-        "standoff": np.array(campaign.output.standoffs),
-        "hit_y": bench.shots.hit_y,
-        "hit_z": bench.shots.hit_z,
-        "hits_per_second": rates,
+        v.SETTING: list(settings),
+        v.QUANTILE: np.array(QUANTILES),
+        v.STUDY_LEVEL: [label(campaign, numerics) for _, numerics in pairs],
+        v.STANDOFF: np.array(campaign.output.standoffs),
+        v.HIT_Y: bench.shots.hit_y,
+        v.HIT_Z: bench.shots.hit_z,
+        v.HITS_PER_SECOND: rates,
     }
     quoted = QUANTILES.index(QUOTED)
-    values["residual_velocity_front"] = front(rates, values["residual_velocity_error"][:, quoted]).astype(np.int8)
-    values["tilt_front"] = front(rates, values["tilt_error"][:, quoted, -1]).astype(np.int8)
+    for name in QUANTITIES:
+        errors = values[v.ERRORS[name]][:, quoted].reshape(len(rates), -1)[:, -1]  # at the last stand-off
+        values[v.FRONTS[name]] = front(rates, errors).astype(np.int8)
     return study_dataset(
         values,
         {
-            "title": campaign.title,
-            "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact study",
-            "campaign": campaign.text,
-            "warpimpact_version": warpimpact.__version__,
-            "warp_version": warp.__version__,
-            "device": f"{bench.device.alias} ({bench.device.name})",
-            "seed": campaign.hits.seed,
-            "standoff_point": campaign.output.standoff_point,
+            attr.TITLE: campaign.title,
+            attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact study",
+            attr.CAMPAIGN: campaign.text,
+            **attr.versions(),
+            attr.DEVICE: f"{bench.device.alias} ({bench.device.name})",
+            attr.SEED: campaign.hits.seed,
+            attr.STANDOFF_POINT: campaign.output.standoff_point,
         },
     )
 
@@ -209,62 +209,6 @@ def front(rates: Array, errors: Array) -> NDArray[np.bool_]:
     no_worse = (rates[:, None] >= rates) & (errors[:, None] <= errors)
     better = (rates[:, None] > rates) | (errors[:, None] < errors)
     return np.isfinite(errors) & ~(no_worse & better).any(axis=0)
-
-
-def advantage(dataset: xarray.Dataset, literal: str) -> tuple[str, float] | None:
-    """The fastest consistent setting with 90 % errors no larger than those of a literal one (by its name), at the last
-    stand-off, and how many times as fast it is; None if there is none."""
-    quoted = dataset.sel(quantile=QUOTED).isel(standoff=-1)
-    rival = quoted.sel(setting=literal)
-    no_worse = quoted["scheme"] == "consistent"
-    for name in QUANTITIES:
-        no_worse &= quoted[f"{name}_error"] <= rival[f"{name}_error"]
-    if not no_worse.any():
-        return None
-    rates = quoted["hits_per_second"].where(no_worse)
-    return str(rates.idxmax().item()), float(rates.max() / rival["hits_per_second"])
-
-
-def study_text(dataset: xarray.Dataset) -> str:
-    """The study as a table, fast to slow, and what the converged answer is worth."""
-    last = dataset.isel(standoff=-1).sortby("hits_per_second", ascending=False)
-    standoff = f"{last['standoff'].item() * 1e3:g} mm"
-    change = last.isel(level=-1).sel(quantile=QUOTED)
-    unsettled = int((dataset["settled"] == 0).sum())
-    width = max(len(name) for name in last["setting"].values)
-    lines = [
-        f"{'':{width + 10}}{'residual velocity [m/s]':>26}{f'tilt at {standoff} [°]':>28}{'other':>10}",
-        f"{'setting':{width}}{'hits/s':>10}{_heads()}{_heads()}{'status':>8}",
-        *(_row(last.isel(setting=index), width) for index in range(last.sizes["setting"])),
-        "* no faster setting has a smaller 90 % error",
-        *(_advantage_line(dataset, name) for name in last["setting"].values[last["scheme"] == "nodal"]),
-        f"converged answer: uncertain by {change['residual_velocity_change'].item():.2g} m/s and "
-        f"{change['tilt_change'].item():.2g}° (90 % of {dataset.sizes['hit']} hits)",
-    ]
-    if unsettled:
-        lines.append(
-            f"left out, as their status still depends on the numerics: {unsettled} of {dataset.sizes['hit']} hits"
-        )
-    return "\n".join(lines)
-
-
-def _advantage_line(dataset: xarray.Dataset, literal: str) -> str:
-    found = advantage(dataset, literal)
-    if found is None:
-        return f"{literal}: no setting of the consistent scheme is as close"
-    return f"{literal}: {found[0]} is no further off and {found[1]:.3g} times as fast"
-
-
-def _heads() -> str:
-    return "  " + "".join(f"{name:>8}" for name in ("50 %", "90 %", "max")) + "  "
-
-
-def _row(setting: xarray.Dataset, width: int) -> str:
-    cells = f"{setting['setting'].item():{width}}{setting['hits_per_second'].item():10.4g}"
-    for name in QUANTITIES:
-        cells += "  " + "".join(f"{value:8.3f}" for value in setting[f"{name}_error"].values)
-        cells += " *" if setting[f"{name}_front"] else "  "
-    return cells + f"{setting['other_status'].item():8d}"
 
 
 class _Bench:
@@ -336,12 +280,12 @@ def _doubled(level: Fidelity) -> Fidelity:
 def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> dict[str, Any]:
     """The numerics of every setting with all choices made."""
     resolutions = [resolve(numerics, campaign.scene) for numerics in settings.values()]
-    values = {
+    values: dict[str, Any] = {
         name: np.array([getattr(resolution, name) for resolution in resolutions])
-        for name in ("patches_axial", "patches_around", "grid_spacing")
+        for name in (v.PATCHES_AXIAL, v.PATCHES_AROUND, v.GRID_SPACING)
     }
     steps = [_time_step(campaign, resolution) for resolution in resolutions]
-    return values | {"scheme": [numerics.scheme for numerics in settings.values()], "time_step": np.array(steps)}
+    return values | {v.SCHEME: [numerics.scheme for numerics in settings.values()], v.TIME_STEP: np.array(steps)}
 
 
 def _error_values(answers: Sequence[Answer], truth: Converged) -> dict[str, Any]:
@@ -354,22 +298,22 @@ def _error_values(answers: Sequence[Answer], truth: Converged) -> dict[str, Any]
         return off
 
     values: dict[str, Any] = {
-        f"{name}_error": np.stack([_quantiles(errors(name, index)) for index in range(len(answers))])
+        v.ERRORS[name]: np.stack([_quantiles(errors(name, index)) for index in range(len(answers))])
         for name in QUANTITIES
     }
-    return values | {"other_status": (truth.settled & ~same).sum(axis=1)}
+    return values | {v.OTHER_STATUS: (truth.settled & ~same).sum(axis=1)}
 
 
 def _converged_values(truth: Converged) -> dict[str, Any]:
     return {
-        "settled": truth.settled.astype(np.int8),
-        "status": truth.answer.status,
-        "residual_velocity": truth.answer.residual_velocity,
-        "tilt": truth.answer.tilt,
-        "residual_velocity_uncertainty": truth.residual_velocity_changes[-1],
-        "tilt_uncertainty": truth.tilt_changes[-1],
-        "residual_velocity_change": np.stack([_quantiles(change) for change in truth.residual_velocity_changes]),
-        "tilt_change": np.stack([_quantiles(change) for change in truth.tilt_changes]),
+        v.SETTLED: truth.settled.astype(np.int8),
+        v.CONVERGED_STATUS: truth.answer.status,
+        v.CONVERGED_VELOCITY: truth.answer.residual_velocity,
+        v.CONVERGED_TILT: truth.answer.tilt,
+        v.UNCERTAINTIES[v.RESIDUAL_VELOCITY]: truth.residual_velocity_changes[-1],
+        v.UNCERTAINTIES[v.TILT]: truth.tilt_changes[-1],
+        v.CHANGES[v.RESIDUAL_VELOCITY]: np.stack([_quantiles(change) for change in truth.residual_velocity_changes]),
+        v.CHANGES[v.TILT]: np.stack([_quantiles(change) for change in truth.tilt_changes]),
     }
 
 

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 
-from warpimpact.results.dataset import images, status_codes
-from warpimpact.results.measures import MEASURED, Measure, Tally
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import status_codes
+from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
 from warpimpact.statistics.intervals import Estimate
 
 SLICE = 2**18
@@ -45,12 +47,12 @@ class Summary:
 
 def summary(dataset: xarray.Dataset) -> Summary:
     """Summarise a hit map; velocity, deflection and tilt count only the cores that passed the plate."""
-    codes, standoffs = status_codes(dataset), dataset["standoff"].values.tolist()
-    velocity, deflection, *tilt = main_measures(standoffs)
+    codes, standoffs = status_codes(dataset), dataset[v.STANDOFF].values.tolist()
+    velocity, deflection, *tilt = means_of((v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT), standoffs)
     estimates = estimated(dataset, [velocity, deflection, *tilt])
     counts = np.zeros(len(codes), dtype=int)
-    for part in slices(dataset[["status"]]):
-        counts += (part["status"].values[:, None] == list(codes.values())).sum(axis=0)
+    for part in slices(dataset[[v.STATUS]]):
+        counts += (part[v.STATUS].values[:, None] == list(codes.values())).sum(axis=0)
     return Summary(
         counts=dict(zip(codes, counts.tolist(), strict=True)),
         residual_velocity=Spread.of(estimates[velocity]),
@@ -59,19 +61,21 @@ def summary(dataset: xarray.Dataset) -> Summary:
     )
 
 
-def main_measures(standoffs: Sequence[float]) -> list[Measure]:
-    """Means of residual velocity, deflection and the tilt at every stand-off [m]."""
-    names = ["residual_velocity", "deflection", *(f"tilt@{standoff!r}m" for standoff in standoffs)]
-    return [Measure.parse(f"mean({name})") for name in names]
+def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
+    """Means of some variables, at every stand-off [m] of those that have one."""
+    return [
+        Measure.parse(f"mean({variable})" if at is None else f"mean({variable}@{at!r}m)")
+        for variable in variables
+        for at in (standoffs if v.STANDOFF in variable.dims else [None])
+    ]
 
 
 def estimated(
     dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95
 ) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals; of an open file only a slice is in memory at a time."""
-    dealt = {"replicates": int(dataset.attrs.get("replicates", 1)), "images": images(dataset)}
-    tallies = [Tally(measure, **dealt, confidence=confidence) for measure in measures]
-    for part in slices(dataset[["status", *(name for name in MEASURED if name in dataset)]]):
+    tallies = [Tally(measure, **dealing(dataset), confidence=confidence) for measure in measures]
+    for part in slices(dataset[[v.STATUS, *(name for name in MEASURED if name in dataset)]]):
         for tally in tallies:
             tally.add(part)
     return {tally.measure: tally.estimate() for tally in tallies}
@@ -93,7 +97,7 @@ _SAMPLINGS = {
 def sampling_note(dataset: xarray.Dataset) -> str:
     """What there is to say of the intervals of a result because of its sampling, if anything."""
     told = dataset.attrs
-    return _SAMPLINGS.get(told.get("sampling", ""), "") if told.get("replicates", 1) == 1 else ""
+    return _SAMPLINGS.get(told.get(attr.SAMPLING, ""), "") if told.get(attr.REPLICATES, 1) == 1 else ""
 
 
 def summary_text(dataset: xarray.Dataset) -> str:
@@ -116,22 +120,22 @@ UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "N m": " N m", "
 def stop_lines(dataset: xarray.Dataset) -> list[str]:
     """What the stop rule asked for, if there was one."""
     told = dataset.attrs
-    if "stop_quantity" not in told:
+    if attr.STOP_QUANTITY not in told:
         return []
-    (low, high), unit = told["estimate_interval"], UNITS[told["estimate_units"]]
-    reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told["stop_reason"]]
+    (low, high), unit = told[attr.ESTIMATE_INTERVAL], UNITS[told[attr.ESTIMATE_UNITS]]
+    reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told[attr.STOP_REASON]]
     return [
-        f"{told['stop_quantity']} = {told['estimate']:.6g}{unit}, {told['confidence']:.4g} interval "
+        f"{told[attr.STOP_QUANTITY]} = {told[attr.ESTIMATE]:.6g}{unit}, {told[attr.CONFIDENCE]:.4g} interval "
         f"{low:.6g} to {high:.6g}{unit}; {reason}"
     ]
 
 
 def symmetry_text(dataset: xarray.Dataset) -> str:
     """How many hits of a map with `hits.irreducible` were computed, and where the others come from."""
-    computed, hits = dataset.attrs["computed_hits"], dataset.sizes["hit"]
+    computed, hits = dataset.attrs[attr.COMPUTED_HITS], dataset.sizes["hit"]
     if computed == hits:
         return f"all {hits} hits computed: plate and shot have no symmetry in common"
-    return f"{computed} of {hits} hits computed, the others are their images by {dataset.attrs['symmetries']}"
+    return f"{computed} of {hits} hits computed, the others are their images by {dataset.attrs[attr.SYMMETRIES]}"
 
 
 def _count_row(meaning: str, count: int, hits: int) -> str:

@@ -8,6 +8,9 @@ import numpy as np
 import xarray
 from scipy.spatial.transform import Rotation
 
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -37,20 +40,20 @@ def pressed(history: xarray.Dataset, step: int) -> Surface:
     recorded force, and within 4° of it. The discs that close nose and base are left out.
     """
     arm, normal, area = _body(history)
-    turn = Rotation.from_quat(history["attitude"].values[step])
+    turn = Rotation.from_quat(history[v.ATTITUDE].values[step])
     arm, normal = _turned(turn, arm), _turned(turn, normal)
-    point = history["plate_position"].values[step] + arm
-    moving = history[["velocity", "angular_velocity"]].isel(time=slice(max(step - 1, 0), step + 1)).mean("time")
-    velocity = moving["velocity"].values + np.cross(moving["angular_velocity"].values, arm)
+    point = history[v.PLATE_POSITION].values[step] + arm
+    moving = history[[v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY]].isel(time=slice(max(step - 1, 0), step + 1)).mean("time")
+    velocity = moving[v.VELOCITY].values + np.cross(moving[v.MARCHED_ANGULAR_VELOCITY].values, arm)
     closing = np.sum(velocity * normal, axis=-1)
-    inside = (point[..., 0] >= 0.0) & (point[..., 0] <= history.attrs["plate_thickness"])
+    inside = (point[..., 0] >= 0.0) & (point[..., 0] <= history.attrs[attr.PLATE_THICKNESS])
     touching = inside & (closing > _AT_REST * np.linalg.norm(velocity, axis=-1))
     return Surface(point, normal, area, np.where(touching, _left(history, step, point), 0.0))
 
 
 def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     """Points from the centre of mass and normals in the axes of the body, and areas, as of `Surface`."""
-    station, radius = history["station"].values, history["core_radius"].values
+    station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
     along, outward = -np.diff(station), np.diff(radius)  # from one section to the next, towards the base
     slant = np.hypot(along, outward)
     azimuth = (np.arange(AROUND) + 0.5) * 2.0 * np.pi / AROUND
@@ -67,10 +70,10 @@ def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
 def _left(history: xarray.Dataset, step: int, point: Array) -> Array:
     """Share of the resistance left at points of the plate: between snapshots its logarithm, which follows the exposure,
     changes evenly; 0 beyond what the snapshots show."""
-    share = history["resistance_share"]
+    share = history[v.RESISTANCE_SHARE]
     spent = xarray.where(share > _SPENT, share, _SPENT)
-    now = np.exp(xarray.apply_ufunc(np.log, spent).interp(snapshot=history["time"][step]))
-    cells = {f"cell_{axis}": (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
+    now = np.exp(xarray.apply_ufunc(np.log, spent).interp(snapshot=history[v.TIME][step]))
+    cells = {v.CELL[axis]: (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
     return np.nan_to_num(now.interp(cells).values)
 
 

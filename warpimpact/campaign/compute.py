@@ -11,11 +11,10 @@ from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
-import warp
 import xarray
 
-import warpimpact
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import solid_dataset, to_dataset
 from warpimpact.scene import Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
@@ -44,7 +43,7 @@ def compute(
         device, threads, progress: as in `simulate`.
 
     Returns:
-        The Dataset of results.py, one entry per shot: a result of its own.
+        The Dataset of results/dataset.py, one entry per shot: a result of its own.
 
     Raises:
         DeviceError: the device is absent.
@@ -64,28 +63,27 @@ def compute(
         unfolded(outcomes, group),
         period=period,
         attributes={
-            "title": campaign.title,
-            "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
-            "campaign": campaign.text,
-            "warpimpact_version": warpimpact.__version__,
-            "warp_version": warp.__version__,
-            "device": f"{chosen.alias} ({chosen.name})",
-            "sampling": campaign.hits.sampling,
-            "seed": campaign.hits.seed,
-            "replicates": campaign.replicates,
-            "standoff_point": campaign.output.standoff_point,
-            "open_area": campaign.plate.open_area,
-            "areal_density": campaign.plate.areal_density,
-            "core": campaign.core.model_dump_json(),
-            "impact": _impact(campaign),
-            "numerics": _numerics(campaign, shots),
-            "numerics_given": json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
-            "failed_share": campaign.output.failed_share,
-            "compute_time": elapsed,
-            "hits_per_second": len(computed) / elapsed,
+            attr.TITLE: campaign.title,
+            attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+            attr.CAMPAIGN: campaign.text,
+            **attr.versions(),
+            attr.DEVICE: f"{chosen.alias} ({chosen.name})",
+            attr.SAMPLING: campaign.hits.sampling,
+            attr.SEED: campaign.hits.seed,
+            attr.REPLICATES: campaign.replicates,
+            attr.STANDOFF_POINT: campaign.output.standoff_point,
+            attr.OPEN_AREA: campaign.plate.open_area,
+            attr.AREAL_DENSITY: campaign.plate.areal_density,
+            attr.CORE: campaign.core.model_dump_json(),
+            attr.IMPACT: _impact(campaign),
+            attr.NUMERICS: _numerics(campaign, shots),
+            attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
+            attr.FAILED_SHARE: campaign.output.failed_share,
+            attr.COMPUTE_TIME: elapsed,
+            attr.HITS_PER_SECOND: len(computed) / elapsed,
         }
-        | ({} if campaign.hits.count is None else {"count": campaign.hits.count})
-        | ({"ligament": ligament} if math.isfinite(ligament) else {})
+        | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
+        | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {}),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
     )
@@ -130,16 +128,15 @@ def _impact(campaign: Campaign) -> str:
 
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
     """By which symmetries hits were unfolded, and how many were computed."""
-    return {"symmetries": ", ".join(map(str, group)), "computed_hits": computed}
+    return {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
 
 
 def made_by(device: str) -> dict[str, str]:
     """Versions and kind of device: what decides the bits beside the campaign."""
     chosen = find_device(device)
     return {
-        "warpimpact_version": warpimpact.__version__,
-        "warp_version": warp.__version__,
-        "device": "cpu" if chosen.is_cpu else chosen.name,
+        **attr.versions(),
+        attr.DEVICE: "cpu" if chosen.is_cpu else chosen.name,
     }
 
 

@@ -19,6 +19,7 @@ import xarray
 from filelock import FileLock, Timeout
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 
@@ -181,7 +182,7 @@ class Parts:
         """Whether the result file is that of this very campaign."""
         try:
             with xarray.open_dataset(self.output, engine="netcdf4") as file:
-                return file.attrs.get("fingerprint") == fingerprint(self.content)
+                return file.attrs.get(attr.FINGERPRINT) == fingerprint(self.content)
         except (OSError, RuntimeError, ValueError):
             return False
 
@@ -234,7 +235,7 @@ class Parts:
             OutputError: the file cannot be written; the shards are still there.
         """
         paths = [self._path(index) for index in range(count)]
-        files.join(paths, self.output, {**attributes(self.load(0)), "fingerprint": fingerprint(self.content)})
+        files.join(paths, self.output, {**attributes(self.load(0)), attr.FINGERPRINT: fingerprint(self.content)})
         self.discard()
 
     def discard(self) -> None:

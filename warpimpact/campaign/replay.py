@@ -6,24 +6,23 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
-import warp
 import xarray
 
-import warpimpact
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, to_dataset
 from warpimpact.results.files import ResultError
-from warpimpact.results.variables import outcome_variables, shot_variables
 from warpimpact.scene import Numerics
 from warpimpact.solver import simulate
 from warpimpact.solver.refinement import level
 from warpimpact.solver.resolution import Fidelity
 from warpimpact.solver.unfold import image_of
 
-ROUNDING = {"residual_velocity": 0.1, "deflection": 0.5, "tilt": 0.5}
+ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """How far another device's rounding may move an outcome [m/s, degree]. Between single and double precision, 6144
 hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
-_OF_A_MAP = ("count", "compute_time", "hits_per_second", "computed_hits")
+_OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES)
 
 
 def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
@@ -63,15 +62,14 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         hit=0
     )
     stored = result.isel(hit=hit)
-    if not _same(end, stored, ("hit_y", "hit_z", *shot_variables(end))):
+    if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
         raise ResultError(f"hit: got {hit}, whose shot is no longer what the campaign and the files it names give")
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
-        "history": f"{result.attrs['history']}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
-        "hit": hit,
-        "agreement": _agreement(end, stored),
-        "warpimpact_version": warpimpact.__version__,
-        "warp_version": warp.__version__,
-        "device": "cpu",
+        attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
+        attr.HIT: hit,
+        attr.AGREEMENT: _agreement(end, stored),
+        **attr.versions(),
+        attr.DEVICE: "cpu",
     }
     return history_dataset(scene, end, again, attributes=attributes)
 
@@ -80,14 +78,15 @@ def _numerics(campaign: Campaign, result: xarray.Dataset, hit: int) -> Numerics 
     """What the hit was computed with: of a run to a tolerance, the level that it ended on."""
     if campaign.numerics.tolerance is None:
         return campaign.numerics
-    return level(int(result["level"][hit]), campaign.numerics)
+    return level(int(result[v.LEVEL][hit]), campaign.numerics)
 
 
 def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
-    if "campaign" not in result.attrs:
+    if attr.CAMPAIGN not in result.attrs:
         raise ResultError("the result does not carry its campaign")
-    count = int(result.attrs["count"]) if "count" in result.attrs else None  # a list of hits has none
-    return Campaign.from_text(result.attrs["campaign"], name="the campaign in the result", folder=folder, count=count)
+    count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
+    text = result.attrs[attr.CAMPAIGN]
+    return Campaign.from_text(text, name="the campaign in the result", folder=folder, count=count)
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:
@@ -96,10 +95,10 @@ def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) ->
 
 
 def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
-    if _same(end, stored, tuple(outcome_variables(end))):
+    if _same(end, stored, tuple(v.outcome_variables(end))):
         return "bit-identical"
     close = all(
         np.allclose(end[name], stored[name], rtol=0.0, atol=tolerance, equal_nan=True)
         for name, tolerance in ROUNDING.items()
     )
-    return "within rounding" if close and end["status"] == stored["status"] else "different"
+    return "within rounding" if close and end[v.STATUS] == stored[v.STATUS] else "different"

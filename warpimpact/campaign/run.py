@@ -16,6 +16,8 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure, Tally
@@ -62,7 +64,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
         progress: called with the standing several times a second.
 
     Returns:
-        The Dataset of results.py, one entry per hit.
+        The Dataset of results/dataset.py, one entry per hit.
 
     Raises:
         DeviceError: the device is absent.
@@ -209,7 +211,7 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
     plate = campaign.plate
     if not campaign.output.solid_reference or plate.solid == plate:
         return None
-    conditions = [values for name, values in shots.columns.items() if name not in ("hit_y", "hit_z")]
+    conditions = [values for name, values in shots.columns.items() if name not in (v.HIT_Y, v.HIT_Z)]
     alike = plate.size is None and not any(np.ptp(values) for values in conditions)
     return shots[: 1 if alike else _MOST_SOLID]
 
@@ -237,8 +239,8 @@ def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[in
         shard = dataset.isel(hit=slice(place * size, (place + 1) * size))
         if index:
             shard = shard.drop_dims("solid_hit", errors="ignore")
-        time = dataset.attrs["compute_time"] * shard.sizes["hit"] / hits
-        yield index, shard.assign_attrs(compute_time=time, **_computed(dataset, shard.sizes["hit"]))
+        time = dataset.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
+        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | _computed(dataset, shard.sizes["hit"]))
 
 
 class _Watch:
@@ -277,7 +279,7 @@ class _Watch:
     def _advance(self, shard: xarray.Dataset) -> None:
         self._next += 1
         self._hits += shard.sizes["hit"]
-        self._time += shard.attrs["compute_time"]
+        self._time += shard.attrs[attr.COMPUTE_TIME]
         for tally in self._tallies:
             tally.add(shard)
         stop: dict[str, Any] = {}
@@ -299,12 +301,12 @@ class _Watch:
         if not met and self._next != self._shards:
             return {}
         return {
-            "stop_quantity": rule.quantity,
-            "stop_reason": "half_width" if met else "max_count",
-            "estimate": estimate.value,
-            "estimate_interval": [estimate.low, estimate.high],
-            "estimate_units": rule.measure.units,
-            "confidence": rule.confidence,
+            attr.STOP_QUANTITY: rule.quantity,
+            attr.STOP_REASON: "half_width" if met else "max_count",
+            attr.ESTIMATE: estimate.value,
+            attr.ESTIMATE_INTERVAL: [estimate.low, estimate.high],
+            attr.ESTIMATE_UNITS: rule.measure.units,
+            attr.CONFIDENCE: rule.confidence,
         }
 
     def standing(self, underway: int) -> Standing:
@@ -318,9 +320,9 @@ class _Watch:
 def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:
     """Global attributes of a complete result over those of its first shard."""
     return {
-        "history": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
-        "compute_time": end.compute_time,
-        "hits_per_second": end.hits / images(dataset) / end.compute_time,
+        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        attr.COMPUTE_TIME: end.compute_time,
+        attr.HITS_PER_SECOND: end.hits / images(dataset) / end.compute_time,
         **_computed(dataset, end.hits),
         **end.stop,
     }
@@ -328,4 +330,4 @@ def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:
 
 def _computed(dataset: xarray.Dataset, hits: int) -> dict[str, int]:
     """How many of some hits of a Dataset were computed, if that is not all the same."""
-    return {"computed_hits": hits // images(dataset)} if "computed_hits" in dataset.attrs else {}
+    return {attr.COMPUTED_HITS: hits // images(dataset)} if attr.COMPUTED_HITS in dataset.attrs else {}

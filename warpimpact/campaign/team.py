@@ -16,6 +16,7 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import compute, made_by
+from warpimpact.results import attributes as attr
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
 
@@ -91,7 +92,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
 
 
 def _task_size(kind: dict[str, str]) -> int:
-    return 1 if kind["device"] == "cpu" else CUDA_SHOTS
+    return 1 if kind[attr.DEVICE] == "cpu" else CUDA_SHOTS
 
 
 @contextmanager
@@ -179,6 +180,6 @@ def _devices(names: str) -> list[Any]:
 
         return [first] if first.is_cpu else list(warp.get_cuda_devices())
     devices = [first, *(find_device(name.strip()) for name in names.split(",")[1:])]
-    if len({kind for chosen in devices if (kind := made_by(str(chosen))["device"])}) > 1:
+    if len({kind for chosen in devices if (kind := made_by(str(chosen))[attr.DEVICE])}) > 1:
         raise DeviceError(f'device: got "{names}", but these are of different kinds, which compute different bits')
     return devices

@@ -1,4 +1,8 @@
-"""The warpimpact command; what is heavy is imported once a command needs it, to keep `--help` quick."""
+"""The `warpimpact` command: what a person types, progress, tables and clear errors.
+
+A file per group of commands. What is heavy is imported once a command needs it, which keeps `--help` quick. Change
+arguments, messages and progress here; a number is computed in another room. It imports every other room.
+"""
 
 import argparse
 import sys

@@ -33,7 +33,8 @@ def add_study(commands: Commands) -> None:
 
 
 def _study(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.study import study, study_text
+    from warpimpact.analysis.study import study
+    from warpimpact.analysis.study_text import study_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting import study_figure
     from warpimpact.results import files

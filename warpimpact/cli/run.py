@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from warpimpact.results import attributes as attr
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
@@ -63,9 +64,9 @@ def _run(arguments: argparse.Namespace) -> int:
         )
     with files.opened(output) as dataset:
         print(summary_text(dataset))
-        if "symmetries" in dataset.attrs:
+        if attr.SYMMETRIES in dataset.attrs:
             print(symmetry_text(dataset))
-        print(f"{dataset.attrs['hits_per_second']:.4g} hits per second on {dataset.attrs['device']}")
+        print(f"{dataset.attrs[attr.HITS_PER_SECOND]:.4g} hits per second on {dataset.attrs[attr.DEVICE]}")
         print(f"written to {output}")
         return failure_code(dataset, output)
 
@@ -75,7 +76,7 @@ def failure_code(dataset: "xarray.Dataset", path: Path) -> int:
     from warpimpact.results.dataset import failed
 
     share = float(failed(dataset).mean())
-    allowed = dataset.attrs["failed_share"]
+    allowed = dataset.attrs[attr.FAILED_SHARE]
     if share <= allowed:
         return 0
     print(

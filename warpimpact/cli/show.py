@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from warpimpact.results import attributes as attr
+
 from .options import Commands, add_campaign, add_command, add_output, add_result, add_results
 from .paths import check_folder, check_picture, named
 
@@ -26,7 +28,7 @@ def _inspect(arguments: argparse.Namespace) -> None:
     from warpimpact.results import files
 
     with files.opened(arguments.result) as dataset:
-        print(dataset.attrs["campaign"] if arguments.campaign else inspect_text(dataset))
+        print(dataset.attrs[attr.CAMPAIGN] if arguments.campaign else inspect_text(dataset))
 
 
 def add_plot(commands: Commands) -> None:

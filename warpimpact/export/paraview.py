@@ -16,6 +16,8 @@ import numpy as np
 import xarray
 from scipy.spatial.transform import Rotation
 
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 
 if TYPE_CHECKING:
@@ -26,7 +28,7 @@ if TYPE_CHECKING:
 
 AROUND = 48
 """Points round the core's surface."""
-_BODY = ("velocity", "angular_velocity", "force", "moment")
+_BODY = (v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY, v.FORCE, v.MOMENT)
 
 
 def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
@@ -46,8 +48,8 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as aside:
             pieces = Path(aside) / "vtk"
             pieces.mkdir()
-            _write_series(pieces, "core", "vtp", history["time"].values, cores(history))
-            _write_series(pieces, "plate", "vti", history["snapshot"].values, plates(history))
+            _write_series(pieces, "core", "vtp", history[v.TIME].values, cores(history))
+            _write_series(pieces, "plate", "vti", history[v.SNAPSHOT].values, plates(history))
             pieces.rename(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error})") from error
@@ -59,17 +61,17 @@ def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
     holds of the whole body as field data."""
     import pyvista
 
-    station, radius = history["station"].values, history["core_radius"].values
+    station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
     azimuth = np.linspace(0.0, 2.0 * np.pi, AROUND, endpoint=False)
     ring = np.stack([np.zeros(AROUND), np.cos(azimuth), np.sin(azimuth)], axis=-1)
     arms = (station[:, None, None] * [1.0, 0.0, 0.0] + radius[:, None, None] * ring).reshape(-1, 3)
     faces = _faces(len(station))
     for step in range(history.sizes["time"]):
         now = history.isel(time=step)
-        turned = Rotation.from_quat(now["attitude"].values).apply(arms)
-        velocity = now["velocity"].values + np.cross(now["angular_velocity"].values, turned)
-        surface = pyvista.PolyData((now["plate_position"].values + turned).astype(np.float32), faces)
-        surface.point_data["velocity"] = velocity.astype(np.float32)
+        turned = Rotation.from_quat(now[v.ATTITUDE].values).apply(arms)
+        velocity = now[v.VELOCITY].values + np.cross(now[v.MARCHED_ANGULAR_VELOCITY].values, turned)
+        surface = pyvista.PolyData((now[v.PLATE_POSITION].values + turned).astype(np.float32), faces)
+        surface.point_data[v.VELOCITY] = velocity.astype(np.float32)
         for name in _BODY:
             surface.field_data[f"core_{name}"] = now[name].values[None, :]
         yield surface
@@ -90,15 +92,15 @@ def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
     """The plate within reach of the core at every snapshot: a layer of cells with the share of the resistance left."""
     import pyvista
 
-    y, z = history["cell_y"].values, history["cell_z"].values
+    y, z = history[v.CELL_Y].values, history[v.CELL_Z].values
     dy, dz = y[1] - y[0], z[1] - z[0]
-    for share in history["resistance_share"].values:
+    for share in history[v.RESISTANCE_SHARE].values:
         grid = pyvista.ImageData(
             dimensions=(2, len(y) + 1, len(z) + 1),
-            spacing=(history.attrs["plate_thickness"], dy, dz),
+            spacing=(history.attrs[attr.PLATE_THICKNESS], dy, dz),
             origin=(0.0, y[0] - 0.5 * dy, z[0] - 0.5 * dz),
         )
-        grid.cell_data["resistance_share"] = share.ravel(order="F")
+        grid.cell_data[v.RESISTANCE_SHARE] = share.ravel(order="F")
         yield grid
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 import xarray
 
 from warpimpact.analysis.summary import slices
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.files import aside
 
@@ -19,18 +20,18 @@ def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     ``angular_velocity_x``. ``status`` is a word.
     """
     columns = {}
-    for name in ("hit_y", "hit_z", *dataset.data_vars):
+    for name in (v.HIT_Y, v.HIT_Z, *dataset.data_vars):
         array = dataset[name]
         if array.dims == ("hit",):
             columns[str(name)] = array.values
         elif array.dims == ("hit", "standoff"):
-            for index, standoff in enumerate(dataset["standoff"].values):
+            for index, standoff in enumerate(dataset[v.STANDOFF].values):
                 columns[f"{name}_{standoff * 1e3:g}mm"] = array.values[:, index]
         elif array.dims == ("hit", "axis"):
-            for index, axis in enumerate(dataset["axis"].values):
+            for index, axis in enumerate(dataset[v.AXIS].values):
                 columns[f"{name}_{axis}"] = array.values[:, index]
     words = {code: word for word, code in status_codes(dataset).items()}
-    columns["status"] = pd.Categorical.from_codes(columns["status"].astype(int), categories=pd.Index(words.values()))
+    columns[v.STATUS] = pd.Categorical.from_codes(columns[v.STATUS].astype(int), categories=pd.Index(words.values()))
     return pd.DataFrame(columns).rename_axis(index="hit")
 
 

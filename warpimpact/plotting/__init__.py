@@ -1,4 +1,8 @@
-"""Figures: a Dataset, or a plate, goes in, a matplotlib Figure comes out."""
+"""Figures: a Dataset, or a plate, goes in, a matplotlib Figure comes out.
+
+Change axes, colours and layout here; a number that a figure shows is computed in analysis or statistics. It imports
+analysis and the rooms below it, but neither export nor report.
+"""
 
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty

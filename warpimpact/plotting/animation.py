@@ -11,6 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Polygon
 
 from warpimpact.plotting.trajectory import Pose, pose_at_step, silhouette, two_views
+from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 
 FRAMES = 50
@@ -23,10 +24,10 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
 
     Between two steps the core flies straight on and its axis turns evenly, as it does in the model.
     """
-    times = np.linspace(float(dataset["time"][0]), float(dataset["time"][-1]), FRAMES)
-    between = dataset[["plate_position", "core_axis", "velocity"]].interp(time=times)
+    times = np.linspace(float(dataset[v.TIME][0]), float(dataset[v.TIME][-1]), FRAMES)
+    between = dataset[[v.PLATE_POSITION, v.CORE_AXIS, v.VELOCITY]].interp(time=times)
     poses = [_unit(pose_at_step(between, frame)) for frame in range(FRAMES)]
-    speeds = np.linalg.norm(between["velocity"], axis=1)
+    speeds = np.linalg.norm(between[v.VELOCITY], axis=1)
     figure, panels = two_views(dataset, poses, "", room=4.0)
     FigureCanvasAgg(figure)
     cores = {view: Polygon(np.zeros((1, 2)), facecolor="0.55", edgecolor="black") for view in panels}
@@ -78,5 +79,5 @@ def _unit(pose: Pose) -> Pose:
 
 
 def _line_of_fire(dataset: xarray.Dataset) -> np.ndarray:
-    obliquity, azimuth = (np.radians(float(dataset[name])) for name in ("obliquity", "azimuth"))
+    obliquity, azimuth = (np.radians(float(dataset[name])) for name in (v.OBLIQUITY, v.AZIMUTH))
     return np.array([np.cos(obliquity), np.sin(obliquity) * np.cos(azimuth), np.sin(obliquity) * np.sin(azimuth)])

@@ -20,8 +20,9 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed, status_codes
-from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -33,12 +34,6 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Scale = tuple[Colormap, Normalize]
 
-MAPPED = tuple(
-    name
-    for name, variable in (SHOT_VARIABLES | OUTCOME_VARIABLES | BENDING_VARIABLES).items()
-    if name != "status" and variable.dims in {("hit",), ("hit", "standoff")}
-)
-
 PIXELS = 400  # along the longer side of the cell
 FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail that is not there
 WIDEST_GAP = 3.0  # distance to a hit that an image bridges, in mean hit spacings; random hits reach about 2
@@ -46,8 +41,8 @@ GREY = "0.62"  # of hits without a value
 # Okabe and Ito's colours, which stay apart in every kind of colour blindness.
 STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00")
 
-_SIGNED = {"azimuth", "impact_pitch", "impact_yaw", "pitch", "yaw"}
-_BEHIND = {"residual_velocity", "deflection"}  # a ricochet has them too, but in front of the plate
+_SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW}
+_BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them too, but in front of the plate
 _MM = 1e3
 # Units as people write them, and the factor from those of the Dataset.
 _SHOWN_UNITS = {
@@ -77,7 +72,8 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None)
 
     Args:
         dataset: the result of a campaign.
-        variable: one of `MAPPED`. Residual velocity and deflection are those of cores that passed the plate.
+        variable: one of `variables.HIT_NUMBERS`. Residual velocity and deflection are those of cores that passed
+            the plate.
         standoff: distance behind the plate [m] for a variable that has one; the largest if None.
 
     Raises:
@@ -88,7 +84,7 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None)
     exists = np.isfinite(array.values) & (passed(dataset) if variable in _BEHIND else True)
     title = words(variable)
     if "standoff" in array.coords:
-        title += f", {float(array['standoff']) * _MM:g} mm behind the plate"
+        title += f", {float(array[v.STANDOFF]) * _MM:g} mm behind the plate"
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
     values = np.where(exists, array.values * factor, np.nan)
@@ -97,13 +93,13 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None)
 
 def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None) -> xarray.DataArray:
     """The variable, shape (hit,), at one stand-off if it has any."""
-    mapped = [name for name in MAPPED if name in dataset]
+    mapped = [name for name in v.HIT_NUMBERS if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
     array = dataset[variable]
     if "standoff" not in array.dims:
         return array
-    distances = dataset["standoff"].values
+    distances = dataset[v.STANDOFF].values
     index = distances.size - 1 if standoff is None else int(np.argmin(np.abs(distances - standoff)))
     if standoff is not None and not np.isclose(distances[index], standoff):
         known = ", ".join(f"{distance:g}" for distance in distances)
@@ -117,7 +113,7 @@ def words(name: str) -> str:
 
 def shots_text(dataset: xarray.Dataset) -> str:
     """How many hits there are, at what velocity and obliquity."""
-    velocity, obliquity = (range_text(dataset[name]) for name in ("impact_velocity", "obliquity"))
+    velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     return f"{dataset.sizes['hit']} hits, {velocity}, obliquity {obliquity}"
 
 
@@ -130,14 +126,14 @@ def range_text(array: xarray.DataArray) -> str:
 
 def limits(dataset: xarray.Dataset) -> Array:
     """Range [mm] along y and z that holds the whole cell and every hit, shape [2, 2]."""
-    half = np.asarray(dataset.attrs["plate_period"]) / 2
+    half = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2
     hits = hit_points(dataset)
     return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * _MM
 
 
 def hit_points(dataset: xarray.Dataset) -> Array:
     """Where the hits are [m], shape [hits, 2]."""
-    return np.stack([dataset["hit_y"].values, dataset["hit_z"].values], axis=-1)
+    return np.stack([dataset[v.HIT_Y].values, dataset[v.HIT_Z].values], axis=-1)
 
 
 def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
@@ -165,7 +161,7 @@ def draw_values(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale
 
 def draw_status(axes: Axes, dataset: xarray.Dataset) -> None:
     """Draw how the shots ended, with the share of each status in the legend."""
-    status = dataset["status"].values
+    status = dataset[v.STATUS].values
     scale = Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
     _paint(axes, dataset, status.astype(float), ListedColormap(STATUS_COLOURS), scale)
     entries: list[Artist] = [
@@ -187,8 +183,8 @@ def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
     if not dataset.sizes["vertex"]:
         return []
     (edge,) = axes.plot(
-        dataset["outline_y"] * _MM,
-        dataset["outline_z"] * _MM,
+        dataset[v.OUTLINE_Y] * _MM,
+        dataset[v.OUTLINE_Z] * _MM,
         color="white",
         linewidth=1.2,
         path_effects=[Stroke(linewidth=2.8, foreground="black"), Normal()],
@@ -202,7 +198,7 @@ def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
 def pixels(dataset: xarray.Dataset, count: int = PIXELS) -> Array:
     """Centres [m] of the cell's pixels, from its lower left corner on, shape [z, y, 2]; `count` along the longer
     side."""
-    period = np.asarray(dataset.attrs["plate_period"])
+    period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
     counts = np.ceil(count * period / period.max()).astype(int)
     y, z = ((np.arange(n) + 0.5) / n * length for n, length in zip(counts, period, strict=True))
     return np.stack(np.meshgrid(y, z), axis=-1)
@@ -210,13 +206,13 @@ def pixels(dataset: xarray.Dataset, count: int = PIXELS) -> Array:
 
 def tree_of(dataset: xarray.Dataset, which: NDArray[np.bool_] | slice = slice(None)) -> KDTree:
     """Hits to look up from `pixels`, across the cell's edges."""
-    period = np.asarray(dataset.attrs["plate_period"])
+    period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
     return KDTree((hit_points(dataset)[which] + period / 2) % period, boxsize=period)
 
 
 def nearest_hits(dataset: xarray.Dataset, count: int = PIXELS) -> NDArray[np.intp] | None:
     """Index of the hit nearest to each of the `pixels`, shape [z, y]; None if the hits do not cover the cell."""
-    period, hits = np.asarray(dataset.attrs["plate_period"]), hit_points(dataset)
+    period, hits = np.asarray(dataset.attrs[attr.PLATE_PERIOD]), hit_points(dataset)
     if len(hits) < FEWEST_HITS or np.any(np.abs(hits) > period / 2):
         return None
     distance, nearest = tree_of(dataset).query(pixels(dataset, count))
@@ -226,7 +222,7 @@ def nearest_hits(dataset: xarray.Dataset, count: int = PIXELS) -> NDArray[np.int
 
 def paint_pixels(axes: Axes, dataset: xarray.Dataset, image: Array, scale: Scale) -> ScalarMappable:
     """Colour the cell by an image of shape [z, y]."""
-    y, z = np.asarray(dataset.attrs["plate_period"]) / 2 * _MM
+    y, z = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2 * _MM
     colours, norm = scale
     extent = (-y, y, -z, z)
     return axes.imshow(image, cmap=colours, norm=norm, origin="lower", extent=extent, interpolation="nearest")
@@ -254,7 +250,7 @@ def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap
 
 def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_]) -> str:
     """Legend of the grey hits: how they ended."""
-    found = set(dataset["status"].values[~exists].tolist())
+    found = set(dataset[v.STATUS].values[~exists].tolist())
     return fill(", ".join(words(name) for name, code in status_codes(dataset).items() if code in found), 30)
 
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from warpimpact.analysis.comparison import Comparison
+    from warpimpact.analysis.comparison import Comparison, Difference
     from warpimpact.analysis.effectiveness import Measure
 
 # Okabe and Ito's colours, which stay apart in every kind of colour blindness; a marker for who sees none.
@@ -71,7 +71,7 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Measure]
     for line, plate in enumerate(plates):
         for told in (told for told in plate.measures if _effect(told) == _effect(measures[0])):
             label, marker, colour, offset = _STYLES[_statistic(told)]
-            _draw_interval(axes, line + offset, told.value, told.low, told.high, marker, colour, label=label)
+            _draw_interval(axes, line + offset, told, (marker, colour), label=label)
             if told.name == measures[0].name and not math.isnan(told.solid):
                 axes.plot(
                     told.solid,
@@ -95,7 +95,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Mea
             line = lines.setdefault((pair.one, pair.other), len(lines))
             _, marker, colour, offset = _STYLES[_statistic(names[pair.measure])]
             hollow = not pair.told_apart
-            _draw_interval(axes, line + offset, pair.value, pair.low, pair.high, marker, colour, hollow=hollow)
+            _draw_interval(axes, line + offset, pair, (marker, colour), hollow=hollow)
     axes.axvline(0.0, color=_GREY, linewidth=1.0)
     _furnish(axes, [f"{one} − {other}" for one, other in lines])
     better = "right" if measures[0].higher_is_better else "left"
@@ -105,16 +105,15 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Mea
 def _draw_interval(
     axes: Axes,
     line: float,
-    value: float,
-    low: float,
-    high: float,
-    marker: str,
-    colour: str,
+    number: Measure | Difference,
+    style: tuple[str, str],
     *,
     label: str | None = None,
     hollow: bool = False,
 ) -> None:
-    ends = None if math.isnan(low) else [[max(0.0, value - low)], [max(0.0, high - value)]]
+    """A number with its interval, by marker and colour."""
+    value, (marker, colour) = number.value, style
+    ends = None if math.isnan(number.low) else [[max(0.0, value - number.low)], [max(0.0, number.high - value)]]
     axes.errorbar(
         value,
         line,

@@ -22,6 +22,8 @@ from warpimpact.plotting.cell import (
     shown,
     tree_of,
 )
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 
 if TYPE_CHECKING:
@@ -50,7 +52,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     column = shown(dataset, variable, standoff)
     size = _map_size(dataset)
     figure = Figure(figsize=(size[0] + 4.6, size[1] + 2.9), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get('title', '')}\n{column.title}")
+    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{column.title}")
     centre = figure.subplots()
     artist = draw_values(centre, dataset, column.values, scale_of([column.values], signed=column.signed))
     exists = np.isfinite(column.values)
@@ -78,7 +80,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off, the largest if None, with the distribution of each."""
     figure = Figure(figsize=(7.5, 6.5), layout="constrained")
-    figure.suptitle(dataset.attrs.get("title", ""))
+    figure.suptitle(dataset.attrs.get(attr.TITLE, ""))
     grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
     (above, corner), (centre, beside) = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     corner.remove()
@@ -92,7 +94,7 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
 
 def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None = None) -> tuple[Array, Array]:
     """Draw residual velocity against tilt, with their medians; returns tilt [degree] and velocity [m/s] as drawn."""
-    tilt, velocity = (shown(dataset, name, standoff) for name in ("tilt", "residual_velocity"))
+    tilt, velocity = (shown(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
     both = np.isfinite(tilt.values) & np.isfinite(velocity.values)
     x, y = tilt.values[both], velocity.values[both]
     if len(x) > _MOST_POINTS:
@@ -156,7 +158,7 @@ def _two_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], tit
     """A local value beside half the width of its interval."""
     width, height = _map_size(dataset)
     figure = Figure(figsize=(2.0 * width + 4.0, height + 1.9), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get('title', '')}\n{title}")
+    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{title}")
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for axes, image, label in zip(panels, images, labels, strict=True):
         figure.colorbar(paint_pixels(axes, dataset, image, scale_of([image.ravel()])), ax=axes, label=label)
@@ -177,7 +179,7 @@ def _local(
     exists = np.isfinite(values)
     there = exists[nearest]
     if exists.sum() >= NEIGHBOURS:
-        period = np.asarray(dataset.attrs["plate_period"])
+        period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
         points = pixels(dataset, _FINE)[there]
         _, near = tree_of(dataset, exists).query(points, k=NEIGHBOURS)
         offsets = (hit_points(dataset)[exists] + period / 2)[near] - points[:, None]

@@ -12,6 +12,8 @@ from matplotlib.figure import Figure
 
 from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, nearest_hits, scale_of, shots_text, shown
 from warpimpact.plotting.distribution import dispersion, marginals, uncertainty
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
     from warpimpact.plotting.cell import Scale
 
 _MM = 1e3
+_MAIN = (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
 # Sizes on paper [inch]: the longer side of the largest map, the room round it, the title and the note of a sheet.
 _LONGER_SIDE = 4.2
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.75, 1.15, 0.55, 1.2
@@ -63,7 +66,7 @@ def status_map(dataset: xarray.Dataset) -> Figure:
 def overview(dataset: xarray.Dataset) -> Figure:
     """Residual velocity, deflection, tilt at the largest stand-off, and status on one page."""
     figure, (*panels, last) = _sheet_of_one(dataset, maps=4, columns=2)
-    for axes, variable in zip(panels, ("residual_velocity", "deflection", "tilt"), strict=True):
+    for axes, variable in zip(panels, _MAIN, strict=True):
         _draw(axes, dataset, shown(dataset, variable))
     draw_status(last, dataset)
     return figure
@@ -71,26 +74,24 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths."""
-    figures = {
+    figures: dict[str, Figure] = {
         "overview": overview(dataset),
         "status": status_map(dataset),
-        "residual_velocity": hit_map(dataset, "residual_velocity"),
-        "deflection": hit_map(dataset, "deflection"),
     }
-    for standoff in dataset["standoff"].values:
-        figures[f"tilt_{standoff * _MM:g}mm"] = hit_map(dataset, "tilt", standoff)
-    figures |= {
-        name: hit_map(dataset, name) for name in ("largest_bending_moment", "bending_stress") if name in dataset
-    }
-    figures |= {"marginals": marginals(dataset, "residual_velocity"), "dispersion": dispersion(dataset)}
+    for variable in (name for name in v.shown_by("plot") if name in dataset):
+        at_standoffs = v.STANDOFF in variable.dims
+        for standoff in dataset[v.STANDOFF].values.tolist() if at_standoffs else [None]:
+            name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
+            figures[name] = hit_map(dataset, variable, standoff)
+    figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
     if nearest_hits(dataset) is not None:
-        figures["uncertainty"] = uncertainty(dataset, "residual_velocity")
+        figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
     return _saved(figures, folder, stem)
 
 
 def save_beside(datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str) -> list[Path]:
     """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths."""
-    figures = {variable: hit_maps(datasets, variable) for variable in ("residual_velocity", "deflection", "tilt")}
+    figures: dict[str, Figure] = {variable: hit_maps(datasets, variable) for variable in _MAIN}
     return _saved(figures, folder, stem)
 
 
@@ -107,7 +108,7 @@ def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int) -> tuple[
     """A sheet of several maps of one result, which says what it shows."""
     figure, panels = _sheet([dataset] * maps, columns=columns)
     note = f"{shots_text(dataset)}; seen from behind the plate"
-    _inscribe(figure, dataset.attrs.get("title", ""), note)
+    _inscribe(figure, dataset.attrs.get(attr.TITLE, ""), note)
     return figure, panels
 
 

@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from warpimpact.analysis.surface import AROUND, pressed
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 
 _MM, _US = 1e3, 1e6
 _ARROW = 5.0  # length of the largest stress [mm]
@@ -22,12 +24,12 @@ def pressure(dataset: xarray.Dataset) -> Figure:
 
     Colour and length are the stress as a share of that of the untouched plate at rest (`analysis.surface.pressed`).
     """
-    step = int(np.linalg.norm(dataset["force"], axis=1).argmax())
+    step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
     surface = pressed(dataset, step)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     figure.suptitle(
-        f"{dataset.attrs['title']}\nhit {dataset.attrs['hit']}: "
-        f"normal stress under the largest force, at {float(dataset['time'][step]) * _US:.1f} µs"
+        f"{dataset.attrs[attr.TITLE]}\nhit {dataset.attrs[attr.HIT]}: "
+        f"normal stress under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
     )
     axes = figure.add_subplot(projection="3d")
     x, y, z = np.moveaxis(np.concatenate([surface.point, surface.point[:, :1]], axis=1) * _MM, -1, 0)

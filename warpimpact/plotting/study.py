@@ -9,12 +9,14 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.study import QUOTED
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.solver.resolution import FIDELITIES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_PANELS = {"residual_velocity": "residual velocity [m/s]", "tilt": "tilt [°]"}
+_PANELS = {v.RESIDUAL_VELOCITY: "residual velocity [m/s]", v.TILT: "tilt [°]"}
 _BELOW_FLOOR = 0.4  # lowest error shown, in units of the uncertainty
 # Okabe and Ito's colours, which stay apart in every kind of colour blindness.
 _BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.62"
@@ -33,41 +35,41 @@ def study_figure(dataset: xarray.Dataset) -> Figure:
         _draw(axes, quoted, quantity)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle(
-        f"{dataset.attrs['title']}\n{dataset.sizes['hit']} hits, tilt at {quoted['standoff'].item() * 1e3:g} mm; "
-        f"{dataset.attrs['device']}, {dataset.attrs['history'][:10]}"
+        f"{dataset.attrs[attr.TITLE]}\n{dataset.sizes['hit']} hits, tilt at {quoted[v.STANDOFF].item() * 1e3:g} mm; "
+        f"{dataset.attrs[attr.DEVICE]}, {dataset.attrs[attr.HISTORY][:10]}"
     )
     return figure
 
 
-def _draw(axes: Axes, quoted: xarray.Dataset, quantity: str) -> None:
+def _draw(axes: Axes, quoted: xarray.Dataset, quantity: v.Variable) -> None:
     """One panel: every setting, the front, the names that people look for, the floor of what can be told."""
     axes.set(xscale="log", yscale="log", xlabel="hits per second", ylabel=f"{QUOTED:.0%} error of {_PANELS[quantity]}")
     axes.grid(which="major", color="0.9")
     axes.set_axisbelow(True)
-    quoted = quoted.isel(setting=(quoted[f"{quantity}_error"] > 0.0).values)  # what a logarithm can show
-    literal = (quoted["scheme"] == "nodal").values
-    on_front = quoted.isel(setting=quoted[f"{quantity}_front"].values == 1).sortby("hits_per_second")
+    quoted = quoted.isel(setting=(quoted[v.ERRORS[quantity]] > 0.0).values)  # what a logarithm can show
+    literal = (quoted[v.SCHEME] == "nodal").values
+    on_front = quoted.isel(setting=quoted[v.FRONTS[quantity]].values == 1).sortby(v.HITS_PER_SECOND)
 
     def points(settings: xarray.Dataset) -> tuple[np.ndarray, np.ndarray]:
-        return settings["hits_per_second"].values, settings[f"{quantity}_error"].values
+        return settings[v.HITS_PER_SECOND].values, settings[v.ERRORS[quantity]].values
 
-    floor = quoted[f"{quantity}_change"].values[-1]
+    floor = quoted[v.CHANGES[quantity]].values[-1]
     axes.plot(*points(on_front), color=_BLUE, linewidth=1.5, zorder=2, label="front: no faster setting is as exact")
     axes.scatter(*points(quoted.isel(setting=~literal)), s=28, color=_GREY, zorder=3, label="other settings")
     axes.scatter(*points(on_front), s=28, color=_BLUE, zorder=4)
     axes.scatter(
         *points(quoted.isel(setting=literal)), s=48, color=_VERMILION, marker="X", zorder=4, label="literal scheme"
     )
-    named = quoted.isel(setting=np.isin(quoted["setting"].values, list(FIDELITIES)))
+    named = quoted.isel(setting=np.isin(quoted[v.SETTING].values, list(FIDELITIES)))
     axes.scatter(*points(named), s=110, facecolors="none", edgecolors="black", zorder=5, label="fidelities")
     axes.margins(x=0.22, y=0.15)
     if floor > 0.0:
         bottom = min(axes.get_ylim()[0], _BELOW_FLOOR * floor)
         axes.axhspan(bottom, floor, color=_VERMILION, alpha=0.12, linewidth=0, label="converged answer uncertain")
         axes.set_ylim(bottom=bottom)
-    for setting in named["setting"].values:
+    for setting in named[v.SETTING].values:
         _name(axes, *points(named.sel(setting=[setting])), setting, right=-5, up=7, ha="right")
-    for row, setting in enumerate(quoted["setting"].values[literal]):
+    for row, setting in enumerate(quoted[v.SETTING].values[literal]):
         _name(axes, *points(quoted.sel(setting=[setting])), setting, right=9, up=4 - 14 * row)
 
 

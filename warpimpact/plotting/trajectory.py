@@ -18,7 +18,10 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
 from scipy.spatial import ConvexHull
 
+from warpimpact.plotting.cell import words
 from warpimpact.plotting.pressure import pressure
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 
 if TYPE_CHECKING:
@@ -30,10 +33,10 @@ if TYPE_CHECKING:
 INSTANTS = 5  # poses of the core within the plate that are drawn
 
 _MM, _US = 1e3, 1e6
-_ANGLES = {"y": "yaw", "z": "pitch"}  # view → projected angle of the axis that it shows
+_ANGLES = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
 _COMPONENTS = {"x": "black", "y": "#0072B2", "z": "#D55E00"}  # Okabe and Ito's colours
 # Blue and green, as in the paper's fig. 5, but light enough for a dark core.
-_LOADS = {"force": ("#56B4E9", "kN", 1e-3), "moment": ("#009E73", "N m", 1.0)}
+_LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
 _STEEL = "0.8"
 _ARROW = 12.0  # length of a load's arrow [mm]
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
@@ -55,7 +58,7 @@ def passage(dataset: xarray.Dataset) -> Figure:
         for (label, pose), colour in zip(poses.items(), colours, strict=True):
             outline = silhouette(dataset, pose, view) * _MM
             axes.add_patch(Polygon(outline, facecolor=(*colour[:3], 0.3), edgecolor=colour, lw=1.4, label=label))
-        path = dataset["plate_position"].sel(axis=["x", view]) * _MM
+        path = dataset[v.PLATE_POSITION].sel(axis=["x", view]) * _MM
         axes.plot(path[:, 0], path[:, 1], color="black", lw=0.8, ls="--", label="centre of mass")
     _add_legend(figure, views["y"])
     return figure
@@ -82,9 +85,9 @@ def flight(dataset: xarray.Dataset) -> Figure:
 
 def largest_load(dataset: xarray.Dataset) -> Figure:
     """The core under the largest force, with force and moment as arrows (the paper's fig. 5b)."""
-    step = int(np.linalg.norm(dataset["force"], axis=1).argmax())
+    step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
     pose = pose_at_step(dataset, step)
-    what = f"under the largest force, at {float(dataset['time'][step]) * _US:.1f} µs"
+    what = f"under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
     figure, views = two_views(dataset, [pose], what, room=_ARROW)
     for view, axes in views.items():
         axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor="0.55", edgecolor="black"))
@@ -113,12 +116,12 @@ def course(dataset: xarray.Dataset) -> Figure:
     figure = Figure(figsize=(10.0, 9.0), layout="constrained")
     figure.suptitle(_title(dataset, "course through the plate"))
     panels = figure.subplots(3, 2, sharex=True)
-    time, axis = dataset["time"] * _US, dataset["core_axis"]
-    velocity = dataset["velocity"]
+    time, axis = dataset[v.TIME] * _US, dataset[v.CORE_AXIS]
+    velocity = dataset[v.VELOCITY]
     _draw_components(panels[0, 0], time, velocity - velocity[0], "change of velocity [m/s]")
-    _draw_components(panels[0, 1], time, dataset["angular_velocity"] / 1e3, "angular velocity [10³ rad/s]")
-    _draw_components(panels[1, 0], time, dataset["force"] / 1e3, "force [kN]")
-    _draw_components(panels[1, 1], time, dataset["moment"], "moment [N m]")
+    _draw_components(panels[0, 1], time, dataset[v.MARCHED_ANGULAR_VELOCITY] / 1e3, "angular velocity [10³ rad/s]")
+    _draw_components(panels[1, 0], time, dataset[v.FORCE] / 1e3, "force [kN]")
+    _draw_components(panels[1, 1], time, dataset[v.MOMENT], "moment [N m]")
     _draw_energy(panels[2, 0], time, dataset)
     for view, angle in _ANGLES.items():
         values = np.degrees(np.unwrap(np.arctan2(axis.sel(axis=view), axis.sel(axis="x"))))
@@ -134,7 +137,7 @@ def course(dataset: xarray.Dataset) -> Figure:
 
 def plate(dataset: xarray.Dataset) -> Figure:
     """Resistance left in the plate, from the first touch to the end, seen from behind (the paper's fig. 6)."""
-    share = dataset["resistance_share"]
+    share = dataset[v.RESISTANCE_SHARE]
     columns = min(3, share.sizes["snapshot"])
     rows = -(-share.sizes["snapshot"] // columns)
     limits = _touched(dataset)
@@ -142,15 +145,15 @@ def plate(dataset: xarray.Dataset) -> Figure:
     figure = Figure(figsize=(3.3 * columns + 1.2, (3.1 * tall + 0.5) * rows + 0.7), layout="constrained")
     figure.suptitle(_title(dataset, "resistance left in the plate, seen from behind"))
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    y, z = (_cell_edges(dataset[f"cell_{axis}"]) for axis in "yz")
+    y, z = (_cell_edges(dataset[v.CELL[axis]]) for axis in "yz")
     for panel, snapshot in zip(panels.flat, share.where(share[0] >= 0.5), strict=False):
         image = panel.imshow(
             snapshot.T, origin="lower", extent=(*y, *z), cmap="viridis", vmin=0.0, vmax=1.0, interpolation="nearest"
         )
         edge = [Stroke(linewidth=2.4, foreground="black"), Normal()]
-        panel.plot(dataset["outline_y"] * _MM, dataset["outline_z"] * _MM, color="white", lw=1.0, path_effects=edge)
-        panel.plot(dataset["hit_y"] * _MM, dataset["hit_z"] * _MM, "+", color="#D55E00", ms=10, mew=2)
-        panel.set(xlim=limits["y"], ylim=limits["z"], title=f"{float(snapshot['snapshot']) * _US:.1f} µs")
+        panel.plot(dataset[v.OUTLINE_Y] * _MM, dataset[v.OUTLINE_Z] * _MM, color="white", lw=1.0, path_effects=edge)
+        panel.plot(dataset[v.HIT_Y] * _MM, dataset[v.HIT_Z] * _MM, "+", color="#D55E00", ms=10, mew=2)
+        panel.set(xlim=limits["y"], ylim=limits["z"], title=f"{float(snapshot[v.SNAPSHOT]) * _US:.1f} µs")
     for panel in panels[-1]:
         panel.set_xlabel("y [mm]")
     for panel in panels[:, 0]:
@@ -171,12 +174,12 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
 def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
     """The core at instants spread evenly over its way through the plate, by their times."""
     steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
-    return {f"{float(dataset['time'][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
+    return {f"{float(dataset[v.TIME][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
 
 
 def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
     """The core at the stand-offs, by their distances; none of a core that does not pass the plate."""
-    standoffs = dataset["standoff"].values.tolist() if passed(dataset) else []
+    standoffs = dataset[v.STANDOFF].values.tolist() if passed(dataset) else []
     return {f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
 
 
@@ -186,7 +189,7 @@ def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
     The convex hull of its rings: a groove of a core that has one is not seen.
     """
     _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # completes the axis to three at right angles
-    station, radius = (dataset[name].values[:, None, None] for name in ("station", "core_radius"))
+    station, radius = (dataset[name].values[:, None, None] for name in (v.STATION, v.CORE_RADIUS))
     ring = np.cos(_AROUND)[:, None] * right + np.sin(_AROUND)[:, None] * up
     points = (pose.position + station * pose.axis + radius * ring)[..., [0, "xyz".index(view)]].reshape(-1, 2)
     outline: Array = points[ConvexHull(points).vertices]
@@ -194,23 +197,23 @@ def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
 
 
 def pose_at_step(dataset: xarray.Dataset, step: int) -> Pose:
-    return Pose(dataset["plate_position"].values[step], dataset["core_axis"].values[step])
+    return Pose(dataset[v.PLATE_POSITION].values[step], dataset[v.CORE_AXIS].values[step])
 
 
 def _pose_at(dataset: xarray.Dataset, standoff: float) -> Pose:
     """The core when it passes a stand-off [m]: its axis from the projected angles, its place in free flight."""
     there, end = dataset.sel(standoff=standoff), dataset.isel(time=-1)
-    yaw, pitch = (np.radians(float(there[name])) for name in ("yaw", "pitch"))
+    yaw, pitch = (np.radians(float(there[name])) for name in (v.YAW, v.PITCH))
     axis = np.sign(np.cos(yaw)) * np.array([1.0, np.tan(yaw), np.tan(pitch)])
     axis /= np.linalg.norm(axis)
-    ahead = float(dataset["station"].max()) * axis[0] if dataset.attrs["standoff_point"] == "nose" else 0.0
-    position, velocity = end["plate_position"].values, end["velocity"].values
-    x = dataset.attrs["plate_thickness"] + standoff - ahead
+    ahead = float(dataset[v.STATION].max()) * axis[0] if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0
+    position, velocity = end[v.PLATE_POSITION].values, end[v.VELOCITY].values
+    x = dataset.attrs[attr.PLATE_THICKNESS] + standoff - ahead
     return Pose(position + velocity * ((x - position[0]) / velocity[0]), axis)
 
 
 def _title(dataset: xarray.Dataset, what: str) -> str:
-    return f"{dataset.attrs['title']}\nhit {dataset.attrs['hit']}: {what}"
+    return f"{dataset.attrs[attr.TITLE]}\nhit {dataset.attrs[attr.HIT]}: {what}"
 
 
 def two_views(
@@ -221,7 +224,7 @@ def two_views(
     corners = {}
     for view in _ANGLES:
         outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
-        hit = [dataset.attrs["plate_thickness"], float(dataset[f"hit_{view}"])]
+        hit = [dataset.attrs[attr.PLATE_THICKNESS], float(dataset[v.HIT_POINT[view]])]
         points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * _MM
         corners[view] = points.min(axis=0) - room, points.max(axis=0) + room
     heights = [high[1] - low[1] for low, high in corners.values()]
@@ -233,9 +236,9 @@ def two_views(
     for axes, (view, (low, high)) in zip(panels, corners.items(), strict=True):
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set(xlabel="x [mm]", ylabel=f"{view} [mm]")
-        along = (dataset["section"] + dataset[f"hit_{view}"]) * _MM
-        solid = dataset[f"solid_along_{view}"].values == 1
-        thickness = dataset.attrs["plate_thickness"] * _MM
+        along = (dataset[v.SECTION] + dataset[v.HIT_POINT[view]]) * _MM
+        solid = dataset[v.SOLID_ALONG[view]].values == 1
+        thickness = dataset.attrs[attr.PLATE_THICKNESS] * _MM
         axes.fill_betweenx(along, 0.0, thickness, where=solid, step="mid", color=_STEEL, ec="none", zorder=0)
         axes.autoscale(False)
     return figure, dict(zip(corners, panels, strict=True))
@@ -255,9 +258,10 @@ def _draw_components(axes: Axes, time: xarray.DataArray, values: xarray.DataArra
 
 def _draw_energy(axes: Axes, time: xarray.DataArray, dataset: xarray.Dataset) -> None:
     """Kinetic energy of translation on the left, and the much smaller one of rotation on the right."""
-    for side, motion, colour in ((axes, "translational", "black"), (axes.twinx(), "rotational", "#D55E00")):
-        side.plot(time, dataset[f"{motion}_energy"], color=colour)
-        side.set_ylabel(f"{motion} energy [J]", color=colour)
+    drawn = ((axes, v.TRANSLATIONAL_ENERGY, "black"), (axes.twinx(), v.ROTATIONAL_ENERGY, "#D55E00"))
+    for side, energy, colour in drawn:
+        side.plot(time, dataset[energy], color=colour)
+        side.set_ylabel(f"{words(energy)} [J]", color=colour)
         side.tick_params(axis="y", colors=colour)
 
 
@@ -269,11 +273,11 @@ def _cell_edges(centres: xarray.DataArray) -> tuple[float, float]:
 
 def _touched(dataset: xarray.Dataset) -> dict[str, tuple[float, float]]:
     """Range [mm] along y and z that the core has weakened, and some room; all there is if it has weakened nothing."""
-    share = dataset["resistance_share"]
+    share = dataset[v.RESISTANCE_SHARE]
     weaker = (share[-1] < share[0]).values
     ranges = {}
     for axis, across in (("y", 1), ("z", 0)):
-        low, high = _cell_edges(dataset[f"cell_{axis}"])
-        there = dataset[f"cell_{axis}"].values[weaker.any(axis=across)] * _MM
+        low, high = _cell_edges(dataset[v.CELL[axis]])
+        there = dataset[v.CELL[axis]].values[weaker.any(axis=across)] * _MM
         ranges[axis] = (max(low, there.min() - 2.0), min(high, there.max() + 2.0)) if there.size else (low, high)
     return ranges

@@ -11,9 +11,10 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.cell import MAPPED, STATUS_COLOURS, Shown, hit_points, limits, nearest_hits, shown, words
+from warpimpact.plotting.cell import STATUS_COLOURS, Shown, hit_points, limits, nearest_hits, shown, words
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
-from warpimpact.results.variables import SHOT_VARIABLES
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +25,6 @@ MOST_HITS = 20_000
 """Hits that a page holds, of all results together: some 3 MB."""
 WORST_SHARE = 0.25
 """Of the trajectories, those of the worst hits; the others are spread evenly."""
-_MAIN = ("residual_velocity", "deflection", "tilt")  # what the label at the pointer tells
 _PIXELS = 160
 _BEHIND = "#707070"  # colour of the core behind the plate
 _DIGITS = 5
@@ -49,11 +49,11 @@ def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
     """Numbers of the hits that get a trajectory: those that are to come first, those with the largest residual
     velocity, then again and again the hit that is farthest from all chosen so far, across the cell's edges."""
-    velocity = shown(dataset, "residual_velocity").values
+    velocity = shown(dataset, v.RESIDUAL_VELOCITY).values
     worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")[: round(WORST_SHARE * count)]
     numbers = dataset["hit"].values
     chosen = list(dict.fromkeys([*np.searchsorted(numbers, first).tolist(), *worst.tolist()]))[:count]
-    points, period = hit_points(dataset), np.asarray(dataset.attrs["plate_period"])
+    points, period = hit_points(dataset), np.asarray(dataset.attrs[attr.PLATE_PERIOD])
     distance = np.full(len(points), np.inf)
 
     def step_back(hit: int) -> None:
@@ -78,7 +78,7 @@ def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
     shared = {key: column for key, column in columns[0].items() if all(key in others for others in columns)}
     return {
         "variables": [{"key": key, "label": column.label, "signed": column.signed} for key, column in shared.items()],
-        "main": [key for key in shared if key.startswith(tuple(map(words, _MAIN)))],
+        "main": [key for key in shared if key.startswith(tuple(map(words, v.shown_by("report"))))],
         "statuses": [
             {"code": status.value, "label": words(status.name.lower()), "colour": STATUS_COLOURS[status]}
             for status in Status
@@ -93,11 +93,11 @@ def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
 def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
     """The variables that differ from hit to hit, and outcomes in any case, by what people call them."""
     columns = {}
-    for variable in (name for name in MAPPED if name in dataset):
-        at_standoff = "standoff" in dataset[variable].dims
-        for standoff in dataset["standoff"].values.tolist() if at_standoff else [None]:
+    for variable in (name for name in v.HIT_NUMBERS if name in dataset):
+        at_standoff = v.STANDOFF in variable.dims
+        for standoff in dataset[v.STANDOFF].values.tolist() if at_standoff else [None]:
             column = shown(dataset, variable, standoff)
-            if variable not in SHOT_VARIABLES or np.ptp(column.values) > 0.0:
+            if variable not in v.SHOT_VARIABLES or np.ptp(column.values) > 0.0:
                 name = words(variable) + ("" if standoff is None else f" at {standoff * _MM:g} mm")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
     return columns
@@ -107,13 +107,13 @@ def _map_data(dataset: xarray.Dataset, columns: dict[str, Array]) -> dict[str, A
     nearest = nearest_hits(dataset, _PIXELS)
     y, z = hit_points(dataset).T * _MM
     return {
-        "period": _rounded(np.asarray(dataset.attrs["plate_period"]) * _MM),
+        "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * _MM),
         "limits": limits(dataset).tolist(),
-        "outline": [_rounded(dataset[f"outline_{axis}"].values * _MM) for axis in "yz"],
+        "outline": [_rounded(dataset[v.OUTLINE[axis]].values * _MM) for axis in "yz"],
         "number": dataset["hit"].values.tolist(),
         "y": _rounded(y),
         "z": _rounded(z),
-        "status": dataset["status"].values.astype(int).tolist(),
+        "status": dataset[v.STATUS].values.astype(int).tolist(),
         "columns": {key: _rounded(values) for key, values in columns.items()},
         "nearest": None if nearest is None else nearest.tolist(),
     }
@@ -128,7 +128,7 @@ def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
         return {"label": label, "colour": colour} | {view: _outline(history, pose, view) for view in "yz"}
 
     return {
-        "thickness": history.attrs["plate_thickness"] * _MM,
+        "thickness": history.attrs[attr.PLATE_THICKNESS] * _MM,
         "solid": {view: _solid_ranges(history, view) for view in "yz"},
         "inside": [drawn(*pose, colour) for pose, colour in zip(inside.items(), colours, strict=True)],
         "behind": [drawn(*pose, _BEHIND) for pose in behind.items()],
@@ -146,8 +146,8 @@ def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float 
 
 def _solid_ranges(history: xarray.Dataset, view: str) -> list[list[float]]:
     """From where to where the plate is solid along y or z through the hit point [mm]."""
-    along = (history["section"].values + float(history[f"hit_{view}"])) * _MM
-    solid = np.concatenate([[0], history[f"solid_along_{view}"].values, [0]])
+    along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * _MM
+    solid = np.concatenate([[0], history[v.SOLID_ALONG[view]].values, [0]])
     starts, ends = np.flatnonzero(np.diff(solid) == 1), np.flatnonzero(np.diff(solid) == -1) - 1
     return [[float(along[start]), float(along[end])] for start, end in zip(starts, ends, strict=True)]
 

@@ -18,7 +18,7 @@ from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, interval_text, number_text
-from warpimpact.analysis.study import study_text
+from warpimpact.analysis.study_text import study_text
 from warpimpact.campaign.replay import replay
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import compared, told

@@ -14,26 +14,28 @@ import xarray
 
 from warpimpact.analysis.comparison import compare, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.summary import UNITS, estimated, main_measures
+from warpimpact.analysis.summary import UNITS, estimated, means_of
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
 
 _MM = 1e3
 _PROVENANCE = (
-    "history",
-    "warpimpact_version",
-    "warp_version",
-    "device",
-    "numerics",
-    "sampling",
-    "seed",
-    "replicates",
-    "symmetries",
-    "computed_hits",
-    "fingerprint",
-    "references",
+    attr.HISTORY,
+    attr.WARPIMPACT_VERSION,
+    attr.WARP_VERSION,
+    attr.DEVICE,
+    attr.NUMERICS,
+    attr.SAMPLING,
+    attr.SEED,
+    attr.REPLICATES,
+    attr.SYMMETRIES,
+    attr.COMPUTED_HITS,
+    attr.FINGERPRINT,
+    attr.REFERENCES,
 )
 
 
@@ -50,17 +52,17 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     attributes = dataset.attrs
     return {
         "name": name,
-        "title": attributes.get("title", "untitled"),
+        "title": attributes.get(attr.TITLE, "untitled"),
         "hits": dataset.sizes["hit"],
         "asked": _asked(dataset),
-        "campaign": attributes.get("campaign", ""),
+        "campaign": attributes.get(attr.CAMPAIGN, ""),
         "tables": _tables(dataset),
         "statuses": list(_statuses(dataset)),
         "numbers": list(_numbers(dataset)),
         "measures": effectiveness(dataset),
         "plate": _plate(dataset),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
-        "speed": float(f"{attributes.get('hits_per_second', 0.0):.2g}"),
+        "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),
     }
 
 
@@ -77,26 +79,26 @@ def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, str]:
 
 def _asked(dataset: xarray.Dataset) -> str:
     """What was shot at what, as a sentence or two."""
-    y, z = (f"{length * _MM:.4g}" for length in dataset.attrs["plate_period"])
-    velocity, obliquity = (range_text(dataset[name]) for name in ("impact_velocity", "obliquity"))
-    sampling = f", {dataset.attrs['sampling']} sampling" if "sampling" in dataset.attrs else ""
+    y, z = (f"{length * _MM:.4g}" for length in dataset.attrs[attr.PLATE_PERIOD])
+    velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
+    sampling = f", {dataset.attrs[attr.SAMPLING]} sampling" if attr.SAMPLING in dataset.attrs else ""
     text = (
         f"{dataset.sizes['hit']} hits{sampling}, over a cell of {y} × {z} mm, at {velocity} and obliquity {obliquity}."
     )
-    if "areal_density" in dataset.attrs:
+    if attr.AREAL_DENSITY in dataset.attrs:
         told = dataset.attrs
-        text += f" The plate is open by {told['open_area']:.1%} and weighs {told['areal_density']:.3g} kg/m²."
+        text += f" The plate is open by {told[attr.OPEN_AREA]:.1%} and weighs {told[attr.AREAL_DENSITY]:.3g} kg/m²."
     return text
 
 
 def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
     """Tables of a campaign with its values as they were written, the one inside another as `plate.pattern`; the number
     of hits may be that of the command line."""
-    campaign = dataset.attrs.get("campaign", "")
+    campaign = dataset.attrs.get(attr.CAMPAIGN, "")
     values = json.loads(campaign) if campaign.startswith("{") else tomllib.loads(campaign)
     tables = dict(_flat(values, ""))
-    if "count" in dataset.attrs and "count" in tables.get("hits", {}):
-        tables["hits"]["count"] = str(dataset.attrs["count"])
+    if attr.COUNT in dataset.attrs and "count" in tables.get("hits", {}):
+        tables["hits"]["count"] = str(dataset.attrs[attr.COUNT])
     return tables
 
 
@@ -123,7 +125,8 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
-    for measure, estimate in estimated(dataset, main_measures(dataset["standoff"].values.tolist())).items():
+    means = means_of(v.shown_by("report"), dataset[v.STANDOFF].values.tolist())
+    for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
             unit = UNITS[measure.units]
@@ -133,9 +136,9 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
     """The cell that hits are spread over, its holes as the path of an SVG: lengths in mm, y to the right, z up."""
-    vertices = np.stack([dataset["outline_y"].values, -dataset["outline_z"].values], axis=-1) * _MM
+    vertices = np.stack([dataset[v.OUTLINE_Y].values, -dataset[v.OUTLINE_Z].values], axis=-1) * _MM
     gaps = np.flatnonzero(np.isnan(vertices[:, 0]))
     rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(vertices, gaps)]
     path = " ".join("M" + "L".join(f"{y:.3f},{z:.3f}" for y, z in ring) + "Z" for ring in rings if len(ring))
-    y, z = (float(length) * _MM for length in dataset.attrs["plate_period"])
+    y, z = (float(length) * _MM for length in dataset.attrs[attr.PLATE_PERIOD])
     return {"path": path, "y": y, "z": z}

@@ -1,4 +1,4 @@
-"""The Dataset of a hit map: how it is gathered, asked, written and read; variables.py tells what it holds.
+"""The Datasets of a hit map, a history and a study: how they are gathered and asked; variables.py tells what they hold.
 
 Inside the package everything is SI and radians; `to_dataset` is where angles become degrees. The Dataset
 follows the CF conventions and opens with plain ``xarray.open_dataset``.
@@ -6,29 +6,15 @@ follows the CF conventions and opens with plain ``xarray.open_dataset``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
 
 from warpimpact.kernels.status import Status
-from warpimpact.results.variables import (
-    BENDING_VARIABLES,
-    COORDINATES,
-    ESTIMATE_VARIABLES,
-    HISTORY_COORDINATES,
-    HISTORY_VARIABLES,
-    OUTCOME_VARIABLES,
-    OUTLINE_VARIABLES,
-    SCATTER_VARIABLES,
-    SHOT_VARIABLES,
-    SOLID_VARIABLES,
-    STUDY_COORDINATES,
-    STUDY_VARIABLES,
-    VARIABLES,
-    Variable,
-)
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -41,7 +27,7 @@ if TYPE_CHECKING:
 _ATTRIBUTES = {
     "Conventions": "CF-1.11",
     "source": "warpimpact: trajectories of a rigid core through a perforated plate that resists and weakens",
-    "references": "Numerical and experimental investigation of asymmetrical contact between a steel plate "
+    attr.REFERENCES: "Numerical and experimental investigation of asymmetrical contact between a steel plate "
     "and armour-piercing projectiles",
     "comment": "Plate frame, right-handed: x along the plate normal in the direction of fire, x = 0 at the "
     "front face; y and z in the plate. What does not exist is NaN.",
@@ -57,7 +43,7 @@ def to_dataset(
     outcomes: Outcomes,
     *,
     period: tuple[float, float],
-    attributes: Mapping[str, str | int | float],
+    attributes: Mapping[str, Any],
     estimates: Estimates | None = None,
 ) -> xarray.Dataset:
     """Gather shots and outcomes into the Dataset of the hit map.
@@ -70,35 +56,28 @@ def to_dataset(
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
         estimates: Of the errors of a run to a tolerance, SI and radians.
     """
-    standoffs = np.array(scene.record.standoffs)
-    coordinates = {"hit_y": shots.hit_y, "hit_z": shots.hit_z, "standoff": standoffs, "axis": ["x", "y", "z"]}
-    values = {name: getattr(shots, name.removeprefix("impact_")) for name in SHOT_VARIABLES}
-    values |= {name: shots.columns[name] for name in SCATTER_VARIABLES if name in shots.columns}
-    values |= {
-        name: getattr(outcomes, name) for name in OUTCOME_VARIABLES | BENDING_VARIABLES if hasattr(outcomes, name)
+    coordinates: dict[str, Any] = {
+        v.HIT_Y: shots.hit_y,
+        v.HIT_Z: shots.hit_z,
+        v.STANDOFF: np.array(scene.record.standoffs),
+        v.AXIS: ["x", "y", "z"],
     }
+    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    values |= {name: shots.columns[name] for name in v.SCATTER_VARIABLES if name in shots.columns}
+    ended = (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES)
+    values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
     values |= _outlines(scene, *((-0.5 * side, 0.5 * side) for side in period))
-    optional = SCATTER_VARIABLES | BENDING_VARIABLES
-    variables = VARIABLES | {name: variable for name, variable in optional.items() if name in values}
+    optional = (name for name in (*v.SCATTER_VARIABLES, *v.BENDING_VARIABLES) if name in values)
+    variables = [*v.VARIABLES, *optional]
     if estimates is not None:
-        variables = variables | ESTIMATE_VARIABLES
-        values |= {name: getattr(estimates, name) for name in ESTIMATE_VARIABLES}
-        values["converged"] = estimates.converged.astype(np.int8)
-    dataset = xarray.Dataset(
-        {name: _described(variable, values[name]) for name, variable in variables.items()},
-        {name: _described(variable, coordinates[name]) for name, variable in COORDINATES.items()},
-        _ATTRIBUTES | dict(attributes) | {"plate_period": np.array(period)},
+        variables += v.ESTIMATE_VARIABLES
+        values |= {name: getattr(estimates, name) for name in v.ESTIMATE_VARIABLES}
+        values[v.CONVERGED] = estimates.converged.astype(np.int8)
+    return xarray.Dataset(
+        _described(variables, values),
+        _described(v.COORDINATES, coordinates),
+        _ATTRIBUTES | dict(attributes) | {attr.PLATE_PERIOD: np.array(period)},
     )
-    return _with_flags(dataset)
-
-
-def _with_flags(dataset: xarray.Dataset) -> xarray.Dataset:
-    """The Dataset with the codes of its status said."""
-    dataset["status"].attrs |= {
-        "flag_values": np.array(list(Status), dtype=np.int8),
-        "flag_meanings": " ".join(status.name.lower() for status in Status),
-    }
-    return dataset
 
 
 def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
@@ -107,12 +86,8 @@ def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
     Args:
         outcomes: SI and radians.
     """
-    return xarray.Dataset(
-        {
-            name: _described(variable, getattr(outcomes, name.removeprefix("solid_")))
-            for name, variable in SOLID_VARIABLES.items()
-        }
-    )
+    values: dict[str, Any] = {variable: getattr(outcomes, variable.field) for variable in v.SOLID_VARIABLES}
+    return xarray.Dataset(_described(v.SOLID_VARIABLES, values))
 
 
 def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
@@ -120,35 +95,33 @@ def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
 
     A plate that is solid is its own reference.
     """
-    if dataset.attrs.get("open_area") == 0.0:
+    if dataset.attrs.get(attr.OPEN_AREA) == 0.0:
         return dataset
-    if not SOLID_VARIABLES.keys() <= dataset.variables.keys():
+    if not v.SOLID_VARIABLES.keys() <= dataset.variables.keys():
         return None
-    solid = dataset[list(SOLID_VARIABLES)].isel(solid_hit=slice(dataset.sizes["hit"])).load()
-    solid = solid.rename({name: name.removeprefix("solid_") for name in SOLID_VARIABLES} | {"solid_hit": "hit"})
-    shots = [name for name in (*SHOT_VARIABLES, *SCATTER_VARIABLES) if name in dataset]
+    solid = dataset[list(v.SOLID_VARIABLES)].isel(solid_hit=slice(dataset.sizes["hit"])).load()
+    solid = solid.rename(v.SOLID_VARIABLES | {"solid_hit": "hit"})
+    shots = v.shot_variables(dataset)
     first = dataset[shots].isel(hit=slice(solid.sizes["hit"]))
     return solid.merge(first.load())
 
 
-def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, str | int | float]) -> xarray.Dataset:
+def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
     """Gather a study of speed and accuracy.
 
     Args:
         values: of every name in STUDY_VARIABLES and STUDY_COORDINATES, SI and radians.
         attributes: global attributes: title, history, campaign, versions, device, ...
     """
-    return _with_flags(
-        xarray.Dataset(
-            {name: _described(variable, values[name]) for name, variable in STUDY_VARIABLES.items()},
-            {name: _described(variable, values[name]) for name, variable in STUDY_COORDINATES.items()},
-            _ATTRIBUTES | dict(attributes),
-        )
+    return xarray.Dataset(
+        _described(v.STUDY_VARIABLES, values),
+        _described(v.STUDY_COORDINATES, values),
+        _ATTRIBUTES | dict(attributes),
     )
 
 
 def history_dataset(
-    scene: Scene, hit: xarray.Dataset, replay: Replay, *, attributes: Mapping[str, str | int | float]
+    scene: Scene, hit: xarray.Dataset, replay: Replay, *, attributes: Mapping[str, Any]
 ) -> xarray.Dataset:
     """Gather a replayed shot into the Dataset of its history, which tells enough of core and plate to draw them.
 
@@ -160,45 +133,45 @@ def history_dataset(
         attributes: global attributes over those of `hit`.
     """
     core, plate = scene.core, scene.target.plate
-    hit_y, hit_z = float(hit["hit_y"]), float(hit["hit_z"])
+    hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
     history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
     section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * core.bounding_radius
-    values = (
-        {name: getattr(history, name) for name in HISTORY_VARIABLES if hasattr(history, name)}
-        | {
-            "plate_position": history.position + np.array([0.0, hit_y, hit_z]),
-            "resistance_share": replay.resistance_share,
-            "core_radius": core.radius(stations),
-            "solid_along_y": plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
-            "solid_along_z": plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
-        }
-        | _outlines(scene, *((float(cells.min()), float(cells.max())) for cells in (replay.cell_y, replay.cell_z)))
-    )
-    coordinates = {
-        "time": history.time,
-        "quaternion": ["x", "y", "z", "w"],
-        "snapshot": replay.plate_time,
-        "cell_y": replay.cell_y,
-        "cell_z": replay.cell_z,
-        "section": section,
-        "station": core.mass_properties.centre_of_mass - stations,
+    values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}
+    values |= {
+        v.PLATE_POSITION: history.position + np.array([0.0, hit_y, hit_z]),
+        v.RESISTANCE_SHARE: replay.resistance_share,
+        v.CORE_RADIUS: core.radius(stations),
+        v.SOLID_ALONG_Y: plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
+        v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
+    }
+    values |= _outlines(scene, *((float(cells.min()), float(cells.max())) for cells in (replay.cell_y, replay.cell_z)))
+    coordinates: dict[str, Any] = {
+        v.TIME: history.time,
+        v.QUATERNION: ["x", "y", "z", "w"],
+        v.SNAPSHOT: replay.plate_time,
+        v.CELL_Y: replay.cell_y,
+        v.CELL_Z: replay.cell_z,
+        v.SECTION: section,
+        v.STATION: core.mass_properties.centre_of_mass - stations,
     }
     dataset = (
         hit.drop_dims("vertex")
-        .rename(angular_velocity="residual_angular_velocity")
-        .assign_coords(
-            {name: _described(variable, coordinates[name]) for name, variable in HISTORY_COORDINATES.items()}
-        )
+        .rename({v.ANGULAR_VELOCITY: v.RESIDUAL_ANGULAR_VELOCITY})
+        .assign_coords(_described(v.HISTORY_COORDINATES, coordinates))
     )
-    return dataset.assign(
-        {name: _described(variable, values[name]) for name, variable in (HISTORY_VARIABLES | OUTLINE_VARIABLES).items()}
-    ).assign_attrs(dict(attributes) | {"plate_thickness": float(hit.get("thickness", plate.thickness))})
+    thickness = float(hit.get(v.THICKNESS, plate.thickness))
+    return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES), values)).assign_attrs(
+        dict(attributes) | {attr.PLATE_THICKNESS: thickness}
+    )
 
 
-def _described(variable: Variable, values: Any) -> tuple[tuple[str, ...], Any, dict[str, str]]:
+def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
     """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them."""
-    surface = np.degrees(values) if variable.units == "degree" else values
-    return variable.dims, surface, {"units": variable.units, "long_name": variable.long_name}
+    return {str(one): (one.dims, _in_units(one, values[one]), one.attributes) for one in variables}
+
+
+def _in_units(variable: v.Variable, values: Any) -> Any:
+    return np.degrees(values) if variable.units == "degree" else values
 
 
 def _outlines(
@@ -208,25 +181,28 @@ def _outlines(
     gap = np.full((1, 2), np.nan)
     rows = [row for outline in scene.target.plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
     vertices = np.concatenate(rows[1:]) if rows else np.empty((0, 2))
-    return {"outline_y": vertices[:, 0], "outline_z": vertices[:, 1]}
+    return {v.OUTLINE_Y: vertices[:, 0], v.OUTLINE_Z: vertices[:, 1]}
 
 
 def status_codes(dataset: xarray.Dataset) -> dict[str, int]:
     """Meaning → code of ``status``, in the order of the codes."""
-    attributes = dataset["status"].attrs
+    attributes = dataset[v.STATUS].attrs
     return dict(zip(attributes["flag_meanings"].split(), attributes["flag_values"].tolist(), strict=True))
 
 
 def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether each core passed the plate, shape (hit,): it perforated the plate or missed its material."""
-    return np.isin(dataset["status"].values, [Status.PERFORATED, Status.MISSED])
+    return np.isin(dataset[v.STATUS].values, [Status.PERFORATED, Status.MISSED])
 
 
 def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
-    return np.isin(dataset["status"].values, [status for status in Status if status.failed])
+    return np.isin(dataset[v.STATUS].values, [status for status in Status if status.failed])
 
 
 def images(dataset: xarray.Dataset) -> int:
     """How many hits in a row are images of each other; 1 but for a map with `hits.irreducible`."""
-    return str(dataset.attrs.get("symmetries", "()")).count("(")
+    told = dataset.attrs
+    if attr.IMAGES in told or attr.SYMMETRIES not in told:
+        return int(told.get(attr.IMAGES, 1))
+    return str(told[attr.SYMMETRIES]).count("(")  # files of version 0.1.0 name the symmetries, but not their number

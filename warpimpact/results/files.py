@@ -13,8 +13,8 @@ from typing import Any
 import netCDF4
 import xarray
 
+from warpimpact.results import variables as v
 from warpimpact.results.interrupts import uninterrupted
-from warpimpact.results.variables import COORDINATES, STUDY_COORDINATES, STUDY_VARIABLES, VARIABLES
 
 
 class OutputError(OSError):
@@ -164,7 +164,7 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         ResultError: The file is missing, is not netCDF, or is neither.
     """
     with _netcdf(path) as dataset:
-        missing = (COORDINATES.keys() | VARIABLES.keys()) - dataset.variables.keys()
+        missing = {*v.COORDINATES, *v.VARIABLES} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
         yield dataset
@@ -177,7 +177,7 @@ def read_study(path: Path) -> xarray.Dataset:
         ResultError: The file is missing, is not netCDF, or is not a study.
     """
     with _netcdf(path) as dataset:
-        missing = (STUDY_COORDINATES.keys() | STUDY_VARIABLES.keys()) - dataset.variables.keys()
+        missing = {*v.STUDY_COORDINATES, *v.STUDY_VARIABLES} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
         return dataset.load()

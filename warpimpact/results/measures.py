@@ -12,8 +12,9 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.results.dataset import failed, passed
-from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed, images, passed
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -30,12 +31,8 @@ _KINDS: dict[str, Any] = {
     "1": Number,
 }
 """Types of the quantities that have these units in the Dataset."""
-_VARIABLES = OUTCOME_VARIABLES | BENDING_VARIABLES
-MEASURED = tuple(
-    name
-    for name, variable in _VARIABLES.items()
-    if name != "status" and variable.dims in {("hit",), ("hit", "standoff")}
-)
+_VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in v.SHOT_VARIABLES}
+MEASURED = tuple(_VARIABLES)
 STATUSES = {status.name.lower(): status for status in Status if not status.failed}
 
 _VARIABLE = r"(?P<variable>[a-z_]+)(?:\s*@\s*(?P<standoff>[^<>,]+?))?"
@@ -130,7 +127,7 @@ class Measure:
     def values(self, dataset: xarray.Dataset) -> Array:
         """What every shot says, NaN where it does not count; shape [hits]."""
         if self.kind == "share":
-            return np.where(failed(dataset), np.nan, dataset["status"].values == STATUSES[self.variable])
+            return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
         column = dataset[self.variable]
         if self.standoff is not None:
             column = column.sel(standoff=self.standoff, method="nearest")
@@ -165,3 +162,8 @@ class Tally:
     def estimate(self) -> Estimate:
         """What the shots so far say."""
         return self._dealt.estimate()
+
+
+def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
+    """How the shots of a result were dealt out, for `Dealt`."""
+    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": images(dataset)}

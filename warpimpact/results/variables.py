@@ -2,155 +2,322 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Collection
+from enum import IntEnum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpimpact.kernels.status import Status
 
 if TYPE_CHECKING:
     import xarray
 
 
-class Variable(NamedTuple):
-    """What the Dataset says about one of its variables."""
+class Variable(str):
+    """Name of a variable, which is its key in a Dataset, with what the Dataset says about it.
+
+    Attributes:
+        dims: names of its dimensions.
+        units: as CF writes them; "degree" where the package itself computes in radians.
+        long_name: what it is, for people.
+        flags: the codes that it may hold, if it holds codes (CF: flag_values, flag_meanings).
+        field: of shots, outcomes or history that it is gathered from.
+        shown_by: commands that show it by themselves; others show it on request, or every variable alike.
+    """
 
     dims: tuple[str, ...]
     units: str
     long_name: str
+    flags: type[IntEnum] | None
+    field: str
+    shown_by: frozenset[str]
+
+    def __new__(
+        cls,
+        name: str,
+        dims: tuple[str, ...],
+        units: str,
+        long_name: str,
+        *,
+        flags: type[IntEnum] | None = None,
+        field: str | None = None,
+        shown_by: Collection[str] = (),
+    ) -> Variable:
+        self = super().__new__(cls, name)
+        self.dims, self.units, self.long_name, self.flags = dims, units, long_name, flags
+        self.field, self.shown_by = field or name, frozenset(shown_by)
+        return self
+
+    def __reduce__(self) -> tuple[type[str], tuple[str]]:
+        """A copy in another process is the plain name, which finds the same entries."""
+        return str, (str(self),)
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """CF attributes of the variable in the Dataset."""
+        told: dict[str, Any] = {"units": self.units, "long_name": self.long_name}
+        if self.flags is not None:
+            told["flag_values"] = np.array(list(self.flags), dtype=np.int8)
+            told["flag_meanings"] = " ".join(flag.name.lower() for flag in self.flags)
+        return told
+
+    @property
+    def is_number_of_hit(self) -> bool:
+        """Whether it has one number per hit, or one per hit and stand-off, which maps and measures can take."""
+        return self.flags is None and self.dims in {("hit",), ("hit", "standoff")}
 
 
-COORDINATES = {
-    "hit_y": Variable(("hit",), "m", "hit point on the front face, y"),
-    "hit_z": Variable(("hit",), "m", "hit point on the front face, z"),
-    "standoff": Variable(("standoff",), "m", "distance behind the rear face"),
-    "axis": Variable(("axis",), "1", "axis of the plate frame"),
-}
+_HIT, _AT_STANDOFF = ("hit",), ("hit", "standoff")
+_MAIN = ("run", "inspect", "plot", "report")
 
-SHOT_VARIABLES = {
-    "impact_velocity": Variable(("hit",), "m s-1", "impact velocity"),
-    "obliquity": Variable(("hit",), "degree", "angle between line of fire and plate normal"),
-    "azimuth": Variable(("hit",), "degree", "direction of the obliquity, from +y towards +z"),
-    "impact_pitch": Variable(("hit",), "degree", "pitch of the core on impact, relative to the line of fire"),
-    "impact_yaw": Variable(("hit",), "degree", "yaw of the core on impact, relative to the line of fire"),
-    "spin": Variable(("hit",), "rad s-1", "spin of the core about its axis on impact"),
-}
+# --- Coordinates of a hit map ---
+HIT_Y = Variable("hit_y", _HIT, "m", "hit point on the front face, y")
+HIT_Z = Variable("hit_z", _HIT, "m", "hit point on the front face, z")
+STANDOFF = Variable("standoff", ("standoff",), "m", "distance behind the rear face")
+AXIS = Variable("axis", ("axis",), "1", "axis of the plate frame")
 
-SCATTER_VARIABLES = {
-    "resistance": Variable(("hit",), "Pa", "resistance of the plate"),
-    "shear_coefficient": Variable(("hit",), "1", "friction per normal stress"),
-    "degradation": Variable(("hit",), "1", "share of the resistance left after an interval of contact"),
-    "thickness": Variable(("hit",), "m", "thickness of the plate"),
-    "mass": Variable(("hit",), "kg", "mass of the core"),
-}
+COORDINATES = (HIT_Y, HIT_Z, STANDOFF, AXIS)
+
+# --- How the core came ---
+IMPACT_VELOCITY = Variable("impact_velocity", _HIT, "m s-1", "impact velocity", field="velocity")
+OBLIQUITY = Variable("obliquity", _HIT, "degree", "angle between line of fire and plate normal")
+AZIMUTH = Variable("azimuth", _HIT, "degree", "direction of the obliquity, from +y towards +z")
+IMPACT_PITCH = Variable(
+    "impact_pitch", _HIT, "degree", "pitch of the core on impact, relative to the line of fire", field="pitch"
+)
+IMPACT_YAW = Variable(
+    "impact_yaw", _HIT, "degree", "yaw of the core on impact, relative to the line of fire", field="yaw"
+)
+SPIN = Variable("spin", _HIT, "rad s-1", "spin of the core about its axis on impact")
+
+SHOT_VARIABLES = (IMPACT_VELOCITY, OBLIQUITY, AZIMUTH, IMPACT_PITCH, IMPACT_YAW, SPIN)
+
+# --- What else may differ from shot to shot ---
+RESISTANCE = Variable("resistance", _HIT, "Pa", "resistance of the plate")
+SHEAR_COEFFICIENT = Variable("shear_coefficient", _HIT, "1", "friction per normal stress")
+DEGRADATION = Variable("degradation", _HIT, "1", "share of the resistance left after an interval of contact")
+THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
+MASS = Variable("mass", _HIT, "kg", "mass of the core")
+
+SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS)
 """Only of a campaign in which they differ from shot to shot."""
 
-OUTCOME_VARIABLES = {
-    "status": Variable(("hit",), "1", "how the shot ended"),
-    "residual_velocity": Variable(("hit",), "m s-1", "residual velocity"),
-    "deflection": Variable(("hit",), "degree", "angle between residual velocity and line of fire"),
-    "angular_velocity": Variable(("hit", "axis"), "rad s-1", "residual angular velocity"),
-    "energy_loss": Variable(("hit",), "J", "kinetic energy lost in the plate"),
-    "contact_duration": Variable(("hit",), "s", "duration of contact"),
-    "tilt": Variable(("hit", "standoff"), "degree", "angle between core axis and line of fire"),
-    "pitch": Variable(("hit", "standoff"), "degree", "pitch of the core, projected into the x-z plane"),
-    "yaw": Variable(("hit", "standoff"), "degree", "yaw of the core, projected into the x-y plane"),
-    "total_yaw": Variable(("hit", "standoff"), "degree", "angle between core axis and residual velocity"),
-}
+# --- How the shot ended ---
+STATUS = Variable("status", _HIT, "1", "how the shot ended", flags=Status)
+RESIDUAL_VELOCITY = Variable("residual_velocity", _HIT, "m s-1", "residual velocity", shown_by=_MAIN)
+DEFLECTION = Variable("deflection", _HIT, "degree", "angle between residual velocity and line of fire", shown_by=_MAIN)
+ANGULAR_VELOCITY = Variable("angular_velocity", ("hit", "axis"), "rad s-1", "residual angular velocity")
+ENERGY_LOSS = Variable("energy_loss", _HIT, "J", "kinetic energy lost in the plate")
+CONTACT_DURATION = Variable("contact_duration", _HIT, "s", "duration of contact")
+TILT = Variable("tilt", _AT_STANDOFF, "degree", "angle between core axis and line of fire", shown_by=_MAIN)
+PITCH = Variable("pitch", _AT_STANDOFF, "degree", "pitch of the core, projected into the x-z plane")
+YAW = Variable("yaw", _AT_STANDOFF, "degree", "yaw of the core, projected into the x-y plane")
+TOTAL_YAW = Variable("total_yaw", _AT_STANDOFF, "degree", "angle between core axis and residual velocity")
 
-SOLID_VARIABLES = {
-    f"solid_{name}": Variable(
-        tuple("solid_hit" if dim == "hit" else dim for dim in OUTCOME_VARIABLES[name].dims),
-        OUTCOME_VARIABLES[name].units,
-        f"{OUTCOME_VARIABLES[name].long_name}, solid plate of equal areal density",
+OUTCOME_VARIABLES = (
+    STATUS,
+    RESIDUAL_VELOCITY,
+    DEFLECTION,
+    ANGULAR_VELOCITY,
+    ENERGY_LOSS,
+    CONTACT_DURATION,
+    TILT,
+    PITCH,
+    YAW,
+    TOTAL_YAW,
+)
+
+
+def _solid(variable: Variable) -> Variable:
+    """The same of the solid plate of equal areal density."""
+    return Variable(
+        f"solid_{variable}",
+        tuple("solid_hit" if dim == "hit" else dim for dim in variable.dims),
+        variable.units,
+        f"{variable.long_name}, solid plate of equal areal density",
+        field=variable.field,
     )
-    for name in ("status", "residual_velocity", "tilt")
-}
-"""What the solid plate of equal areal density makes of the first shots; of the first one alone where no two differ but
-in where they hit. Only of a perforated plate, where `output.solid_reference` asks for it."""
 
-BENDING_VARIABLES = {
-    "largest_bending_moment": Variable(("hit",), "N m", "largest bending moment in the rigid core"),
-    "bending_section": Variable(("hit",), "m", "distance of its section from the nose"),
-    "bending_stress": Variable(("hit",), "Pa", "largest nominal bending stress in the rigid core"),
-    "bending_stress_section": Variable(("hit",), "m", "distance of its section from the nose"),
-}
+
+SOLID_VARIABLES = {_solid(variable): variable for variable in (STATUS, RESIDUAL_VELOCITY, TILT)}
+"""What the solid plate of equal areal density makes of the first shots, and the variable of the hits that each goes
+with; of the first shot alone where no two differ but in where they hit. Only of a perforated plate, where
+`output.solid_reference` asks for it."""
+
+LARGEST_BENDING_MOMENT = Variable(
+    "largest_bending_moment",
+    _HIT,
+    "N m",
+    "largest bending moment in the rigid core",
+    shown_by=("inspect", "plot"),
+)
+BENDING_SECTION = Variable("bending_section", _HIT, "m", "distance of its section from the nose")
+BENDING_STRESS = Variable(
+    "bending_stress", _HIT, "Pa", "largest nominal bending stress in the rigid core", shown_by=("inspect", "plot")
+)
+BENDING_STRESS_SECTION = Variable("bending_stress_section", _HIT, "m", "distance of its section from the nose")
+
+BENDING_VARIABLES = (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION)
 """Only of a campaign with output.bending."""
 
-ESTIMATE_VARIABLES = {
-    "residual_velocity_error": Variable(("hit",), "m s-1", "estimated error of the residual velocity"),
-    "tilt_error": Variable(("hit", "standoff"), "degree", "estimated error of the tilt"),
-    "converged": Variable(("hit",), "1", "whether the estimated errors meet the tolerance, 1 or 0"),
-    "level": Variable(("hit",), "1", "level of resolution on which the hit was computed"),
-}
+RESIDUAL_VELOCITY_ERROR = Variable("residual_velocity_error", _HIT, "m s-1", "estimated error of the residual velocity")
+TILT_ERROR = Variable("tilt_error", _AT_STANDOFF, "degree", "estimated error of the tilt")
+CONVERGED = Variable("converged", _HIT, "1", "whether the estimated errors meet the tolerance, 1 or 0")
+LEVEL = Variable("level", _HIT, "1", "level of resolution on which the hit was computed")
+
+ESTIMATE_VARIABLES = (RESIDUAL_VELOCITY_ERROR, TILT_ERROR, CONVERGED, LEVEL)
 """Only of a run to a tolerance."""
 
-OUTLINE_VARIABLES = {
-    "outline_y": Variable(("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN"),
-    "outline_z": Variable(("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN"),
-}
+OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
+OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
-VARIABLES = SHOT_VARIABLES | OUTCOME_VARIABLES | OUTLINE_VARIABLES
+OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
-HISTORY_COORDINATES = {
-    "time": Variable(("time",), "s", "time since the first touch of the front face"),
-    "quaternion": Variable(("quaternion",), "1", "component of a quaternion, w its scalar part"),
-    "snapshot": Variable(("snapshot",), "s", "time at which the plate is shown"),
-    "cell_y": Variable(("cell_y",), "m", "cell of the plate, y"),
-    "cell_z": Variable(("cell_z",), "m", "cell of the plate, z"),
-    "section": Variable(("section",), "m", "distance from the hit point in the plate"),
-    "station": Variable(("station",), "m", "distance along the core, from its centre of mass towards the nose"),
-}
+VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *OUTLINE_VARIABLES)
+"""Of every hit map."""
+HIT_NUMBERS = tuple(v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit)
+"""What shots and their outcomes have as one number per hit, or one per hit and stand-off."""
 
-HISTORY_VARIABLES = {
-    "position": Variable(("time", "axis"), "m", "centre of mass, from the hit point"),
-    "plate_position": Variable(("time", "axis"), "m", "centre of mass in the plate"),
-    "attitude": Variable(("time", "quaternion"), "1", "turn of the plate's axes into the core's, x towards its nose"),
-    "core_axis": Variable(("time", "axis"), "1", "unit vector along the core towards its nose"),
-    "velocity": Variable(("time", "axis"), "m s-1", "velocity of the centre of mass"),
-    "angular_velocity": Variable(("time", "axis"), "rad s-1", "angular velocity"),
-    "force": Variable(("time", "axis"), "N", "force on the core, mean over the step"),
-    "moment": Variable(("time", "axis"), "N m", "moment about the centre of mass, mean over the step"),
-    "translational_energy": Variable(("time",), "J", "kinetic energy of translation"),
-    "rotational_energy": Variable(("time",), "J", "kinetic energy of rotation"),
-    "resistance_share": Variable(("snapshot", "cell_y", "cell_z"), "1", "share of the resistance left; 0 in holes"),
-    "core_radius": Variable(("station",), "m", "radius of the core"),
-    "solid_along_y": Variable(("section",), "1", "1 where the plate is solid along y through the hit point, else 0"),
-    "solid_along_z": Variable(("section",), "1", "1 where the plate is solid along z through the hit point, else 0"),
-}
+# --- History of one hit ---
+TIME = Variable("time", ("time",), "s", "time since the first touch of the front face")
+QUATERNION = Variable("quaternion", ("quaternion",), "1", "component of a quaternion, w its scalar part")
+SNAPSHOT = Variable("snapshot", ("snapshot",), "s", "time at which the plate is shown")
+CELL_Y = Variable("cell_y", ("cell_y",), "m", "cell of the plate, y")
+CELL_Z = Variable("cell_z", ("cell_z",), "m", "cell of the plate, z")
+SECTION = Variable("section", ("section",), "m", "distance from the hit point in the plate")
+STATION = Variable("station", ("station",), "m", "distance along the core, from its centre of mass towards the nose")
 
-STUDY_COORDINATES = {
-    "setting": Variable(("setting",), "1", "numerics under study"),
-    "quantile": Variable(("quantile",), "1", "share of the hits with at most this error"),
-    "level": Variable(("level",), "1", "level of refinement behind the converged answer"),
-} | {name: COORDINATES[name] for name in ("standoff", "hit_y", "hit_z")}
+HISTORY_COORDINATES = (TIME, QUATERNION, SNAPSHOT, CELL_Y, CELL_Z, SECTION, STATION)
 
-STUDY_VARIABLES = {
-    "scheme": Variable(("setting",), "1", "scheme"),
-    "patches_axial": Variable(("setting",), "1", "surface patches along the core"),
-    "patches_around": Variable(("setting",), "1", "surface patches around the core"),
-    "grid_spacing": Variable(("setting",), "m", "spacing of the plate grid"),
-    "time_step": Variable(("setting",), "s", "time step at impact velocity"),
-    "hits_per_second": Variable(("setting",), "s-1", "hits computed per second"),
-    "residual_velocity_error": Variable(("setting", "quantile"), "m s-1", "error of the residual velocity"),
-    "tilt_error": Variable(("setting", "quantile", "standoff"), "degree", "error of the tilt"),
-    "other_status": Variable(("setting",), "1", "hits that end otherwise than the converged answer"),
-    "residual_velocity_front": Variable(("setting",), "1", "1 where no faster setting has a smaller 90 % error"),
-    "tilt_front": Variable(("setting",), "1", "1 where no faster setting has a smaller 90 % error, last stand-off"),
-    "residual_velocity_change": Variable(
-        ("level", "quantile"), "m s-1", "change of the residual velocity from the level before"
+_ALONG = ("time", "axis")
+POSITION = Variable("position", _ALONG, "m", "centre of mass, from the hit point")
+PLATE_POSITION = Variable("plate_position", _ALONG, "m", "centre of mass in the plate")
+ATTITUDE = Variable(
+    "attitude", ("time", "quaternion"), "1", "turn of the plate's axes into the core's, x towards its nose"
+)
+CORE_AXIS = Variable("core_axis", _ALONG, "1", "unit vector along the core towards its nose")
+VELOCITY = Variable("velocity", _ALONG, "m s-1", "velocity of the centre of mass")
+MARCHED_ANGULAR_VELOCITY = Variable("angular_velocity", _ALONG, "rad s-1", "angular velocity")
+FORCE = Variable("force", _ALONG, "N", "force on the core, mean over the step")
+MOMENT = Variable("moment", _ALONG, "N m", "moment about the centre of mass, mean over the step")
+TRANSLATIONAL_ENERGY = Variable("translational_energy", ("time",), "J", "kinetic energy of translation")
+ROTATIONAL_ENERGY = Variable("rotational_energy", ("time",), "J", "kinetic energy of rotation")
+RESISTANCE_SHARE = Variable(
+    "resistance_share", ("snapshot", "cell_y", "cell_z"), "1", "share of the resistance left; 0 in holes"
+)
+CORE_RADIUS = Variable("core_radius", ("station",), "m", "radius of the core")
+SOLID_ALONG_Y = Variable(
+    "solid_along_y", ("section",), "1", "1 where the plate is solid along y through the hit point, else 0"
+)
+SOLID_ALONG_Z = Variable(
+    "solid_along_z", ("section",), "1", "1 where the plate is solid along z through the hit point, else 0"
+)
+
+HISTORY_VARIABLES = (
+    POSITION,
+    PLATE_POSITION,
+    ATTITUDE,
+    CORE_AXIS,
+    VELOCITY,
+    MARCHED_ANGULAR_VELOCITY,
+    FORCE,
+    MOMENT,
+    TRANSLATIONAL_ENERGY,
+    ROTATIONAL_ENERGY,
+    RESISTANCE_SHARE,
+    CORE_RADIUS,
+    SOLID_ALONG_Y,
+    SOLID_ALONG_Z,
+)
+RESIDUAL_ANGULAR_VELOCITY = "residual_angular_velocity"
+"""The name in a history of the outcome's angular velocity, whose own name is that of the motion."""
+
+# By the axis y or z of the plate frame.
+HIT_POINT = {"y": HIT_Y, "z": HIT_Z}
+OUTLINE = {"y": OUTLINE_Y, "z": OUTLINE_Z}
+CELL = {"y": CELL_Y, "z": CELL_Z}
+SOLID_ALONG = {"y": SOLID_ALONG_Y, "z": SOLID_ALONG_Z}
+
+# --- Study of speed and accuracy; some names are those of a hit map, with a meaning of their own ---
+SETTING = Variable("setting", ("setting",), "1", "numerics under study")
+QUANTILE = Variable("quantile", ("quantile",), "1", "share of the hits with at most this error")
+STUDY_LEVEL = Variable("level", ("level",), "1", "level of refinement behind the converged answer")
+
+STUDY_COORDINATES = (SETTING, QUANTILE, STUDY_LEVEL, STANDOFF, HIT_Y, HIT_Z)
+
+_SETTING = ("setting",)
+SCHEME = Variable("scheme", _SETTING, "1", "scheme")
+PATCHES_AXIAL = Variable("patches_axial", _SETTING, "1", "surface patches along the core")
+PATCHES_AROUND = Variable("patches_around", _SETTING, "1", "surface patches around the core")
+GRID_SPACING = Variable("grid_spacing", _SETTING, "m", "spacing of the plate grid")
+TIME_STEP = Variable("time_step", _SETTING, "s", "time step at impact velocity")
+HITS_PER_SECOND = Variable("hits_per_second", _SETTING, "s-1", "hits computed per second")
+OTHER_STATUS = Variable("other_status", _SETTING, "1", "hits that end otherwise than the converged answer")
+SETTLED = Variable("settled", _HIT, "1", "1 where the hit ends with the same status on all levels")
+CONVERGED_STATUS = Variable("status", _HIT, "1", "how the shot ended, converged", flags=Status)
+CONVERGED_VELOCITY = Variable("residual_velocity", _HIT, "m s-1", "residual velocity, converged")
+CONVERGED_TILT = Variable("tilt", _AT_STANDOFF, "degree", "angle between core axis and line of fire, converged")
+
+ERRORS = {
+    RESIDUAL_VELOCITY: Variable(
+        "residual_velocity_error", ("setting", "quantile"), "m s-1", "error of the residual velocity"
     ),
-    "tilt_change": Variable(("level", "quantile", "standoff"), "degree", "change of the tilt from the level before"),
-    "settled": Variable(("hit",), "1", "1 where the hit ends with the same status on all levels"),
-    "status": Variable(("hit",), "1", "how the shot ended, converged"),
-    "residual_velocity": Variable(("hit",), "m s-1", "residual velocity, converged"),
-    "residual_velocity_uncertainty": Variable(("hit",), "m s-1", "change of it on the last level"),
-    "tilt": Variable(("hit", "standoff"), "degree", "angle between core axis and line of fire, converged"),
-    "tilt_uncertainty": Variable(("hit", "standoff"), "degree", "change of it on the last level"),
+    TILT: Variable("tilt_error", ("setting", "quantile", "standoff"), "degree", "error of the tilt"),
+}
+"""Of the two quantities of a study, as are the following."""
+FRONTS = {
+    RESIDUAL_VELOCITY: Variable(
+        "residual_velocity_front", _SETTING, "1", "1 where no faster setting has a smaller 90 % error"
+    ),
+    TILT: Variable("tilt_front", _SETTING, "1", "1 where no faster setting has a smaller 90 % error, last stand-off"),
+}
+CHANGES = {
+    RESIDUAL_VELOCITY: Variable(
+        "residual_velocity_change",
+        ("level", "quantile"),
+        "m s-1",
+        "change of the residual velocity from the level before",
+    ),
+    TILT: Variable(
+        "tilt_change", ("level", "quantile", "standoff"), "degree", "change of the tilt from the level before"
+    ),
+}
+UNCERTAINTIES = {
+    RESIDUAL_VELOCITY: Variable("residual_velocity_uncertainty", _HIT, "m s-1", "change of it on the last level"),
+    TILT: Variable("tilt_uncertainty", _AT_STANDOFF, "degree", "change of it on the last level"),
 }
 
+STUDY_VARIABLES = (
+    SCHEME,
+    PATCHES_AXIAL,
+    PATCHES_AROUND,
+    GRID_SPACING,
+    TIME_STEP,
+    HITS_PER_SECOND,
+    *ERRORS.values(),
+    OTHER_STATUS,
+    *FRONTS.values(),
+    *CHANGES.values(),
+    SETTLED,
+    CONVERGED_STATUS,
+    CONVERGED_VELOCITY,
+    UNCERTAINTIES[RESIDUAL_VELOCITY],
+    CONVERGED_TILT,
+    UNCERTAINTIES[TILT],
+)
 
-def shot_variables(dataset: xarray.Dataset) -> list[str]:
+
+def shown_by(command: str) -> tuple[Variable, ...]:
+    """The variables of a hit map that a command shows by itself."""
+    return tuple(variable for variable in HIT_NUMBERS if command in variable.shown_by)
+
+
+def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the cores came and what they hit, but for where."""
     return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
 
 
-def outcome_variables(dataset: xarray.Dataset) -> list[str]:
+def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
     return [*OUTCOME_VARIABLES, *(name for name in BENDING_VARIABLES if name in dataset)]

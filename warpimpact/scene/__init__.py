@@ -1,4 +1,8 @@
-"""What is shot at what: immutable, validated, in SI units and radians."""
+"""What is shot at what: immutable, validated, in SI units and radians.
+
+Change cores, plates, patterns, shots and their scatter here; a message says what was found and what is allowed. It
+imports no other room: neither a kernel nor a Dataset.
+"""
 
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction

@@ -1,4 +1,4 @@
-"""Cores: rigid bodies of revolution r(s), s from the nose tip (MODEL §2)."""
+"""Cores: rigid bodies of revolution r(s), s from the nose tip (docs/model.md §2)."""
 
 from abc import ABC, abstractmethod
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Localized interaction: normal stress on an advancing surface element (MODEL §4, Ben-Dor et al.)."""
+"""Localized interaction: normal stress on an advancing surface element (docs/model.md §4, Ben-Dor et al.)."""
 
 import numpy as np
 

@@ -39,7 +39,7 @@ class Numerics(_AsGiven):
 
     Attributes:
         fidelity: "draft", "standard" or "reference".
-        scheme: "consistent", or "nodal" for the paper's literal scheme (MODEL §4).
+        scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
         time_step: [s].
         patches_axial, patches_around: surface patches per length of the core (the consistent scheme takes shorter ones
             behind the widest station), and around it; a multiple of 4 around it makes mirrored shots mirror exactly.

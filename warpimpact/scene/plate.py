@@ -1,4 +1,4 @@
-"""Plate: a thickness of resisting material with holes (MODEL §3, §4)."""
+"""Plate: a thickness of resisting material with holes (docs/model.md §3, §4)."""
 
 from typing import Annotated, Self
 

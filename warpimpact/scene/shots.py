@@ -1,4 +1,4 @@
-"""Shots: how the core arrives, and where (MODEL §1)."""
+"""Shots: how the core arrives, and where (docs/model.md §1)."""
 
 import math
 from collections.abc import Sequence

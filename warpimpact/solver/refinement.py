@@ -59,7 +59,7 @@ def simulate_to_tolerance(
     """Compute every shot on the first two levels, and on finer ones while two levels differ by too much.
 
     The outcome is that of the finer level, the estimate its change from the coarser one; where levels converge,
-    the finer outcome is nearer to the limit (MODEL.md §4) than that.
+    the finer outcome is nearer to the limit (docs/model.md §4) than that.
 
     Args:
         numerics: its tolerance and precision; the others as in `simulate`.

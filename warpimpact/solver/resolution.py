@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Fidelity:
-    """Numbers behind a named fidelity; lengths scale with the scene (MODEL.md §4's table)."""
+    """Numbers behind a named fidelity; lengths scale with the scene (docs/model.md §4's table)."""
 
     patches_axial: int
     patches_around: int
@@ -56,7 +56,7 @@ NODAL: dict[str, Any] = {
     "grid_spacing": 1.0e-5,
     "time_step": 1.0e-6,
 }
-"""The paper's own resolution; its time step is the one that meets its rows (MODEL.md §4)."""
+"""The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
 
 
 @dataclass(frozen=True)

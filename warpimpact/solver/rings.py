@@ -49,7 +49,7 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
     alone, evenly divided.
 
     Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the
-    closed surface sum to zero and the work of a straight shot is exact (MODEL.md §6.1).
+    closed surface sum to zero and the work of a straight shot is exact (docs/model.md §6.1).
     """
     if discs:
         nose, base = (float(r) for r in core.radius(np.array([0.0, core.length])))

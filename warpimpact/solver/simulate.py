@@ -95,7 +95,7 @@ def simulate(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
-    """Compute every shot on its own copy of the target (MODEL.md §§1–5).
+    """Compute every shot on its own copy of the target (docs/model.md §§1–5).
 
     Args:
         numerics: how finely; None is the standard fidelity.

@@ -14,15 +14,14 @@ from PIL import Image
 from warpimpact.analysis import study as studies
 from warpimpact.analysis.study import (
     Answer,
-    advantage,
     converged,
     default_settings,
     extrapolated,
     front,
     label,
     study,
-    study_text,
 )
+from warpimpact.analysis.study_text import advantage, study_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
@@ -203,7 +202,7 @@ def test_advantage_compares_speed_at_no_larger_error() -> None:
 
 
 def test_variables_have_units_names_and_the_campaign(small: xarray.Dataset, campaign: Campaign) -> None:
-    assert set(small.variables) == STUDY_VARIABLES.keys() | STUDY_COORDINATES.keys()
+    assert set(small.variables) == {*STUDY_VARIABLES, *STUDY_COORDINATES}
     assert all(array.attrs["units"] and array.attrs["long_name"] for array in small.variables.values())
     assert small.sizes == {"setting": 4, "quantile": 3, "standoff": 2, "level": 2, "hit": 16}
     assert small.attrs["campaign"] == campaign.text

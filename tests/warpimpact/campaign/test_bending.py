@@ -8,10 +8,9 @@ from warpimpact import Campaign
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.replay import replay
 from warpimpact.cli import main
-from warpimpact.plotting.cell import MAPPED
 from warpimpact.plotting.maps import hit_map
 from warpimpact.results import files
-from warpimpact.results.variables import BENDING_VARIABLES
+from warpimpact.results.variables import BENDING_VARIABLES, HIT_NUMBERS
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 STOP = """
@@ -52,7 +51,7 @@ def test_from_a_campaign_to_its_result(tmp_path: Path, capsys: pytest.CaptureFix
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     row = next(line for line in rows if line[:4] == ["bending", "stress,", "GPa", "mean"])
     assert row[4] == f"{1e-9 * stress.mean():.2f}"
-    assert "bending_stress" in MAPPED
+    assert "bending_stress" in HIT_NUMBERS
     (axes, bar) = hit_map(dataset, "bending_stress").axes
     assert "GPa" in bar.get_ylabel() + bar.get_xlabel() + axes.get_title()
 

@@ -102,9 +102,9 @@ def test_history_tells_where_the_core_is(history: xarray.Dataset, result: xarray
     axis = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], axis=1)
     np.testing.assert_allclose(history["core_axis"], axis, atol=1e-14)
     assert dict(history.sizes)["quaternion"] == 4
-    for name, variable in (HISTORY_COORDINATES | HISTORY_VARIABLES).items():
-        assert history[name].dims == variable.dims
-        assert history[name].attrs == {"units": variable.units, "long_name": variable.long_name}
+    for variable in (*HISTORY_COORDINATES, *HISTORY_VARIABLES):
+        assert history[variable].dims == variable.dims
+        assert history[variable].attrs == {"units": variable.units, "long_name": variable.long_name}
 
 
 def test_plate_starts_whole_and_weakens_where_the_core_goes(history: xarray.Dataset) -> None:

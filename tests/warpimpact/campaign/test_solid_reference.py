@@ -13,6 +13,7 @@ from warpimpact.campaign import team
 from warpimpact.campaign.run import run, run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
+from warpimpact.results.dataset import solid_reference
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 SMALL = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 600")
@@ -75,7 +76,8 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_as
 def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_module, "_MOST_SOLID", 100)
     dataset = computed(tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '))
-    solid = dataset.solid_reference(dataset)
+    solid = solid_reference(dataset)
+    assert solid is not None
     assert solid.sizes["hit"] == 100
     np.testing.assert_array_equal(solid["impact_velocity"], dataset["impact_velocity"][:100])
     order = np.argsort(solid["impact_velocity"].values)

@@ -98,10 +98,10 @@ def test_unfolded_equals_computed(
     assert computed == [32 // images]
     assert unfolded.sizes["hit"] == 32
     assert unfolded.attrs["computed_hits"] == 32 // images
-    assert unfolded.attrs["symmetries"].count("(") == images
+    assert unfolded.attrs["images"] == unfolded.attrs["symmetries"].count("(") == images
     every = every_hit_computed(scene, unfolded, tmp_path)
-    for name, variable in (SHOT_VARIABLES | OUTCOME_VARIABLES).items():
-        tolerance = ROUNDING[variable.units]
+    for name in (*SHOT_VARIABLES, *OUTCOME_VARIABLES):
+        tolerance = ROUNDING[name.units]
         np.testing.assert_allclose(unfolded[name], every[name], rtol=0.0, atol=tolerance, err_msg=name)
     for name in ("pitch", "yaw"):
         assert np.abs(every[name]).max() > 1.0  # so that a sign would show
@@ -131,8 +131,8 @@ def test_a_tolerance_run_is_unfolded_with_its_estimates(tmp_path: Path) -> None:
     assert unfolded.attrs["computed_hits"] == 4
     every = every_hit_computed(campaign(numerics=numerics), unfolded, tmp_path)
     assert 1 <= every["level"].min() < every["level"].max() < len(LADDER)
-    for name, variable in ESTIMATE_VARIABLES.items():
-        np.testing.assert_allclose(unfolded[name], every[name], rtol=0.0, atol=ROUNDING[variable.units], err_msg=name)
+    for name in ESTIMATE_VARIABLES:
+        np.testing.assert_allclose(unfolded[name], every[name], rtol=0.0, atol=ROUNDING[name.units], err_msg=name)
     last = 8 * int(unfolded["level"].values[::8].argmax()) + 5
     assert replay(unfolded, last, folder=tmp_path).attrs["agreement"] == "bit-identical"
 

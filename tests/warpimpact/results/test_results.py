@@ -210,8 +210,8 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
 
 
 def test_every_field_of_shots_and_outcomes_has_a_variable():
-    shot_names = {name.removeprefix("impact_") for name in SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | SCATTER_VARIABLES.keys()
+    shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | set(SCATTER_VARIABLES)
     assert {field.name for field in dataclasses.fields(Outcomes)} == set(OUTCOME_VARIABLES)
     bent = {field.name for field in dataclasses.fields(BentOutcomes)}
-    assert bent == set(OUTCOME_VARIABLES | BENDING_VARIABLES)
+    assert bent == {*OUTCOME_VARIABLES, *BENDING_VARIABLES}

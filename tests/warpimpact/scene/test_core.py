@@ -14,7 +14,7 @@ PAPER = {"coefficients": [3.0e-4, 0.24, -5.29], "length": "27.86 mm"}
 def test_the_papers_core_weighs_four_grams() -> None:
     core = PolynomialCore(**PAPER, density=7850)
     mass, centre_of_mass, axial, transverse = core.mass_properties
-    assert mass == pytest.approx(4.0e-3, abs=5e-7)  # MODEL §2, to the digits given there
+    assert mass == pytest.approx(4.0e-3, abs=5e-7)  # docs/model.md §2, to the digits given there
     assert centre_of_mass == pytest.approx(18.05e-3, abs=5e-6)
     assert axial == pytest.approx(1.50e-8, abs=5e-11)
     assert transverse == pytest.approx(1.65e-7, abs=5e-10)

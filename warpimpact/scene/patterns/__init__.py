@@ -1,4 +1,4 @@
-"""Hole patterns: one hole shape on a lattice, or any mask, repeated periodically (MODEL §3)."""
+"""Hole patterns: one hole shape on a lattice, or any mask, repeated periodically (docs/model.md §3)."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""Lattices: one hole shape at any places of a rectangular cell that repeats (MODEL §3)."""
+"""Lattices: one hole shape at any places of a rectangular cell that repeats (docs/model.md §3)."""
 
 import math
 from abc import abstractmethod

@@ -1,4 +1,4 @@
-"""Masks: any holes, as square cells that are hole or material (MODEL §3)."""
+"""Masks: any holes, as square cells that are hole or material (docs/model.md §3)."""
 
 import math
 from functools import cached_property

@@ -1,0 +1,200 @@
+"""The exposure T [s] that each node of a window remembers, and the tent filter that spreads it (docs/model.md §4)."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import memory, plate_grid
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the exposure for one variant."""
+    real = variant.real
+    half = real(0.5)
+    read, write = memory.build(real).read, memory.build(real).write
+    grid = plate_grid.build(variant)
+    Plate, Window, Box = grid.Plate, grid.Window, grid.Box
+
+    @wp.struct
+    class Fields:
+        """Scratch of all slots, each cells_y × cells_z: exposure [s], exposure gained in the step [s], and room for
+        the filter."""
+
+        exposure: wp.array(dtype=real)
+        gain: wp.array(dtype=real)
+        filtered: wp.array(dtype=real)
+        cells_y: wp.int32
+        cells_z: wp.int32
+
+    @wp.func
+    def gather(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
+        """Bilinear interpolation between the four nodes from `index` on."""
+        next = index + stride
+        low, high = read(field, index), read(field, next)
+        low += z * (read(field, index + 1) - low)
+        high += z * (read(field, next + 1) - high)
+        return low + y * (high - low)
+
+    @wp.func
+    def scatter_plain(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real, amount: real):
+        """Share an amount out over the four nodes, by the weights of the interpolation."""
+        high = amount * y
+        low = amount - high
+        next = index + stride
+        write(field, index, read(field, index) + (low - low * z))
+        write(field, index + 1, read(field, index + 1) + low * z)
+        write(field, next, read(field, next) + (high - high * z))
+        write(field, next + 1, read(field, next + 1) + high * z)
+
+    # Native and volatile, because a compiler would store neighbours in pairs, and the next patch, whose pair overlaps
+    # this one, would wait for the memory.
+    @wp.func_native("""
+    assert(index >= 0 && index + stride + 1 < field.shape[0]);
+    volatile float* const at = field.data + index;
+    const float a = at[0], b = at[1], c = at[stride], d = at[stride + 1];
+    const float high = amount * y, low = amount - high;
+    at[0] = a + (low - low * z);
+    at[1] = b + low * z;
+    at[stride] = c + (high - high * z);
+    at[stride + 1] = d + high * z;
+    """)
+    def scatter_single(
+        field: wp.array(dtype=wp.float32),
+        stride: wp.int32,
+        index: wp.int32,
+        y: wp.float32,
+        z: wp.float32,
+        amount: wp.float32,
+    ):
+        """The same in float32."""
+        ...
+
+    scatter = scatter_plain if variant.double else scatter_single
+
+    # Native, because only with pointers that do not alias does a CPU run these loops in vector registers.
+    @wp.func_native("""
+    assert(start - step >= 0 && start + count + step <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    const auto* __restrict__ from = source.data + start;
+    const auto* __restrict__ before = from - step;
+    const auto* __restrict__ after = from + step;
+    for (int j = 0; j < count; ++j) into[j] = middle * from[j] + side * (before[j] + after[j]);
+    """)
+    def filter_near(
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        start: wp.int32,
+        count: wp.int32,
+        step: wp.int32,
+        middle: real,
+        side: real,
+    ):
+        """target[j] = middle × source[j] + side × (source[j − step] + source[j + step]), start ≤ j < start + count."""
+        ...
+
+    @wp.func_native("""
+    assert(start - step >= 0 && start + count + step <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    const auto* __restrict__ before = source.data + start - step;
+    const auto* __restrict__ after = source.data + start + step;
+    for (int j = 0; j < count; ++j) into[j] += side * (before[j] + after[j]);
+    """)
+    def filter_far(
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        start: wp.int32,
+        count: wp.int32,
+        step: wp.int32,
+        side: real,
+    ):
+        """target[j] += side × (source[j − step] + source[j + step]) for start ≤ j < start + count."""
+        ...
+
+    @wp.func_native("""
+    assert(start >= 0 && start + count <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    const auto* __restrict__ from = source.data + start;
+    for (int j = 0; j < count; ++j) into[j] += factor * from[j];
+    """)
+    def add_scaled(
+        target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
+    ):
+        """target[j] += factor × source[j] for start ≤ j < start + count; target and source are different arrays."""
+        ...
+
+    @wp.func_native("""
+    assert(start >= 0 && start + count <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    auto* __restrict__ from = source.data + start;
+    for (int j = 0; j < count; ++j) { into[j] += factor * from[j]; from[j] = 0; }
+    """)
+    def take_scaled(
+        target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
+    ):
+        """The same, and source[j] = 0."""
+        ...
+
+    @wp.func_native("""
+    auto* __restrict__ into = target.data + start;
+    for (int j = 0; j < count; ++j) into[j] = 0;
+    """)
+    def clear(target: wp.array(dtype=real), start: wp.int32, count: wp.int32):
+        """target[start + j] = 0 for j < count."""
+        ...
+
+    @wp.func
+    def blank(fields: Fields, window: Window):
+        """A plate that nothing has touched."""
+        nodes = window.cells_y * window.cells_z
+        clear(fields.exposure, window.first, nodes)
+        clear(fields.gain, window.first, nodes)
+
+    @wp.func
+    def filter_(
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        plate: Plate,
+        start: wp.int32,
+        count: wp.int32,
+        step: wp.int32,
+    ):
+        """target = the tent's taps along one direction, `step` apart, applied to source."""
+        filter_near(target, source, start, count, step, plate.taps[0], plate.taps[1])
+        for k in range(2, plate.reach + 1):
+            filter_far(target, source, start, count, k * step, plate.taps[k])
+
+    @wp.func
+    def spread(plate: Plate, fields: Fields, window: Window, box: Box):
+        """Filter the gained exposure with the tent K of the law, one direction after the other, and add half
+        of it to the exposure: what the mid-step sees.
+
+        Whole rows at once: what wraps round from one row to the next is zero, for the box keeps the filter's
+        reach away from the window's edge.
+        """
+        stride = window.cells_z
+        above = plate.reach * stride
+        start = window.first + box.y_low * stride
+        count = (box.y_high - box.y_low + 1) * stride
+        filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
+        filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
+        add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
+
+    @wp.func
+    def settle(plate: Plate, fields: Fields, window: Window, box: Box):
+        """Add the other half of the gained exposure and clear it for the next step."""
+        start = window.first + (box.y_low - plate.reach) * window.cells_z
+        count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * window.cells_z
+        take_scaled(fields.exposure, fields.gain, start, count, half)
+
+    return SimpleNamespace(
+        Fields=Fields,
+        gather=gather,
+        scatter=scatter,
+        scatter_plain=scatter_plain,
+        blank=blank,
+        spread=spread,
+        settle=settle,
+    )
