@@ -90,7 +90,7 @@ def build(variant: Variant) -> SimpleNamespace:
         disc, whose axial moment of inertia is twice the transverse one).
         """
         worst = before
-        dv, dw = motion.velocity_change(body, load, dt)
+        dv, dw, felt_v, felt_w = motion.velocity_change(body, load, dt)
         share = motion.restraint_of(body, state, dv, dw)
         gyration = (pose.omega[0] * (body.inertia_axial / body.inertia_transverse - one)) * across(pose.omega)
         spun = pose.omega[0] * across(pose.omega)
@@ -102,8 +102,8 @@ def build(variant: Variant) -> SimpleNamespace:
             if index >= found.first_ring and index <= found.last_ring and touches.ring_area[here] > zero:
                 ring = surfaces.ring_at(surface, pose, index)
                 sums = touches.sums[here]
-                force += share * mean_force(ring, sums, dv - foreseen.velocity, dw - foreseen.omega)
-                moment += share * mean_moment(ring, sums, dv - foreseen.velocity, dw - foreseen.omega)
+                force += share * mean_force(ring, sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
+                moment += share * mean_moment(ring, sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
             inertial = body.mass * (
                 sections.first[index] * push
                 + sections.second[index] * (turning + spun)

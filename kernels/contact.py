@@ -82,7 +82,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 immersed *= grid.on_plate(plate, window, patch.y, patch.z)
             area = grip.share * immersed
             write(touches.area, first + j, area)
-            write(touches.slope, first + j, grip.slope * immersed)
+            slope = laws.steady_slope(law, grip.share, grip.slope, face.closing)
+            write(touches.slope, first + j, slope * immersed)
             write(touches.shift, first + j, grip.shift)
             write(touches.gain, first + j, per_node * area * wp.abs(grips.normal_along_x(pose, patch, face)))
             write_index(touches.tile, first + j, grid.tile_at(plate, window, patch.y, patch.z))
@@ -180,8 +181,8 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """The load over one step; the plate's exposure moves on by the step.
 
-        Half of the slope of the traction is the load's damping: the step is the trapezoid rule, second order where
-        the stress depends on the rate, and stable where a wall rests on the steep ramp of the contact.
+        Half of the slope of the traction is the load's damping: with it the step is of second order where the stress
+        depends on the rate, and stable where a wall rests on the steep ramp of the contact.
         """
         base = slot * surface.rings * surface.around
         load = Load()

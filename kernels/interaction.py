@@ -25,7 +25,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
         `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): the law's own, the share
         `onset_share` of the core's velocity; or, where the step needs a wider one, a multiple, `onset_jump` [m/s²], of
-        the time step, and at most the share `onset_limit` of the core's velocity.
+        the time step, and at most the share `onset_limit` of the core's velocity. `steadied` is the closing speed
+        [m/s] below which contact damps by its chord (`steady_slope`).
         """
 
         a0: real
@@ -38,6 +39,7 @@ def build(variant: Variant) -> SimpleNamespace:
         onset_jump: real
         onset_limit: real
         onset: real
+        steadied: real
 
     @wp.struct
     class Contact:
@@ -83,6 +85,14 @@ def build(variant: Variant) -> SimpleNamespace:
         moment = full * (one - full) + ramp * (mean * (away - full) + sixth * ramp * (high - low))
         found.shift = moment * per_variation / (found.share + tiny)
         return found
+
+    @wp.func
+    def steady_slope(law: Law, share: real, slope: real, closing: real):
+        """Derivative of the share of contact by the closing speed [s/m], or where a core swings to and fro between two
+        walls in turn, step by step, the chord down to no contact: full contact has no slope, and where a step is long
+        enough for the core to pass the whole ramp, nothing else would stop it. As what the last step changed is
+        foreseen, a chord in the place of the slope is an error of second order of the step alone."""
+        return wp.where(closing < law.steadied, share / wp.max(closing, tiny), slope)
 
     @wp.func
     def normal_stress(law: Law, closing: real):
@@ -135,6 +145,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Contact=Contact,
         onset_speed=onset_speed,
         contact_of=contact_of,
+        steady_slope=steady_slope,
         normal_stress=normal_stress,
         stress_slope=stress_slope,
         friction_per_speed=friction_per_speed,

@@ -17,6 +17,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """The march kernel and the structs it takes, for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half = real(0.0), real(0.5)
+    steadied = real(8.0)  # onsets: as far as a step carries a core beyond the ramp
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
@@ -138,6 +139,7 @@ def build(variant: Variant) -> SimpleNamespace:
             worst = Bending()
         contact_steps = int(0)
         last = Change()
+        before_last = Change()
         step = int(0)
         while status == RUNNING and step < max_steps:
             omega = motion.angular_velocity(body, motion.axis_of(state.attitude), state.angular_momentum)
@@ -149,6 +151,8 @@ def build(variant: Variant) -> SimpleNamespace:
             status = ended(surface, body, state, pose, found, touched, initial_energy, window.thickness)
             if status == RUNNING:
                 law.onset = laws.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
+                law.steadied = wp.where(motion.swings(body, before_last, last), steadied * law.onset, zero)
+                before_last = last
                 load = Load()
                 before = state
                 if found.last_ring >= 0:

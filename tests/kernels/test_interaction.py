@@ -43,7 +43,10 @@ def law(
     remaining: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
-    contacts[i] = laws.contact_of(law, closing[i], variation[i], speed[i])
+    found = laws.contact_of(law, closing[i], variation[i], speed[i])
+    touching = closing[i] + found.shift * variation[i] * variation[i]
+    found.slope = laws.steady_slope(law, found.share, found.slope, touching)
+    contacts[i] = found
     stresses[i] = laws.normal_stress(law, closing[i])
     slopes[i] = laws.stress_slope(law, closing[i])
     frictions[i] = laws.friction_per_speed(law, sliding[i], speed[i])
@@ -77,13 +80,22 @@ def filled(struct: Any) -> Any:
 
 
 def applied(
-    closing: Any, device: str, *, variation: Any = 0.0, sliding: Any = 0.0, speed: Any = 1.0, exposure: Any = 0.0
+    closing: Any,
+    device: str,
+    *,
+    variation: Any = 0.0,
+    sliding: Any = 0.0,
+    speed: Any = 1.0,
+    exposure: Any = 0.0,
+    steadied: float = 0.0,
 ) -> SimpleNamespace:
     given = [np.array(a) for a in np.broadcast_arrays(closing, variation, sliding, speed, exposure)]
     names = ("stress", "slope", "friction", "remaining")
     outputs = {name: poisoned(len(given[0]), real, device) for name in names}
     contacts = poisoned(len(given[0]), Contact, device)
-    inputs = [filled(Law), *(wp.array(a, dtype=real, device=device) for a in given)]
+    law = filled(Law)
+    law.steadied = steadied
+    inputs = [law, *(wp.array(a, dtype=real, device=device) for a in given)]
     wp.launch(LAW, len(given[0]), inputs=inputs, outputs=[contacts, *outputs.values()], device=device)
     found = contacts.numpy()
     return SimpleNamespace(
@@ -131,9 +143,7 @@ def test_share_of_a_patch_is_the_mean_of_its_parts(variation: float, device: str
 
 
 @VARIATIONS
-def test_what_touches_lies_where_the_mean_of_the_patch_weighed_by_its_shares_lies(
-    variation: float, device: str
-) -> None:
+def test_what_touches_lies_where_the_patch_weighed_by_its_shares_lies(variation: float, device: str) -> None:
     closing = (variation + ONSET) * np.linspace(-1, 2, 301)
     places, speeds, shares = spread(closing, variation)
     found = applied(closing, device, variation=variation)
@@ -152,6 +162,14 @@ def test_slope_is_the_derivative_of_the_share(variation: float, device: str) -> 
     # A patch that turns by little has kinks.
     kinks = np.abs(difference - here.rise) > 2e-3 / ONSET
     assert kinks.mean() < 0.02
+
+
+def test_steadied_contact_damps_by_its_chord(device: str) -> None:
+    # Up to the speed that is asked for; the slope beyond it, and of a flat patch on the ramp both are the same.
+    closing = np.array([0.5, 1.0, 2.0, 7.9, 8.1]) * ONSET
+    here, steadied = (applied(closing, device, steadied=s) for s in (0.0, 8 * ONSET))
+    np.testing.assert_allclose(here.rise * ONSET, [1, 1, 0, 0, 0], rtol=1e-4)
+    np.testing.assert_allclose(steadied.rise * ONSET, [1, 1, 1 / 2, 1 / 7.9, 0], rtol=1e-4)
 
 
 def test_small_variation_leaves_the_ramp_as_it_is(device: str) -> None:

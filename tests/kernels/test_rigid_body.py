@@ -251,15 +251,18 @@ def test_small_kick_is_the_impulse(device: str) -> None:
     np.testing.assert_allclose(means["moment"], moment, rtol=1e-13)
 
 
-def test_damped_kick_solves_the_linearly_implicit_step(device: str) -> None:
-    # (M + dt D) Δu = dt F with F of a linear drag, F = −D u: implicit Euler, which dissipates at any step.
+def test_damped_kick_is_rosenbrock_s_step(device: str) -> None:
+    # (M + γ dt J) Δu₁ = dt F, (M + γ dt J) Δu = γ dt F + (1 − γ) M Δu₁, γ = 1 − √½, with the load's derivative J = 2 D.
     start, matrices = random_motion(), drag()
     u = np.concatenate([start.velocity, start.omega], axis=1)
     load = -np.einsum("nij,nj->ni", matrices, u)
     after, means = kicked(start, STIFF, device, force=load[:, :3], moment=load[:, 3:], **damping(matrices))
 
     inertia = mass_matrices(start)
-    change = np.linalg.solve(inertia + STIFF * matrices, STIFF * load[..., None])[..., 0]
+    gamma = 1 - np.sqrt(0.5)
+    implicit, push = inertia + gamma * STIFF * 2 * matrices, STIFF * load[..., None]
+    first = np.linalg.solve(implicit, push)
+    change = np.linalg.solve(implicit, gamma * push + (1 - gamma) * inertia @ first)[..., 0]
     scale = np.abs(change[:, :3]).max(), np.abs(change[:, 3:]).max()
     dv = after["velocity"] - start.velocity
     dl = (after["angular_momentum"] - start.angular_momentum)[..., None]
@@ -272,6 +275,21 @@ def test_damped_kick_solves_the_linearly_implicit_step(device: str) -> None:
     applied = STIFF * np.concatenate([means["force"], means["moment"]], axis=1)
     np.testing.assert_allclose(applied[:, :3], impulse[:, :3], rtol=0, atol=1e-9 * np.abs(impulse[:, :3]).max())
     np.testing.assert_allclose(applied[:, 3:], impulse[:, 3:], rtol=0, atol=1e-9 * np.abs(impulse[:, 3:]).max())
+
+
+def test_damped_kick_is_of_second_order(device: str) -> None:
+    # A load F = −J u of damping D = J/2 takes u to exp(−dt M⁻¹J) u.
+    start, matrices = random_motion(), drag()
+    u = np.concatenate([start.velocity, start.omega], axis=1)
+    inertia = mass_matrices(start)
+    rates, modes = np.linalg.eig(np.linalg.solve(inertia, 2 * matrices))
+    errors = []
+    for dt in (0.4 / np.abs(rates).max(), 0.2 / np.abs(rates).max()):
+        load = -2 * np.einsum("nij,nj->ni", matrices, u)
+        after, _ = kicked(start, dt, device, force=load[:, :3], moment=load[:, 3:], **damping(matrices))
+        decayed = modes @ (np.exp(-dt * rates)[..., None] * np.linalg.solve(modes, u[..., None]))
+        errors.append(np.abs(after["velocity"] - decayed[:, :3, 0].real).max())
+    assert errors[1] < errors[0] / 6  # eight, of the local error of a method of second order
 
 
 @pytest.mark.parametrize("dt", [1e-7, 1e-5, 1e-3])

@@ -85,9 +85,8 @@ def test_arrest_in_a_plate_thicker_than_the_depth_of_rest(case: Case, shear_coef
 
     depth, speed = tip_depth(case.core, history), 0.5 * (history.velocity[1:, 0] + history.velocity[:-1, 0])
     creep = 0.5 * AT_REST * VELOCITY * early
-    # Measured: 0.03 mm of the 36 to 45 mm, second order in the rings of 0.8 mm; with friction on the ogive 0.061 mm, as
-    # a slow core needs a ramp wider than κ for its step, which takes friction from the shoulder.
-    assert depth[-1] == pytest.approx(expected.depth_of_rest - creep, abs=0.08e-3)
+    # Measured: 0.03 mm of the 36 to 45 mm, second order in the rings of 0.8 mm.
+    assert depth[-1] == pytest.approx(expected.depth_of_rest - creep, abs=0.06e-3)
     # On the way the energy counts, as v itself falls steeply at the end. Measured: 4e-4 of the impact's.
     inside = (depth > 1.1 * case.nose.length) & (depth < expected.depth_of_rest)
     square = np.square([speed[inside], expected.velocity_at(depth[inside])]) / VELOCITY**2

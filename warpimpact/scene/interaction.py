@@ -14,8 +14,9 @@ class Interaction(Model):
 
     Attributes:
         onset: κ, the closing speed over which contact sets in, as a share of the speed of the centre of mass. Normal
-            stress, friction and exposure are multiplied by min(1, v_n / (κ |v|)). With 0 contact jumps. The outcome then
-            has no limit where a wall with friction slides along itself, as a shank does: it depends on the numerics.
+            stress, friction and exposure are multiplied by min(1, v_n / (κ |v|)). With 0 contact jumps. Where a wall
+            with friction slides along itself, as a shank does, the outcome then has no limit: it depends on the
+            numerics.
     """
 
     static: NonNegativeNumber = 1.0

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ONSET = 0.05
+ONSET = 0.02
 """Onset speed of contact in units of what full contact of a wall as deep as the plate does in one step."""
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
