@@ -71,7 +71,7 @@ def build(variant: Variant) -> SimpleNamespace:
         dt: real,
     ):
         """Fill in the patches of a ring, from index `first` on; the area [m²] with which they press on material."""
-        per_node = dt * window.per_cell * window.per_cell
+        per_node = laws.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
         j = int(0)
         while j < surface.around:
             patch = patch_at(pose, ring, read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j))

@@ -20,8 +20,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Law:
-        """Normal stress a0 + a1 v_n + a2 v_n² [Pa], friction η and ln(β)/Δt_β [1/s]; β itself, which the literal scheme
-        takes once a step.
+        """Normal stress a0 + a1 v_n + a2 v_n² [Pa], friction η and ln(β)/Δt_β [1/s]; or, where exposure counts the path
+        of the centre of mass (`by_path`), ln(β)/Δs_β [1/m]. The literal scheme takes β itself once a step.
 
         `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): the law's own, the share
         `onset_share` of the core's velocity; or, where the step needs a wider one, a multiple, `onset_jump` [m/s²], of
@@ -35,6 +35,7 @@ def build(variant: Variant) -> SimpleNamespace:
         friction: real
         decay_rate: real
         degradation: real
+        by_path: wp.bool
         onset_share: real
         onset_jump: real
         onset_limit: real
@@ -136,8 +137,13 @@ def build(variant: Variant) -> SimpleNamespace:
     exponential = wp.exp if variant.double else exp_single
 
     @wp.func
+    def exposure_in(law: Law, dt: real, velocity: real):
+        """What a step adds to the exposure under one advancing sheet: its time [s], or its path [m] at a velocity."""
+        return wp.where(law.by_path, velocity * dt, dt)
+
+    @wp.func
     def remaining(law: Law, exposure: real):
-        """Share of the resistance left after an exposure T [s]: β^(T/Δt_β)."""
+        """Share of the resistance left after an exposure T [s]: β^(T/Δt_β); or S [m]: β^(S/Δs_β)."""
         return exponential(law.decay_rate * exposure)
 
     return SimpleNamespace(
@@ -149,5 +155,6 @@ def build(variant: Variant) -> SimpleNamespace:
         normal_stress=normal_stress,
         stress_slope=stress_slope,
         friction_per_speed=friction_per_speed,
+        exposure_in=exposure_in,
         remaining=remaining,
     )

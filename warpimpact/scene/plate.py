@@ -1,6 +1,6 @@
 """Plate: a thickness of resisting material with holes (docs/model.md §3, §4)."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
@@ -16,6 +16,9 @@ from .units import (
     PositiveTime,
 )
 
+INTERVAL = 1.0e-6
+"""Δt_β where neither it nor Δs_β is given [s]: that of the paper's rows (MODEL §4)."""
+
 
 class Plate(Model):
     """An unbounded, or with `size` a rectangular, perforated plate.
@@ -24,8 +27,11 @@ class Plate(Model):
         thickness: h [m].
         resistance: Y, the stress that the material puts against the core [Pa].
         shear_coefficient: η, friction per normal stress.
-        degradation: β, what is left of Y after `degradation_interval` of contact; 1 means all of it.
-        degradation_interval: Δt_β [s].
+        degradation: β, what is left of Y after contact for `degradation_interval`, or over `degradation_distance`; 1
+            means all of it.
+        degradation_interval: Δt_β [s]; None where exposure counts the path.
+        degradation_distance: Δs_β, path of the centre of mass [m]; None where exposure counts the time. By path, the
+            law has no rate: what comes out depends on Y/v² alone.
         degradation_length: ℓ, how far around a contact the material weakens [m].
         density: [kg/m³].
         size: extent along y and z of a finite plate centred on the origin [m]; None is unbounded.
@@ -38,7 +44,8 @@ class Plate(Model):
     resistance: NonNegativeStress
     shear_coefficient: NonNegativeNumber = 0.0
     degradation: Annotated[Number, Field(ge=0, le=1)] = 1.0
-    degradation_interval: PositiveTime = 1e-6
+    degradation_interval: PositiveTime | None = None
+    degradation_distance: PositiveLength | None = None
     degradation_length: PositiveLength = 0.5e-3
     density: PositiveDensity = 7850.0
     size: tuple[PositiveLength, PositiveLength] | None = None
@@ -50,6 +57,27 @@ class Plate(Model):
     def _within_the_margin(cls, pattern: Pattern, info: ValidationInfo) -> Pattern:
         size, margin = (info.data.get(name) for name in ("size", "margin"))
         return pattern.bounded(size, margin) if size is not None and margin is not None else pattern.unbounded
+
+    @model_validator(mode="before")
+    @classmethod
+    def _counts_time_or_path(cls, values: Any) -> Any:
+        if not isinstance(values, dict):
+            return values
+        interval, distance = (values.get(f"degradation_{name}") for name in ("interval", "distance"))
+        if interval is not None and distance is not None:
+            raise ValueError(
+                f"got degradation_interval = {interval} beside degradation_distance = {distance}, but exposure counts "
+                "either time or path: give one of them"
+            )
+        by_time = distance is None and interval is None
+        return values | {"degradation_interval": INTERVAL} if by_time else values
+
+    @property
+    def degradation_unit(self) -> float:
+        """Exposure over which β applies once: Δt_β [s], or Δs_β [m]."""
+        given = self.degradation_interval if self.degradation_distance is None else self.degradation_distance
+        assert given is not None  # one of the two is given
+        return given
 
     @model_validator(mode="after")
     def _margin_has_a_rim(self) -> Self:

@@ -60,6 +60,7 @@ class Arrays:
         grid: the plate.
         rate_stress: a2 of the law [Pa s²/m²].
         onset: κ of the law.
+        by_path: whether exposure counts the path of the core, not the time.
         shots: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         rows: of the trace of each shot; 0 for none.
     """
@@ -73,6 +74,7 @@ class Arrays:
     grid: Grid
     rate_stress: float
     onset: float
+    by_path: bool
     shots: dict[str, Array]
     rows: int
 
@@ -117,6 +119,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         grid=_grid(plate, resolution),
         rate_stress=scene.interaction.quadratic * plate.density,
         onset=scene.interaction.onset,
+        by_path=plate.degradation_distance is not None,
         shots=conditions,
         rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
     )
@@ -158,11 +161,11 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots) -> dict[str,
         "a0": a0,
         "a1": a1,
         "friction": shots.own("shear_coefficient", plate.shear_coefficient),
-        "decay_rate": decay_rate(degradation, plate.degradation_interval),
+        "decay_rate": decay_rate(degradation, plate.degradation_unit),
         "degradation": degradation,
         "onset_jump": onset_jump(core, thickness, mass, a0),
         "way": resolution.travel * passage,
-        "longest_time": resolution.longest_time(degradation, plate.degradation_interval),
+        "longest_time": resolution.longest_time(degradation, plate, shots.velocity),
         "longest_step": passage,
         "longest_way": STEP_ALLOWANCE * (thickness + 2.0 * core.bounding_radius),
     }

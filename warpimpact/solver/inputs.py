@@ -48,6 +48,7 @@ class Inputs:
         self.sections = self._sections(arrays)
         self.shots = self._shots(arrays)
         self.law = self.stage.Law()
+        self.law.by_path = arrays.by_path
         self.law.a2, self.law.onset_share, self.law.onset_limit = arrays.rate_stress, arrays.onset, LARGEST_ONSET
         self.pace = self.stage.Pace()
         self.pace.time_step, self.pace.way_along = arrays.resolution.time_step or 0.0, arrays.resolution.way_along

@@ -84,9 +84,11 @@ class Resolution:
         """Way [m] on which the plate acts on a core, for some thicknesses [m], of their shape."""
         return np.minimum(thickness, self.slender)
 
-    def longest_time(self, degradation: Array, interval: float) -> Array:
-        """Time [s] in which contact weakens a plate by as much as a step may, for some β, of their shape."""
-        return np.asarray(self.weakening / np.maximum(-decay_rate(degradation, interval), SLOWEST_DECAY))
+    def longest_time(self, degradation: Array, plate: Plate, velocity: ArrayLike) -> Array:
+        """Time [s] in which contact weakens a plate by as much as a step may, for some β and impact velocities [m/s],
+        of their shape."""
+        longest = self.weakening / np.maximum(-decay_rate(degradation, plate.degradation_unit), SLOWEST_DECAY)
+        return np.asarray(longest if plate.degradation_distance is None else longest / np.asarray(velocity))
 
     def step_at(
         self, velocity: ArrayLike, obliquity: ArrayLike, thickness: ArrayLike, longest_time: ArrayLike
@@ -103,7 +105,7 @@ class Resolution:
 
     def step_of(self, impact: Impact, plate: Plate) -> float:
         """Time step [s] of a scene, or where it scatters, of its means."""
-        longest_time = self.longest_time(np.array(plate.degradation), plate.degradation_interval)
+        longest_time = self.longest_time(np.array(plate.degradation), plate, impact.velocity)
         return float(self.step_at(impact.velocity, impact.obliquity, plate.thickness, longest_time))
 
 
@@ -130,6 +132,11 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
     }
     if numerics.scheme == "nodal":
         defaults = NODAL
+        if plate.degradation_distance is not None:
+            raise ValueError(
+                "the nodal scheme weakens the plate once per time step: it knows no degradation_distance, which the "
+                "consistent scheme takes"
+            )
     given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
     return Resolution(
         nodal=numerics.scheme == "nodal",
@@ -162,7 +169,7 @@ SLOWEST_DECAY = 1.0e-30
 """Below which nothing weakens [1/s]."""
 
 
-def decay_rate(degradation: Array, interval: float) -> Array:
-    """ln(β)/Δt_β [1/s] for some β, of their shape."""
+def decay_rate(degradation: Array, unit: float) -> Array:
+    """ln(β)/Δt_β [1/s], or ln(β)/Δs_β [1/m], for some β, of their shape."""
     log = np.log(degradation, where=degradation > 0.0, out=np.full_like(degradation, -np.inf))
-    return np.maximum(log / interval, -FASTEST_DECAY)
+    return np.maximum(log / unit, -FASTEST_DECAY)

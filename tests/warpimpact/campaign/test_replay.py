@@ -125,7 +125,7 @@ def test_plate_has_been_exposed_by_the_area_that_advanced_for_as_long_as_it_did(
     solid = HOLES.model_copy(update={"pattern": NoPattern()})
     history = replay(run(campaign(plate=solid, hits=Hits(count=1)), device="cpu"), 0, folder=NOWHERE)
     assert (history["resistance_share"][0] == 1.0).all()
-    exposure = np.log(history["resistance_share"][-1]) / np.log(solid.degradation) * solid.degradation_interval
+    exposure = np.log(history["resistance_share"][-1]) / np.log(solid.degradation) * solid.degradation_unit
     cell = float(np.diff(history["cell_y"])[0] * np.diff(history["cell_z"])[0])
     swept = np.pi * CORE.max_radius**2 * solid.thickness / (float(exposure.sum()) * cell)
     assert float(history["residual_velocity"]) < swept < 825.0
