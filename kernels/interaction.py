@@ -63,9 +63,9 @@ def build(variant: Variant) -> SimpleNamespace:
     def contact_of(law: Law, closing: real, variation: real, speed: real):
         """Contact of a patch whose closing speeds are spread evenly over closing ± variation [m/s].
 
-        Each part of it is in contact by min(1, v_p·n / onset) where v_p·n > 0 (MODEL.md §4); this is the exact mean
-        over the patch, and the mean place of what touches, each part weighed by its share. The part that moves away,
-        the part on the ramp and the part in full contact are three pieces of the patch, on which the share is 0,
+        Each part of it is in contact by min(1, v_p·n / onset) where v_p·n > 0 (docs/model.md §4). This is the exact
+        mean over the patch, and the mean place of what touches, each part weighed by its share. The part that moves
+        away, the part on the ramp and the part in full contact are three pieces of the patch, on which the share is 0,
         linear and 1.
 
         Args:

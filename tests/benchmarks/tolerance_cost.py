@@ -15,7 +15,8 @@ import numpy as np
 from warpimpact import Campaign, Hits, Numerics, make_shots
 from warpimpact.analysis.study import QUOTED, study
 from warpimpact.scene import Tolerance
-from warpimpact.solver.refinement import LADDER, simulate_to_tolerance
+from warpimpact.solver.refinement import simulate_to_tolerance
+from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import simulate
 
 ROUNDS = 3

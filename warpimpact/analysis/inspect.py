@@ -14,6 +14,7 @@ from warpimpact.analysis.summary import (
     UNITS,
     estimated,
     means_of,
+    promise_text,
     sampling_note,
     slices,
     stop_lines,
@@ -50,6 +51,8 @@ def _origin(dataset: xarray.Dataset) -> Iterator[str]:
     if attr.AREAL_DENSITY in told:
         numbers = plate_numbers(told[attr.OPEN_AREA], told.get(attr.LIGAMENT, math.inf), told[attr.AREAL_DENSITY])
         yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}"
+    if (promise := promise_text(dataset)) is not None:
+        yield f"{'accuracy':<12}{promise}"
     for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY):
         if name in told:
             yield f"{name:<12}{told[name]}"

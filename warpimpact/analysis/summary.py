@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -12,6 +14,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
+from warpimpact.solver.promise import PROMISES
 from warpimpact.statistics.intervals import Estimate
 
 SLICE = 2**18
@@ -43,6 +46,25 @@ class Summary:
     residual_velocity: Spread
     deflection: Spread
     tilt: dict[float, Spread]
+
+
+def promise_text(dataset: xarray.Dataset) -> str | None:
+    """What the errors of the numerics are, and whether the fidelity keeps its promise; None of an older result."""
+    told = dataset.attrs
+    if attr.NUMERICS_GIVEN not in told:
+        return None
+    given = json.loads(told[attr.NUMERICS_GIVEN])
+    if attr.PROMISE_KEPT not in told:
+        fixed = ("tolerance", "time_step", "patches_axial", "patches_around", "grid_spacing")
+        name = next((name for name in fixed if given.get(name) is not None), "scheme")
+        return f"promises nothing, as numerics.{name} is given"
+    tolerance, _ = PROMISES[given["fidelity"]]
+    stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
+    velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
+    found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg"
+    if told[attr.PROMISE_KEPT]:
+        return f"{given['fidelity']} keeps its promise ({stated}); {found}"
+    return f"{given['fidelity']} does not keep its promise ({stated}) at the finest level it may use; {found}"
 
 
 def summary(dataset: xarray.Dataset) -> Summary:

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -20,8 +20,9 @@ from warpimpact.scene import Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.refinement import LADDER, Estimates, simulate_to_tolerance
-from warpimpact.solver.resolution import resolve
+from warpimpact.solver.promise import PILOT, Promise, keep
+from warpimpact.solver.refinement import LEVELS, Estimates, simulate_to_tolerance
+from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
 from warpimpact.solver.unfold import unfolded, unfolded_estimates
 
@@ -30,6 +31,7 @@ def compute(
     campaign: Campaign,
     shots: Shots,
     *,
+    promise: Promise | None = None,
     solid: Shots | None = None,
     device: str = "auto",
     threads: int | None = None,
@@ -39,6 +41,7 @@ def compute(
 
     Args:
         shots: whole groups of images, as the campaign's sampler gives them.
+        promise: what a pilot found (`promise_of`); None is to compute with the numerics as they are given.
         solid: shots at the solid plate of equal areal density, too; None are none.
         device, threads, progress: as in `simulate`.
 
@@ -51,9 +54,10 @@ def compute(
     scene, group = campaign.scene, campaign.symmetries
     computed = shots[:: len(group)]
     follow = progress and (lambda done, total: progress(done * len(group), total * len(group)))
-    _build(campaign, computed, device)
+    numerics = campaign.numerics if promise is None else promise.fidelity
+    _build(scene, computed, numerics, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(scene, computed, campaign.numerics, device, threads, follow)
+    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow)
     elapsed = time.perf_counter() - begin
     period, chosen = campaign.hits.covered(campaign.plate), find_device(device)
     ligament = campaign.plate.ligament
@@ -76,7 +80,7 @@ def compute(
             attr.AREAL_DENSITY: campaign.plate.areal_density,
             attr.CORE: campaign.core.model_dump_json(),
             attr.IMPACT: _impact(campaign),
-            attr.NUMERICS: _numerics(campaign, shots),
+            attr.NUMERICS: _numerics(campaign, numerics, shots),
             attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             attr.FAILED_SHARE: campaign.output.failed_share,
             attr.COMPUTE_TIME: elapsed,
@@ -84,7 +88,8 @@ def compute(
         }
         | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
-        | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {}),
+        | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {})
+        | ({} if promise is None else _promised(promise)),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
     )
     if solid is None:
@@ -93,29 +98,73 @@ def compute(
     if solid.thickness is not None:
         solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
     reference = scene.model_copy(update={"target": thinner})
-    return dataset.merge(solid_dataset(_outcomes(reference, solid, campaign.numerics, device, threads)[0]))
+    return dataset.merge(solid_dataset(_outcomes(reference, solid, numerics, device, threads)[0]))
 
 
-def _build(campaign: Campaign, shots: Shots, device: str) -> None:
+def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
+    """What a pilot of the campaign's own hits finds; None where the campaign fixes the resolution itself.
+
+    The pilot takes the first hits of a sampling whose points are spread evenly in any order, and of a grid or a list
+    some from end to end: it follows from the campaign alone.
+
+    Raises:
+        DeviceError: the device is absent.
+    """
+    if campaign.numerics.explicit is not None:
+        return None
+    sampler, group = campaign.sampler(), len(campaign.symmetries)
+    hits = len(sampler) // group
+    count = min(PILOT, hits)
+    if campaign.hits.sampling in ("sobol", "random"):
+        pilot = sampler.shots(0, count * group)[::group]
+    else:
+        places = np.linspace(0, hits, count, endpoint=False).astype(int)
+        pilot = Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
+    return keep(campaign.scene, campaign.numerics, pilot, device=device)
+
+
+def _promised(promise: Promise) -> dict[str, Any]:
+    """What is told of a promise."""
+    return {
+        attr.RESOLUTION: json.dumps(asdict(promise.fidelity)),
+        attr.PROMISE_KEPT: int(promise.kept),
+        attr.RESIDUAL_VELOCITY_ERROR_P90: promise.residual_velocity_error,
+        attr.TILT_ERROR_P90: math.degrees(promise.tilt_error),
+    }
+
+
+def promise_in(dataset: xarray.Dataset) -> Promise | None:
+    """The promise that a result was computed with; None if its campaign fixed the resolution."""
+    told = dataset.attrs
+    if attr.RESOLUTION not in told:
+        return None
+    return Promise(
+        fidelity=Fidelity(**json.loads(told[attr.RESOLUTION])),
+        kept=bool(told[attr.PROMISE_KEPT]),
+        residual_velocity_error=float(told[attr.RESIDUAL_VELOCITY_ERROR_P90]),
+        tilt_error=math.radians(float(told[attr.TILT_ERROR_P90])),
+    )
+
+
+def _build(scene: Scene, shots: Shots, numerics: Numerics | Fidelity, device: str) -> None:
     """Have the kernels ready, so that the time of computing is that alone."""
-    numerics = campaign.numerics
-    if numerics.tolerance is not None:
+    if isinstance(numerics, Numerics) and numerics.tolerance is not None:
         numerics = Numerics(precision=numerics.precision)
-    build(campaign.scene, shots, numerics=numerics, device=device)
+    build(scene, shots, numerics=numerics, device=device)
 
 
 def _outcomes(
     scene: Scene,
     shots: Shots,
-    numerics: Numerics,
+    numerics: Numerics | Fidelity,
     device: str,
     threads: int | None,
     progress: Progress | None = None,
 ) -> tuple[Outcomes, Estimates | None]:
     """Outcomes, with estimates of their errors where the numerics have a tolerance."""
-    if numerics.tolerance is None:
-        return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
-    return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
+    if isinstance(numerics, Numerics) and numerics.tolerance is not None:
+        return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
+    return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
 
 
 def _impact(campaign: Campaign) -> str:
@@ -140,15 +189,16 @@ def made_by(device: str) -> dict[str, str]:
     }
 
 
-def _numerics(campaign: Campaign, shots: Shots) -> str:
+def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -> str:
     """The numerics in force, every choice made, as one line."""
     tolerance = campaign.numerics.tolerance
     if tolerance is not None:
+        finest = LADDER[LEVELS[-1]]
         return (
             f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg, "
-            f"at most {LADDER[-1].patches_axial} by {LADDER[-1].patches_around} patches"
+            f"at most {finest.patches_axial} by {finest.patches_around} patches"
         )
-    resolution = resolve(campaign.numerics, campaign.scene, shots.columns)
+    resolution = resolve(numerics, campaign.scene, shots.columns)
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "

@@ -9,14 +9,14 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.compute import promise_in
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, to_dataset
 from warpimpact.results.files import ResultError
 from warpimpact.scene import Numerics
 from warpimpact.solver import simulate
-from warpimpact.solver.refinement import level
-from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.resolution import Fidelity, level
 from warpimpact.solver.unfold import image_of
 
 ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
@@ -76,9 +76,10 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
 
 def _numerics(campaign: Campaign, result: xarray.Dataset, hit: int) -> Numerics | Fidelity:
     """What the hit was computed with: of a run to a tolerance, the level that it ended on."""
-    if campaign.numerics.tolerance is None:
-        return campaign.numerics
-    return level(int(result[v.LEVEL][hit]), campaign.numerics)
+    if campaign.numerics.tolerance is not None:
+        return level(int(result[v.LEVEL][hit]), campaign.numerics)
+    promise = promise_in(result)
+    return campaign.numerics if promise is None else promise.fidelity
 
 
 def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:

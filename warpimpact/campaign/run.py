@@ -14,6 +14,7 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.compute import promise_in
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import attributes as attr
@@ -182,6 +183,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     for index in sorted(store.saved):
         watch.add(index, store.load(index))
     watch.resumed = watch.done
+    promise = promise_in(store.load(min(store.saved))) if store.saved else team.pilot()
     tasks = _tasks(store, len(sampler), team.task)
     waiting: dict[Future[xarray.Dataset], range] = {}
     try:
@@ -190,7 +192,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
             while len(waiting) < width and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
                 solid = _solid_shots(campaign, shots[: store.extent]) if task.start == 0 else None
-                waiting[team.submit(shots, solid)] = task
+                waiting[team.submit(promise, shots, solid)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
             for future in finished:
                 task = waiting.pop(future)

@@ -15,10 +15,11 @@ from typing import Any
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import compute, made_by
+from warpimpact.campaign.compute import compute, made_by, promise_of
 from warpimpact.results import attributes as attr
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
+from warpimpact.solver.promise import Promise
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
@@ -33,15 +34,17 @@ class Team:
     """Computes shots in the background.
 
     Attributes:
-        submit: hands over shots, and those of them that the solid reference takes, too; their Dataset comes in the
-            future.
+        pilot: finds the promise of the campaign, None if it fixes the resolution itself.
+        submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Dataset
+            comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
         made_by: versions and kind of device, which decide the bits.
         underway: how many shots of unfinished tasks are done.
     """
 
-    submit: Callable[[Shots, Shots | None], Future[xarray.Dataset]]
+    pilot: Callable[[], Promise | None]
+    submit: Callable[[Promise | None, Shots, Shots | None], Future[xarray.Dataset]]
     width: Callable[[], int]
     task: int
     made_by: dict[str, str]
@@ -63,7 +66,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     for chosen in devices:
         idle.put(str(chosen))
 
-    def work(shots: Shots, solid: Shots | None) -> xarray.Dataset:
+    def work(promise: Promise | None, shots: Shots, solid: Shots | None) -> xarray.Dataset:
         name, thread = idle.get(), threading.get_ident()
 
         def progress(finished: int, total: int) -> None:
@@ -72,7 +75,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
             done[thread] = finished
 
         try:
-            return compute(campaign, shots, solid=solid, device=name, progress=progress)
+            return compute(campaign, shots, promise=promise, solid=solid, device=name, progress=progress)
         finally:
             done[thread] = 0
             idle.put(name)
@@ -80,7 +83,8 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
     try:
         yield Team(
-            submit=lambda shots, solid: pool.submit(work, shots, solid),
+            pilot=lambda: promise_of(campaign, str(devices[0])),
+            submit=lambda *shots: pool.submit(work, *shots),
             width=lambda: 2 * len(devices),
             task=_task_size(kind),
             made_by=kind,
@@ -134,6 +138,7 @@ def cluster_team(
         executor = client.get_executor(pure=False)
         try:
             yield Team(
+                pilot=lambda: client.submit(promise_of, campaign, device, pure=False).result(),
                 submit=lambda *shots: executor.submit(_compute_alike, campaign, *shots, device, threads, kind),
                 width=lambda: 2 * max(1, sum(client.nthreads().values())),
                 task=_task_size(kind),
@@ -156,6 +161,7 @@ def _ignoring_interrupts(plugin: Any) -> Any:
 
 def _compute_alike(
     campaign: Campaign,
+    promise: Promise | None,
     shots: Shots,
     solid: Shots | None,
     device: str,
@@ -169,7 +175,7 @@ def _compute_alike(
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    return compute(campaign, shots, solid=solid, device=device, threads=threads)
+    return compute(campaign, shots, promise=promise, solid=solid, device=device, threads=threads)
 
 
 def _devices(names: str) -> list[Any]:

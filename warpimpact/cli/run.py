@@ -40,7 +40,7 @@ def add_run(commands: Commands) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    from warpimpact.analysis.summary import summary_text, symmetry_text
+    from warpimpact.analysis.summary import promise_text, summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.campaign.run import run_to_file
     from warpimpact.campaign.team import cluster_team
@@ -66,6 +66,8 @@ def _run(arguments: argparse.Namespace) -> int:
         print(summary_text(dataset))
         if attr.SYMMETRIES in dataset.attrs:
             print(symmetry_text(dataset))
+        if (promise := promise_text(dataset)) is not None:
+            print(promise)
         print(f"{dataset.attrs[attr.HITS_PER_SECOND]:.4g} hits per second on {dataset.attrs[attr.DEVICE]}")
         print(f"written to {output}")
         return failure_code(dataset, output)

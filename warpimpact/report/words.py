@@ -14,7 +14,7 @@ import xarray
 
 from warpimpact.analysis.comparison import compare, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.analysis.summary import UNITS, estimated, means_of
+from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
@@ -56,6 +56,7 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "hits": dataset.sizes["hit"],
         "asked": _asked(dataset),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
+        "promise": promise_text(dataset),
         "tables": _tables(dataset),
         "statuses": list(_statuses(dataset)),
         "numbers": list(_numbers(dataset)),

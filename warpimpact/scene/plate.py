@@ -17,7 +17,7 @@ from .units import (
 )
 
 INTERVAL = 1.0e-6
-"""Δt_β where neither it nor Δs_β is given [s]: that of the paper's rows (MODEL §4)."""
+"""Δt_β where neither it nor Δs_β is given [s]: that of the paper's rows (docs/model.md §4)."""
 
 
 class Plate(Model):

@@ -29,7 +29,7 @@ Progress1 = Callable[[int], None]
 Scratch = TypeVar("Scratch")
 
 CPU_CHUNK = 32
-"""Shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
+"""Most shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
 CUDA_CHUNK = 65536
 WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
 """Half the width of a first window in radii of the core, for a straight shot; less on the literal scheme's fine grid,
@@ -283,7 +283,7 @@ class March:
 
         done = 0
         with ThreadPoolExecutor(len(slots)) as pool:
-            for count in pool.map(work, _chunks(total, CPU_CHUNK)):
+            for count in pool.map(work, _chunks(total, max(1, min(CPU_CHUNK, total // (4 * len(slots)))))):
                 done += count
                 progress(done)
 

@@ -1,33 +1,25 @@
-"""Outcomes to a tolerance: every shot on two levels of resolution, and those that change too much on finer ones."""
+"""Outcomes to a tolerance: every shot on coarse levels of resolution, and on finer ones until it has converged."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Numerics, Scene, Shots, Tolerance
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.resolution import level
 from warpimpact.solver.simulate import Outcomes, simulate
 
 Array = NDArray[np.float64]
 
-LADDER = (
-    Fidelity(24, 24, 1.5, 0.35),
-    Fidelity(36, 36, 2.2, 0.22),
-    Fidelity(54, 52, 3.5, 0.13),
-    Fidelity(80, 76, 5.5, 0.08),
-    Fidelity(120, 112, 9.0, 0.05),
-)
-"""Levels of resolution, coarse to fine, each about three times as expensive as the one before it. A shot that does
-not meet its tolerance on the last is told as not converged."""
-
-
-def level(index: int, numerics: Numerics) -> Fidelity:
-    """A level of the ladder, in the precision of the numerics."""
-    return replace(LADDER[index], double=numerics.precision == "double")
+LEVELS = (0, 2, 4, 6, 8)
+"""Levels of LADDER that a shot goes through, each some four times as expensive as the one before."""
+CLOSE, FAR = 0.3, 1.5
+"""A shot has converged where its last change is at most CLOSE of the tolerance; or where its last change is within the
+tolerance and the change from two levels before within FAR times that. Two levels may agree by chance, three rarely."""
 
 
 @dataclass(frozen=True)
@@ -35,9 +27,9 @@ class Estimates:
     """How far off the outcomes may be, and how fine they were computed.
 
     Attributes:
-        residual_velocity_error: change from the last but one level to the last [m/s], shape [shots]; likewise
+        residual_velocity_error: change from the level before the last to the last [m/s], shape [shots]; likewise
         tilt_error: [rad], shape [shots, stand-offs]. Infinite where the status changed, 0 where there is no value.
-        converged: whether both meet the tolerance, shape [shots].
+        converged: whether the changes meet the tolerance (see CLOSE), shape [shots].
         level: index of the last level in LADDER, shape [shots].
     """
 
@@ -56,10 +48,10 @@ def simulate_to_tolerance(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> tuple[Outcomes, Estimates]:
-    """Compute every shot on the first two levels, and on finer ones while two levels differ by too much.
+    """Compute every shot on the first two levels, and on finer ones until it has converged (CLOSE, FAR).
 
-    The outcome is that of the finer level, the estimate its change from the coarser one; where levels converge,
-    the finer outcome is nearer to the limit (docs/model.md §4) than that.
+    The outcome is that of the finest level computed. The estimate is its change from the level before: where levels
+    converge, the outcome is nearer to the limit (docs/model.md §4) than that.
 
     Args:
         numerics: its tolerance and precision; the others as in `simulate`.
@@ -87,18 +79,23 @@ def simulate_to_tolerance(
             progress(done, len(shots))
 
     pending = np.arange(len(shots))
-    outcomes = on(0, pending)
+    outcomes = before = on(LEVELS[0], pending)
     estimates = Estimates(
         residual_velocity_error=np.full(len(shots), np.inf),
         tilt_error=np.full(outcomes.tilt.shape, np.inf),
         converged=np.zeros(len(shots), dtype=bool),
         level=np.zeros(len(shots), dtype=np.int8),
     )
-    for index in range(1, len(LADDER)):
-        finer = on(index, pending)
-        _estimate(estimates, pending, _picked(outcomes, pending), finer, tolerance)
-        _put(outcomes, pending, finer)
+    for index in LEVELS[1:]:
+        finer, last = on(index, pending), _picked(outcomes, pending)
+        change, since_before = Change.between(last, finer), Change.between(_picked(before, pending), finer)
+        near, far = change.in_tolerances(tolerance), since_before.in_tolerances(tolerance)
+        three_agree = (near <= 1.0) & (far <= FAR) if index > LEVELS[1] else False
+        estimates.residual_velocity_error[pending] = change.residual_velocity
+        estimates.tilt_error[pending] = change.tilt
+        estimates.converged[pending] = (near <= CLOSE) | three_agree
         estimates.level[pending] = index
+        before, outcomes = _with(before, pending, last), _with(outcomes, pending, finer)
         pending = np.flatnonzero(~estimates.converged)
         show(len(shots) - len(pending))
         if not len(pending):
@@ -107,20 +104,28 @@ def simulate_to_tolerance(
     return outcomes, estimates
 
 
-def _estimate(
-    estimates: Estimates, which: NDArray[np.int64], coarse: Outcomes, fine: Outcomes, tolerance: Tolerance
-) -> None:
-    """Write the estimates of some shots from their last two levels."""
-    same = coarse.status == fine.status
-    velocity = np.where(same, _change(coarse.residual_velocity, fine.residual_velocity), np.inf)
-    tilt = np.where(same[:, None], _change(coarse.tilt, fine.tilt), np.inf)
-    estimates.residual_velocity_error[which] = velocity
-    estimates.tilt_error[which] = tilt
-    estimates.converged[which] = (velocity <= tolerance.residual_velocity) & (tilt <= tolerance.tilt).all(axis=1)
+@dataclass(frozen=True)
+class Change:
+    """What changes between two levels: of the residual velocity [m/s], shape [shots], and of the tilt [rad], shape
+    [shots, stand-offs]. 0 where neither has a value, infinite where the status differs or only one has a value."""
+
+    residual_velocity: Array
+    tilt: Array
+
+    @classmethod
+    def between(cls, coarse: Outcomes, fine: Outcomes) -> Self:
+        """The change from the outcomes of one level to those of another, of the same shots."""
+        same = coarse.status == fine.status
+        velocity, tilt = _apart(coarse.residual_velocity, fine.residual_velocity), _apart(coarse.tilt, fine.tilt)
+        return cls(np.where(same, velocity, np.inf), np.where(same[:, None], tilt, np.inf))
+
+    def in_tolerances(self, tolerance: Tolerance) -> Array:
+        """The larger of both in units of the tolerance, shape [shots]."""
+        tilt = self.tilt.max(axis=1, initial=0.0) / tolerance.tilt
+        return np.maximum(self.residual_velocity / tolerance.residual_velocity, tilt)
 
 
-def _change(coarse: Array, fine: Array) -> Array:
-    """|fine − coarse|; 0 where neither exists, infinite where only one does."""
+def _apart(coarse: Array, fine: Array) -> Array:
     missing = np.isnan(coarse), np.isnan(fine)
     change = np.where(missing[0] & missing[1], 0.0, np.abs(fine - coarse))
     return np.where(np.isnan(change), np.inf, change)
@@ -131,7 +136,9 @@ def _picked(outcomes: Outcomes, which: NDArray[np.int64]) -> Outcomes:
     return replace(outcomes, **{field.name: getattr(outcomes, field.name)[which] for field in fields(outcomes)})
 
 
-def _put(outcomes: Outcomes, which: NDArray[np.int64], finer: Outcomes) -> None:
-    """Put the finer outcomes of some shots in place."""
-    for field in fields(outcomes):
-        getattr(outcomes, field.name)[which] = getattr(finer, field.name)
+def _with(outcomes: Outcomes, which: NDArray[np.int64], other: Outcomes) -> Outcomes:
+    """Copies of the columns, with those of some shots from other outcomes."""
+    columns = {field.name: getattr(outcomes, field.name).copy() for field in fields(outcomes)}
+    for name, column in columns.items():
+        column[which] = getattr(other, name)
+    return replace(outcomes, **columns)

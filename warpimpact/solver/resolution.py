@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -50,6 +50,22 @@ FIDELITIES = {
     "standard": Fidelity(23, 32, 1.5, 0.37),
     "reference": Fidelity(64, 56, 5.0, 0.05),
 }
+"""What `simulate` takes for a name; a campaign takes the level of LADDER that keeps the promise (solver/promise.py)."""
+
+LADDER = (
+    Fidelity(14, 16, 1.0, 0.5),
+    Fidelity(18, 24, 1.2, 0.42),
+    Fidelity(23, 32, 1.5, 0.37),
+    Fidelity(28, 40, 1.5, 0.28),
+    Fidelity(32, 48, 2.0, 0.2),
+    Fidelity(44, 60, 2.5, 0.14),
+    Fidelity(60, 80, 3.5, 0.1),
+    Fidelity(84, 108, 5.0, 0.07),
+    Fidelity(116, 148, 7.0, 0.05),
+)
+"""Levels of resolution, coarse to fine: patches, grid and step are refined together. The error about halves from one
+to the next, and the cost about doubles."""
+
 NODAL: dict[str, Any] = {
     "patches_axial": 36,
     "patches_around": 36,
@@ -57,6 +73,11 @@ NODAL: dict[str, Any] = {
     "time_step": 1.0e-6,
 }
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
+
+
+def level(index: int, numerics: Numerics) -> Fidelity:
+    """A level of the ladder, in the precision of the numerics."""
+    return replace(LADDER[index], double=numerics.precision == "double")
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from warpimpact.results.variables import ESTIMATE_VARIABLES, OUTCOME_VARIABLES, 
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
-from warpimpact.solver.refinement import LADDER
+from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"

@@ -1,0 +1,100 @@
+"""What a named fidelity promises, and the level of resolution that keeps the promise on a scene.
+
+A pilot computes some of the shots on levels of LADDER, coarse to fine. The error of a level is estimated by its change
+to a finer one. The coarsest level whose error is within the promise is taken for all shots. The estimate is an upper
+one: a high order statistic of the pilot's shots, times a margin for the error of the finer level itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.scene import Numerics, Scene, Shots, Tolerance
+from warpimpact.solver.refinement import Change
+from warpimpact.solver.resolution import LADDER, Fidelity, level
+from warpimpact.solver.simulate import Outcomes, simulate
+
+PILOT = 32
+"""Shots of a pilot."""
+SHARE = 0.94
+"""Share of the pilot's shots whose error is at most the estimate: all but one of 32. Their 90th percentile would too
+often lie below that of all shots."""
+MARGIN = {1: 1.5, 2: 1.15}
+"""Factor of an estimate by the number of levels to the finer one."""
+
+
+class Named(NamedTuple):
+    """What a name stands for: errors of 90 % of the hits, in residual velocity and in tilt at the largest stand-off,
+    and the level of LADDER from which on it is looked for."""
+
+    tolerance: Tolerance
+    first: int
+
+
+PROMISES = {
+    "draft": Named(Tolerance(residual_velocity=5.0, tilt=math.radians(5.0)), 0),
+    "standard": Named(Tolerance(residual_velocity=1.0, tilt=math.radians(1.0)), 2),
+    "reference": Named(Tolerance(residual_velocity=0.2, tilt=math.radians(0.2)), 4),
+}
+
+
+@dataclass(frozen=True)
+class Promise:
+    """What a pilot found.
+
+    Attributes:
+        fidelity: the numerics to compute all shots with.
+        kept: whether the errors are within what the name promises.
+        residual_velocity_error, tilt_error: upper estimates of the errors of 90 % of the shots [m/s] and [rad];
+            infinite where the pilot could not tell.
+    """
+
+    fidelity: Fidelity
+    kept: bool
+    residual_velocity_error: float
+    tilt_error: float
+
+
+def keep(scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto") -> Promise:
+    """Find the coarsest level of resolution that keeps the promise of a named fidelity.
+
+    Args:
+        numerics: its fidelity and precision count; single settings would promise nothing (`Numerics.explicit`).
+        pilot: shots like those that are to be computed, some PILOT of them.
+
+    Returns:
+        The promise, kept; or if no level keeps it, the finest level that has a finer one to compare with.
+
+    Raises:
+        DeviceError: the device is absent.
+    """
+    tolerance, first = PROMISES[numerics.fidelity]
+    known: dict[int, Outcomes] = {}
+    found = Promise(level(first, numerics), False, math.inf, math.inf)
+    for index in range(first, len(LADDER) - 1):
+        finer = min(index + 2, len(LADDER) - 1)
+        try:
+            for needed in (index, finer):
+                if needed not in known:
+                    known[needed] = simulate(scene, pilot, numerics=level(needed, numerics), device=device)
+        except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
+            break
+        errors = MARGIN[finer - index] * _errors(known[index], known[finer])
+        kept = errors[0] <= tolerance.residual_velocity and errors[1] <= tolerance.tilt
+        found = Promise(level(index, numerics), bool(kept), float(errors[0]), float(errors[1]))
+        if kept:
+            break
+    return found
+
+
+def _errors(coarse: Outcomes, fine: Outcomes) -> NDArray[np.float64]:
+    """Changes of residual velocity [m/s] and last tilt [rad] that SHARE of the shots stay within."""
+    change = Change.between(coarse, fine)
+    last = change.tilt[:, -1] if change.tilt.shape[1] else np.zeros(len(change.tilt))
+    place = math.ceil(SHARE * len(last)) - 1
+    return np.array([np.sort(errors)[place] for errors in (change.residual_velocity, last)])
