@@ -24,8 +24,9 @@ PILOT = 32
 SHARE = 0.94
 """Share of the pilot's shots whose error is at most the estimate: all but one of 32. Their 90th percentile would too
 often lie below that of all shots."""
-MARGIN = {1: 1.5, 2: 1.15}
-"""Factor of an estimate by the number of levels to the finer one."""
+MARGIN = {1: 2.0, 2: 1.4}
+"""Factor of an estimate by the number of levels to the finer one. Over 25 random scenes and 7 levels, 9 of 10 estimates
+are then at least the true 90th percentile (tests/benchmarks/random_scenes.py)."""
 
 
 class Named(NamedTuple):

@@ -1,0 +1,130 @@
+"""The promise of a named fidelity: the level that a pilot chooses keeps it on hits that were not in the pilot."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign, run
+from warpimpact.campaign.compute import promise_in
+from warpimpact.campaign.replay import replay
+from warpimpact.scene import CirclePattern, Hits, Impact, Numerics, OgiveCore, Plate, Record, Scene, make_shots
+from warpimpact.solver import promise
+from warpimpact.solver.promise import MARGIN, PROMISES, keep
+from warpimpact.solver.refinement import Change
+from warpimpact.solver.resolution import LADDER
+from warpimpact.solver.simulate import Outcomes, simulate
+
+CORE = OgiveCore(diameter=6.17e-3, crh=3, length=27e-3, mass=5.25e-3)
+PLATE = Plate(
+    thickness=6e-3,
+    resistance=2e9,
+    shear_coefficient=0.08,
+    degradation=0.85,
+    pattern=CirclePattern(diameter=7e-3, spacing=(10e-3, 17.3e-3), staggered=True),
+)
+SCENE = Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05, 0.13)))
+IMPACT = Impact(velocity="820 m/s", obliquity="12 deg", yaw="1 deg")
+PILOT = make_shots(IMPACT, Hits(count=32, seed=5), PLATE)
+OTHERS = make_shots(IMPACT, Hits(count=96, seed=6), PLATE)
+
+
+@pytest.fixture(scope="module")
+def limit() -> Outcomes:
+    """Of the hits that are not in the pilot, on the finest level."""
+    return simulate(SCENE, OTHERS, numerics=LADDER[-1], device="cpu")
+
+
+def errors(fidelity: Any, limit: Outcomes) -> tuple[float, float]:
+    """90th percentiles of the errors in residual velocity [m/s] and in tilt at the last stand-off [rad]."""
+    change = Change.between(simulate(SCENE, OTHERS, numerics=fidelity, device="cpu"), limit)
+    return float(np.quantile(change.residual_velocity, 0.9)), float(np.quantile(change.tilt[:, -1], 0.9))
+
+
+@pytest.mark.parametrize("name", ["draft", "standard"])
+def test_a_shanked_core_gets_the_accuracy_that_the_name_promises(name: str, limit: Outcomes) -> None:
+    found, tolerance = keep(SCENE, Numerics(fidelity=name), PILOT, device="cpu"), PROMISES[name].tolerance
+    assert found.kept
+    velocity, tilt = errors(found.fidelity, limit)
+    assert velocity <= tolerance.residual_velocity
+    assert tilt <= tolerance.tilt
+    # The errors that are told are upper estimates of the true ones.
+    assert velocity <= found.residual_velocity_error <= tolerance.residual_velocity
+    assert tilt <= found.tilt_error <= tolerance.tilt
+
+
+def test_a_stricter_name_takes_a_finer_level_in_the_precision_asked_for() -> None:
+    levels = [
+        keep(SCENE, Numerics(fidelity=name, precision="double"), PILOT[:8], device="cpu").fidelity
+        for name in ("draft", "standard")
+    ]
+    places = [LADDER.index(replace(level, double=False)) for level in levels]
+    assert places[0] < places[1]
+    assert all(level.double for level in levels)
+
+
+def test_what_cannot_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    # With a ladder of two levels and a promise of nothing, the finest level that can be judged is taken.
+    monkeypatch.setattr(promise, "LADDER", LADDER[:2])
+    nothing = PROMISES["draft"].tolerance.model_copy(update={"residual_velocity": 1e-9})
+    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0))
+    found = keep(SCENE, Numerics(fidelity="draft"), PILOT[:8], device="cpu")
+    assert not found.kept
+    assert found.fidelity == LADDER[0]
+    coarse, fine = (simulate(SCENE, PILOT[:8], numerics=level, device="cpu") for level in LADDER[:2])
+    largest = np.abs(coarse.residual_velocity - fine.residual_velocity).max()
+    assert found.residual_velocity_error == pytest.approx(MARGIN[1] * largest)
+
+
+def test_levels_that_do_not_fit_the_memory_end_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*args: Any, **how: Any) -> Outcomes:
+        raise MemoryError
+
+    monkeypatch.setattr(promise, "simulate", full)
+    found = keep(SCENE, Numerics(), PILOT[:4], device="cpu")
+    assert not found.kept
+    assert math.isinf(found.tilt_error)
+    assert found.fidelity == LADDER[PROMISES["standard"].first]
+
+
+CAMPAIGN = """
+title = "t"
+[core]
+shape = "ogive"
+diameter = "6.17 mm"
+crh = 3
+length = "27 mm"
+mass = "5.25 g"
+[plate]
+thickness = "6 mm"
+resistance = "2 GPa"
+shear_coefficient = 0.08
+degradation = 0.85
+pattern = { shape = "circle", diameter = "7 mm", spacing = ["10 mm", "17.3 mm"], staggered = true }
+[impact]
+velocity = "820 m/s"
+[hits]
+count = 12
+[numerics]
+fidelity = "draft"
+"""
+
+
+@pytest.mark.parametrize("hits", ["count = 12", 'count = 12\nsampling = "grid"', "count = 16\nirreducible = true"])
+def test_a_result_tells_its_promise_and_replays_on_its_level(hits: str) -> None:
+    campaign = Campaign.from_text(CAMPAIGN.replace("count = 12", hits), name="t", folder=Path())
+    result = run(campaign, device="cpu")
+    found = promise_in(result)
+    assert found is not None
+    assert result.attrs["promise_kept"] == 1
+    assert 0.0 < result.attrs["residual_velocity_error_p90"] <= 5.0
+    assert 0.0 < result.attrs["tilt_error_p90"] <= 5.0
+    assert replay(result, 5, folder=Path()).attrs["agreement"] == "bit-identical"
+
+
+def test_a_single_setting_promises_nothing() -> None:
+    campaign = Campaign.from_text(CAMPAIGN + "patches_axial = 20\n", name="t", folder=Path())
+    assert not {"promise_kept", "resolution", "tilt_error_p90"} & run(campaign, device="cpu").attrs.keys()
