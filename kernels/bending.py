@@ -1,8 +1,8 @@
-"""Bending of a core that is still counted as rigid: external against inertial loads (D'Alembert's principle).
+"""Bending moment in a rigid core: external against inertial loads (D'Alembert's principle).
 
-The part of the core ahead of a section bears the contact loads on it and the inertia of its slices; what they do not
-balance is the bending moment in the section. Loads come ring by ring, so the moment is known behind every ring: a
-running sum from the nose, which ends at zero at the base, where nothing follows.
+Contact loads and the inertia of its slices act on the part of the core ahead of a section. The bending moment in the
+section balances them. Loads are known ring by ring, so the moment is known behind every ring. It is a running sum from
+the nose, and it ends at zero at the base.
 """
 
 from functools import cache
@@ -26,11 +26,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Sections:
-        """The sections behind the rings, arrays of shape [rings]: place behind the nose and ahead of the centre of mass
-        [m], and stress per bending moment, 4/(π r³) [1/m³], 0 where it is not asked for.
+        """The sections behind the rings; arrays of shape [rings]. `station` is the distance behind the nose [m],
+        `ahead` the distance ahead of the centre of mass [m]. `stress` is the stress per bending moment, 4/(π r³)
+        [1/m³]; it is 0 where no stress is computed.
 
-        With ξ the place of a slice ahead of the centre of mass, x that of the section, and per mass of the core, of all
-        slices ahead of the section: first = ∫ (ξ − x) dm [m], second = ∫ (ξ − x) ξ dm [m²] and rotary = ∫ r²/4 dm [m²].
+        ξ is the distance of a slice ahead of the centre of mass, x that of the section. The integrals run over all
+        slices ahead of the section, per mass of the core: first = ∫ (ξ − x) dm [m], second = ∫ (ξ − x) ξ dm [m²] and
+        rotary = ∫ r²/4 dm [m²].
         """
 
         station: wp.array(dtype=real)
@@ -57,7 +59,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def mean_moment(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
-        """Its moment about the centre of mass [N m]."""
+        """Moment of a ring about the centre of mass [N m], likewise."""
         slopes = resistances.slopes_of(ring, sums)
         coupled = wp.transpose(resistances.damping_vw(slopes)) * dv
         return sums.moment - half * (coupled + resistances.damping_ww(slopes) * dw)
@@ -82,12 +84,12 @@ def build(variant: Variant) -> SimpleNamespace:
         foreseen: Change,
         dt: real,
     ):
-        """The largest of before and of one step, whose load changes the velocities in `state`; the loads on the rings
-        are those at half of the change that was foreseen.
+        """The larger of `before` and the bending in one step, whose load changes the velocities in `state`. The loads
+        on the rings are those at half of the foreseen change.
 
-        A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ and turns by
-        α − ω_x J ω per rotary inertia, J ω = axis × ω: the second terms are those of spin (Euler's equations for a
-        disc, whose axial moment of inertia is twice the transverse one).
+        A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per
+        rotary inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for
+        a disc, whose axial moment of inertia is twice the transverse one.
         """
         worst = before
         dv, dw, felt_v, felt_w = motion.velocity_change(body, load, dt)

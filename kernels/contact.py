@@ -1,8 +1,8 @@
-"""One step's load on a core: the consistent law (docs/model.md §4), exposure taken at mid-step.
+"""The load of one step on a core: the consistent law (docs/model.md §4), with the exposure at mid-step.
 
-Two passes over the patches in the slab: the first finds what touches and tells the plate, the second reads the
-weakened plate and sums the load. Their inner loops run over the patches of a ring without a branch, so that a CPU
-computes a vector of them at a time.
+A step makes two passes over the patches in the slab. The first pass finds the patches that touch and adds their
+exposure to the plate. The second pass reads the weakened plate and sums the load. The inner loops run over the patches
+of a ring without a branch, so a CPU computes several patches at once.
 """
 
 from functools import cache
@@ -31,10 +31,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Touches:
-        """What the first pass finds, for every patch of every slot: the area [m²] with which it presses on material,
-        the derivative of that area by its closing speed [m s], the `shift` of its grip, exposure per node [s] that it
-        is about to give, cells of the tile and of the grid, and the place in the latter; the area of every ring's
-        patches together; and, where the core bends, what the second pass sums over each ring."""
+        """What the first pass finds for every patch of every slot.
+
+        `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
+        that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
+        of the tile and of the grid; `y` and `z` are its place in the grid's cell. `ring_area` is the area of all
+        patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded.
+        """
 
         area: wp.array(dtype=real)
         slope: wp.array(dtype=real)
@@ -51,7 +54,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def open_window(
         plate: Plate, thickness: real, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64
     ):
-        """A slot's window about a hit, on a plate that nothing has touched."""
+        """A slot's window about a hit, on an untouched plate."""
         window = grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
         if wp.static(variant.degrades):
             memories.blank(fields, window)
@@ -70,7 +73,8 @@ def build(variant: Variant) -> SimpleNamespace:
         first: wp.int32,
         dt: real,
     ):
-        """Fill in the patches of a ring, from index `first` on; the area [m²] with which they press on material."""
+        """Fill in the touches of a ring's patches, from index `first` on; return the area that presses on material
+        [m²]."""
         per_node = laws.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
         j = int(0)
         while j < surface.around:
@@ -96,8 +100,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def expose(surface: Surface, fields: Fields, touches: Touches, first: wp.int32):
-        """Give the plate the exposure of a ring's touches, from its four quarters in turn: neighbours share nodes, and
-        one would wait for the other. What does not touch gives nothing, which costs less than to leave it out."""
+        """Add the exposure of a ring's patches to the plate, one patch of each quarter in turn. Neighbours share nodes,
+        so a CPU would have to wait between them. A patch that does not touch adds zero, which is faster than a
+        branch."""
         quarter = surface.around // 4
         j = int(first)
         while j < first + quarter:
@@ -179,10 +184,10 @@ def build(variant: Variant) -> SimpleNamespace:
         pose: Pose,
         dt: real,
     ):
-        """The load over one step; the plate's exposure moves on by the step.
+        """The load over one step; adds the exposure of the step to the plate.
 
-        Half of the slope of the traction is the load's damping: with it the step is of second order where the stress
-        depends on the rate, and stable where a wall rests on the steep ramp of the contact.
+        The damping of the load is half of the slope of the traction. The step is then of second order where the
+        stress depends on the rate, and stable where a wall lies on the steep ramp of the contact.
         """
         base = slot * surface.rings * surface.around
         load = Load()
@@ -196,7 +201,8 @@ def build(variant: Variant) -> SimpleNamespace:
             load.touching = load.touching or area > zero
         if load.touching:
             if wp.static(variant.degrades):
-                # After all rings are found: what was just stored by vectors cannot be read one by one at once.
+                # After all rings are found: a CPU has to wait before it reads single values that it has just stored as
+                # vectors.
                 for index in range(found.first_ring, found.last_ring + 1):
                     if touches.ring_area[slot * surface.rings + index] > zero:
                         expose(surface, fields, touches, base + index * surface.around)

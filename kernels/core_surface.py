@@ -1,4 +1,4 @@
-"""The core's surface: rings of equal patches, where they are, how they move, how much is in the slab."""
+"""The core's surface: rings of equal patches, their positions, velocities and areas in the slab."""
 
 import math
 from functools import cache
@@ -26,8 +26,9 @@ def build(variant: Variant) -> SimpleNamespace:
         Per ring: station ahead of the centre of mass and radius [m], area of one patch [m²], its normal along
         the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of
         the change of the normal over it.
-        Cosine and sine of the patches' azimuths, a multiple of 4 around a ring: those of even rings, then those of odd
-        rings, half a patch on, so that neighbours do not all miss the same edge.
+        `cosine` and `sine` are those of the patches' azimuths: first for even rings, then for odd rings. Odd rings are
+        turned by half a patch, so neighbouring rings do not all miss the same edge. The number of patches around a ring
+        is a multiple of 4.
         """
 
         station: wp.array(dtype=real)
@@ -48,8 +49,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Pose:
-        """Where the core is and how it moves: body axes and centre of mass in the plate frame; velocity and
-        angular velocity along the body axes (axis, right, up). No point of the core is faster than `speed`."""
+        """Position and motion of the core: body axes and centre of mass in the plate frame; velocity and angular
+        velocity along the body axes (axis, right, up). No point of the core is faster than `speed`."""
 
         position: vec3
         axis: vec3
@@ -78,8 +79,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Patch:
-        """The centre of one patch: place in the plate frame [m], components along x of the directions outwards and
-        around, velocity along the axis, outwards and around [m/s], and its part along the outward normal."""
+        """The centre of one patch: position in the plate frame [m], components along x of the directions outwards and
+        around, velocity along the axis, outwards and around [m/s]. `closing` is the velocity along the outward normal
+        [m/s]."""
 
         x: real
         y: real
@@ -127,8 +129,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def reach_along_x(ring: Ring, pose: Pose, broadside: real, advance: real, turning: real):
-        """How far from its centre along x any part of the ring can get within the step [m]: the half-ways
-        `advance` of the centre of mass along x, and `turning` of a point 1 m away."""
+        """Largest distance along x between the ring's centre and any part of the ring within the step [m]. `advance` is
+        half of the way of the centre of mass along x in the step [m]; `turning` is half of the step's rotation
+        [rad]."""
         around = (one + ring.sector) * ring.radius
         return (
             (around + wp.abs(ring.half_radial)) * broadside
@@ -158,7 +161,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def closes(pose: Pose, ring: Ring):
-        """Whether any part of a ring can advance along its normal: a bound, for rings that only trail behind."""
+        """Whether any part of a ring may advance along its normal. This is a bound: a ring for which it is False cannot
+        touch."""
         along = pose.velocity[0]
         across = wp.sqrt(pose.velocity[1] * pose.velocity[1] + pose.velocity[2] * pose.velocity[2])
         rate = wp.sqrt(pose.omega[1] * pose.omega[1] + pose.omega[2] * pose.omega[2])
@@ -175,11 +179,11 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def behind_face(depth: real, wide: real, narrow: real, per_area: real):
-        """Share of a patch beyond a face at x = 0, averaged over the step, less a half.
+        """Share of a patch beyond a face at x = 0, averaged over the step, minus 1/2.
 
-        The patch spreads evenly over ±extent about its mid-step depth and moves evenly by ±motion, `wide` and
-        `narrow` being the larger and the smaller, per_area = 1 / (2 wide narrow); their convolution keeps the sum
-        over steps of what is immersed exact in straight flight.
+        The patch spreads evenly over ±extent about its mid-step depth and moves evenly by ±motion. `wide` is the larger
+        of extent and motion, `narrow` the smaller, and per_area = 1 / (2 wide narrow). With the convolution of both,
+        the sum of the immersed area over the steps is exact in straight flight.
         """
         rest = wp.max(zero, wide + narrow - wp.abs(depth))
         edge = half - quarter * rest * rest * per_area

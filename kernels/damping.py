@@ -1,4 +1,4 @@
-"""How the load of a ring resists a change of velocity: what makes a step implicit where contact is stiff."""
+"""Damping: how the load of a ring resists a change of velocity. It makes a step implicit where contact is stiff."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -18,8 +18,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Sums:
-        """Over a ring: force [N] and moment [N m] along the body axes; the tractions' derivative by the closing speed
-        [N s/m], weighted by 1, cos, sin, cos² and cos sin of the azimuth."""
+        """Sums over a ring: force [N] and moment [N m] along the body axes; the derivative of the tractions by the
+        closing speed [N s/m], weighted by 1, cos, sin, cos² and cos sin of the azimuth."""
 
         force: vec3
         moment: vec3
@@ -31,8 +31,9 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Slopes:
-        """Σ slope × products of the normal's components along the axis (a) and outwards (r) and of its lever (l) about
-        the centre of mass; with the azimuth's cos and sin for each r or l: (cos, sin), or (cos², cos sin, sin²)."""
+        """Σ slope × two factors. The factors are the normal's components along the axis (a) and outwards (r), and its
+        lever about the centre of mass (l). Each r or l brings a cos or sin of the azimuth: (cos, sin) for one of them,
+        (cos², cos sin, sin²) for two."""
 
         aa: real
         ar: vec2
@@ -43,7 +44,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def slopes_of(ring: Ring, s: Sums):
-        """Of a ring; its normals are n = (a, r cos, r sin) and arm × n = l (0, −sin, cos)."""
+        """The slopes of a ring. Its normals are n = (a, r cos, r sin), and arm × n = l (0, −sin, cos)."""
         a, r = ring.normal_axial, ring.normal_radial
         lever = ring.station * r - ring.radius * a
         once, twice = vec2(s.slopes_c, s.slopes_s), vec3(s.slopes_cc, s.slopes_cs, s.slopes - s.slopes_cc)
@@ -85,7 +86,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def added(a: Slopes, b: Slopes):
-        """Slopes of two sets of rings together."""
+        """Sum of the slopes of two sets of rings."""
         a.aa += b.aa
         a.ar += b.ar
         a.rr += b.rr

@@ -40,7 +40,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def scatter_plain(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real, amount: real):
-        """Share an amount out over the four nodes, by the weights of the interpolation."""
+        """Distribute an amount over the four nodes by the weights of the interpolation."""
         high = amount * y
         low = amount - high
         next = index + stride
@@ -49,8 +49,8 @@ def build(variant: Variant) -> SimpleNamespace:
         write(field, next, read(field, next) + (high - high * z))
         write(field, next + 1, read(field, next + 1) + high * z)
 
-    # Native and volatile, because a compiler would store neighbours in pairs, and the next patch, whose pair overlaps
-    # this one, would wait for the memory.
+    # Native and volatile, because a compiler would store neighbours in pairs. The pair of the next patch overlaps with
+    # this one, so the next patch would wait for the memory.
     @wp.func_native("""
     assert(index >= 0 && index + stride + 1 < field.shape[0]);
     volatile float* const at = field.data + index;
@@ -74,7 +74,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     scatter = scatter_plain if variant.double else scatter_single
 
-    # Native, because only with pointers that do not alias does a CPU run these loops in vector registers.
+    # Native, because a compiler vectorises these loops only if the pointers do not alias.
     @wp.func_native("""
     assert(start - step >= 0 && start + count + step <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
@@ -134,7 +134,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def take_scaled(
         target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
     ):
-        """The same, and source[j] = 0."""
+        """As `add_scaled`; then source[j] = 0."""
         ...
 
     @wp.func_native("""
@@ -147,7 +147,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def blank(fields: Fields, window: Window):
-        """A plate that nothing has touched."""
+        """Make the plate untouched: no exposure."""
         nodes = window.cells_y * window.cells_z
         clear(fields.exposure, window.first, nodes)
         clear(fields.gain, window.first, nodes)
@@ -168,11 +168,11 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def spread(plate: Plate, fields: Fields, window: Window, box: Box):
-        """Filter the gained exposure with the tent K of the law, one direction after the other, and add half
-        of it to the exposure: what the mid-step sees.
+        """Filter the gained exposure with the tent K of the law, one direction after the other, and add half of it to
+        the exposure. The sum is the exposure at mid-step.
 
-        Whole rows at once: what wraps round from one row to the next is zero, for the box keeps the filter's
-        reach away from the window's edge.
+        Whole rows are filtered at once. Values that wrap from one row to the next are zero, because the box keeps the
+        filter's reach away from the window's edge.
         """
         stride = window.cells_z
         above = plate.reach * stride

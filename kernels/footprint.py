@@ -21,9 +21,10 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Footprint:
-        """What a step can touch: the first and last ring that can be in the slab (none: last < first), whether all
-        rings are beyond its rear face (`through`) or before its front face (`back`), and the nodes around those in the
-        slab; `inside` tells whether the window holds them."""
+        """What a step can touch. `first_ring` and `last_ring` are the first and the last ring that can be in the slab;
+        last < first if there is none. `through` means that all rings are behind the rear face, `back` that all are
+        before the front face. `box` holds the nodes around the rings in the slab. `inside` means that the window holds
+        the box."""
 
         first_ring: wp.int32
         last_ring: wp.int32
@@ -39,13 +40,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def footprint_of(surface: Surface, plate: Plate, window: Window, pose: Pose, dt: real):
-        """The footprint in mid-step; patches act at their centres, so a ring covers centre ± radius."""
+        """The footprint at mid-step. Patches act at their centres, so a ring covers centre ± radius."""
         broadside = surfaces.broadside(pose)
         across_y = wp.sqrt(wp.max(zero, one - pose.axis[1] * pose.axis[1]))
         across_z = wp.sqrt(wp.max(zero, one - pose.axis[2] * pose.axis[2]))
         advance = half * dt * wp.abs(wp.dot(pose.velocity, vec3(pose.axis[0], pose.right[0], pose.up[0])))
         turning = half * dt * wp.length(pose.omega)
-        # Integers, because a CPU takes the least of a vector of them, but not of numbers that may be NaN.
+        # Integers, because a compiler vectorises their minimum, but not that of numbers that may be NaN.
         first_ring, last_ring, not_through, not_back = int(surface.rings), int(-1), int(0), int(0)
         y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
         index = int(0)
@@ -71,13 +72,13 @@ def build(variant: Variant) -> SimpleNamespace:
         found.back = not_back == 0
         found.inside = True
         if last_ring >= 0:
-            # One node of slack: rounding of a patch on the ring's outermost point must stay inside.
+            # One node of slack, because rounding may move a patch at the ring's outermost point.
             home_y, home_z = window.cells_y // 2, window.cells_z // 2
             found.box.y_low = home_y + y_low - 1
             found.box.y_high = home_y + y_high + 2
             found.box.z_low = home_z + z_low - 1
             found.box.z_high = home_z + z_high + 2
-            # The filter's first pass takes rows twice its reach away, and looks a little beyond them.
+            # The filter's first pass covers rows up to twice its reach away and reads slightly beyond them.
             rows = 2 * plate.reach + 1
             found.inside = (
                 found.box.y_low >= rows

@@ -1,4 +1,4 @@
-"""Torque-free flight behind the plate: what a shot looks like when it passes the stand-offs (docs/model.md §1)."""
+"""Torque-free flight behind the plate, and the attitude of the core at the stand-offs (docs/model.md §1)."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -27,7 +27,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Report:
-        """What is told of each shot; [shots] or [shots × stand-offs], SI and radians, NaN where it does not exist."""
+        """The output for each shot; arrays of shape [shots] or [shots, stand-offs], SI and radians, NaN where there is
+        no value."""
 
         residual_velocity: wp.array(dtype=real)
         deflection: wp.array(dtype=real)
@@ -45,10 +46,10 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def axis_at(body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real):
-        """Axis when the point `ahead` of the centre of mass has gone `distance` along x.
+        """The axis at the moment when the point `ahead` of the centre of mass has moved by `distance` along x.
 
-        The point's own swing enters the time of flight: a fixed-point iteration, which converges while the swing is
-        slower than the flight; without a lever it is exact at once.
+        The swing of the point changes the time of flight, which a fixed-point iteration finds. It converges while the
+        swing is slower than the flight. If `ahead` is 0, the first iteration is exact.
         """
         then = axis
         for _ in range(iterations):
@@ -76,8 +77,8 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """Report one shot per thread.
 
-        `standoffs` are distances behind the rear face [m]; `ahead` [m] tells which point of the axis has to pass them,
-        from the centre of mass towards the nose.
+        `standoffs` are distances behind the rear face [m]. The point of the axis that passes them is `ahead` of the
+        centre of mass, towards the nose [m].
         """
         shot = wp.tid()
         body = launch.body_of(shots, shot)

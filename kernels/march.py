@@ -50,7 +50,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def reach_of(surface: Surface, thickness: real, state: State):
-        """How far from the hit [m], in the plane of the plate, any part of a core that touches nothing can get."""
+        """Largest distance from the hit [m], in the plane of the plate, of any part of a core that touches nothing."""
         axis = motion.axis_of(state.attitude)
         slope = vec3(zero, state.velocity[1], state.velocity[2]) / state.velocity[0]
         lean = axis - axis[0] * slope  # of the axis against the line of flight
@@ -72,9 +72,9 @@ def build(variant: Variant) -> SimpleNamespace:
         initial_energy: real,
         thickness: real,
     ):
-        """The status a core has reached, or RUNNING.
+        """The final status of a core, or RUNNING.
 
-        A core clear of the slab is gone once it moves away faster than its own rotation can bring any part of it back.
+        A core outside the slab cannot come back if it moves away faster than its rotation moves any part of it.
         """
         status = RUNNING
         energy = motion.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
@@ -144,7 +144,7 @@ def build(variant: Variant) -> SimpleNamespace:
         while status == RUNNING and step < max_steps:
             omega = motion.angular_velocity(body, motion.axis_of(state.attitude), state.angular_momentum)
             pose = surfaces.pose_of(surface, state.position, state.attitude, state.velocity, omega)
-            # What closes in is what mid-step will see, if the step changes what the last one did.
+            # The closing speeds are those at mid-step, if this step changes the velocities as much as the last one did.
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
             found = prints.footprint_of(surface, plate, window, pose, dt)
@@ -160,7 +160,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 if load.touching:
                     touched = True
                     contact_steps += 1
-                    # Back to the speeds at the start of the step, which the damping counts from.
+                    # The damping counts from the speeds at the start of the step.
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
                     if wp.static(variant.bends):

@@ -1,4 +1,4 @@
-"""Access to flat arrays that a CPU can compute in vector registers."""
+"""Access to flat arrays in a form that a compiler can vectorise."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -11,8 +11,8 @@ import warp as wp
 def build(dtype: Any) -> SimpleNamespace:
     """Element access for contiguous arrays of one scalar type.
 
-    Warp's own indexing takes any stride and counts negative indices from the end, so that a compiler cannot see
-    that neighbours lie side by side. Bounds are checked in Warp's debug mode, as in Warp's own.
+    Warp's own indexing takes any stride and counts negative indices from the end. So a compiler cannot see that
+    neighbours are adjacent in memory. Warp's debug mode checks the bounds here, as it does for its own indexing.
     """
 
     @wp.func_native("""

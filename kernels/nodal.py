@@ -1,8 +1,8 @@
 """The paper's literal scheme (its eqs. 4 to 6): points, nearest nodes, β once per node and step.
 
-Kept because the published rows came from it. It has no limit in the time step or the grid (docs/model.md §4),
-has no condition on the direction of motion. Its forces may feed energy into the core: what a step would add beyond
-the kinetic energy that was there, the kick withholds (rigid_body.restraint), as in every scheme here.
+The published rows came from this scheme. It has no limit in the time step or the grid (docs/model.md §4), and it has no
+condition on the direction of motion. Its forces can push energy into the core. Therefore the kick is reduced where it
+would raise the kinetic energy (rigid_body.restraint), as in every scheme here.
 """
 
 from functools import cache
@@ -101,7 +101,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def degrade(surface: Surface, fields: Fields, window: Window, found: Footprint, pose: Pose, factor: real):
-        """Multiply every node that was touched in this step by β, once however many points share it (eq. 6)."""
+        """Multiply every node that was touched in this step by β, once even if several points touched it (eq. 6)."""
         for index in range(found.first_ring, found.last_ring + 1):
             ring = surfaces.ring_at(surface, pose, index)
             for j in range(surface.around):

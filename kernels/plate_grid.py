@@ -1,7 +1,7 @@
 """The plate: the shared pristine pattern, and each shot's own window of it.
 
-The pattern is a periodic tile of material fractions, so fine that the cell under a point is enough. A window is the
-part of the plate that one core can reach, a grid about the hit.
+The pattern is a periodic tile of material fractions. The tile is so fine that a point reads only the cell under it. A
+window is the part of the plate that one core can reach, as a grid about the hit.
 """
 
 from functools import cache
@@ -20,10 +20,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Plate:
-        """Pristine plate: one period [m] as a tile [tile_y × tile_z] of material fractions, corner at the origin; how
-        far at least each of its cells is from any material [m]; the half extents [m] of a finite plate (infinite if
-        there is no rim); the spacing [m] of the exposure's grid, and half of the tent filter on it, which reaches at
-        least one node far."""
+        """The pristine plate.
+
+        `tile` holds the material fractions of one period, shape [tile_y × tile_z]; its corner is at the origin. `clear`
+        is a lower bound of each cell's distance from material [m]. `period_y` and `period_z` are the period [m].
+        `half_y` and `half_z` are half the sides of a finite plate [m], infinite if there is no rim. `spacing` is that
+        of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach in nodes,
+        at least 1.
+        """
 
         tile: wp.array(dtype=real)
         clear: wp.array(dtype=real)
@@ -39,10 +43,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Window:
-        """One slot's part of the fields, and how to find the tile. The hit is the node of index `home`: a shot
-        computes the same bits in a window of any size. The cell of the tile that holds the hit, the hit's place in it,
-        and cells per metre; the thickness of the plate and, seen from the hit, its rims [m]. (y0, z0): where the
-        literal scheme has its node `home` [m]."""
+        """One slot's part of the fields, and its place on the tile.
+
+        `first` is the index of the first node. `home` is that of the node at the hit, so a shot computes the same bits
+        in a window of any size. `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds
+        the hit, `tile_y` and `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the
+        tile per metre. `thickness` is that of the plate; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative
+        to the hit [m]. (y0, z0) is the place of the node `home` in the literal scheme [m].
+        """
 
         first: wp.int32
         home: wp.int32
@@ -90,7 +98,7 @@ def build(variant: Variant) -> SimpleNamespace:
         hit_y: wp.float64,
         hit_z: wp.float64,
     ):
-        """The window about a hit, found in float64, so that a hit far from the origin loses nothing."""
+        """The window about a hit. It is computed in float64, so a hit far from the origin loses no accuracy."""
         window = Window()
         window.first = slot * cells_y * cells_z
         window.home = window.first + (cells_y // 2) * cells_z + cells_z // 2
@@ -98,8 +106,8 @@ def build(variant: Variant) -> SimpleNamespace:
         window.cells_z = cells_z
         window.thickness = thickness
         window.per_cell = one / plate.spacing
-        # Whole cells of the tile and the rest apart, so that hits a lattice vector of whole cells apart compute the
-        # same bits.
+        # Whole cells of the tile are separate from the rest. So two hits that differ by a lattice vector of whole cells
+        # compute the same bits.
         across = hit_y * wp.float64(plate.tile_y) / plate.period_y
         along = hit_z * wp.float64(plate.tile_z) / plate.period_z
         window.row = wp.int32(wp.floor(across)) % plate.tile_y
@@ -116,7 +124,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def within(place: real, period: wp.int32):
-        """A whole number, of a few periods, brought into 0 … period − 1; a CPU vectorises floor, but no remainder."""
+        """Bring a whole number, at most a few periods away, into 0 … period − 1. A compiler vectorises floor, but no
+        remainder."""
         return wp.int32(place - real(period) * wp.floor((place + half) / real(period)))
 
     @wp.func
@@ -126,7 +135,7 @@ def build(variant: Variant) -> SimpleNamespace:
         column = real(window.column) + wp.floor(window.tile_z + z * window.per_column)
         return within(row, plate.tile_y) * plate.tile_z + within(column, plate.tile_z)
 
-    # Native, because only of pointers that do not alias does a CPU read so many cells at a time.
+    # Native, because a compiler reads several cells at once only if the pointers do not alias.
     @wp.func_native("""
     assert(start >= 0 && start + count <= area.shape[0]);
     const auto scale = [count](auto* __restrict__ area, auto* __restrict__ slope, auto* __restrict__ gain,
@@ -153,17 +162,17 @@ def build(variant: Variant) -> SimpleNamespace:
         start: wp.int32,
         count: wp.int32,
     ) -> real:
-        """Scale three lists by tile[at], from `start` on, and return the sum of what is left of the first."""
+        """Multiply three lists by tile[at], from `start` on; return the new sum of the first one."""
         ...
 
     @wp.func
     def clearance(plate: Plate, window: Window):
-        """How far at least the hit is from any material [m]."""
+        """A lower bound of the hit's distance from material [m]."""
         return plate.clear[tile_at(plate, window, zero, zero)]
 
     @wp.func
     def on_plate(plate: Plate, window: Window, y: real, z: real):
-        """Share of half a grid cell about a point that lies on a finite plate."""
+        """Share of half a grid cell about a point that belongs to a finite plate."""
         width = half * plate.spacing
         inside_y = wp.min(y - window.low_y, window.high_y - y) / width + half
         inside_z = wp.min(z - window.low_z, window.high_z - z) / width + half

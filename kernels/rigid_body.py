@@ -1,7 +1,7 @@
 """Motion of a rigid body of revolution (docs/model.md §5; the paper's eqs. 1 and 3).
 
-The state carries the angular momentum in the plate frame rather than the angular velocity: between contacts
-it is constant, so a drift is exact for any time step and the rotational energy cannot creep.
+The state holds the angular momentum in the plate frame, not the angular velocity. The angular momentum is constant
+between contacts. So a drift is exact for any time step, and the rotational energy stays exact.
 """
 
 import math
@@ -44,8 +44,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """Force [N], moment about the centre of mass [N m], and their resistance to a change of velocity; along the
         body axes.
 
-        The damping blocks are −½ ∂(force, moment)/∂(velocity, angular velocity); `damped` tells whether they
-        are not all zero, and `touching` whether any surface touched material at all.
+        The damping blocks are −½ ∂(force, moment)/∂(velocity, angular velocity). `damped` means that at least one of
+        them is not zero, `touching` that at least one patch touches material.
         """
 
         force: vec3
@@ -58,7 +58,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Change:
-        """What a step changes of velocity [m/s] and angular velocity [rad/s], along the body axes."""
+        """Change of velocity [m/s] and angular velocity [rad/s] in a step, along the body axes."""
 
         velocity: vec3
         omega: vec3
@@ -90,7 +90,8 @@ def build(variant: Variant) -> SimpleNamespace:
     def rotation(vector: vec3):
         """Turn by a rotation vector [rad]."""
         square = quarter * wp.dot(vector, vector)  # of half the angle
-        # Series, to the last bit of float64 for the turn of a step: a sine is a call, and takes ten times as long.
+        # The series is exact to the last bit of float64 for the turn of one step. A sine is a call and takes ten times
+        # as long.
         scale = half - half * square / six * (one - square / twenty * (one - square / forty_two))
         cosine = one - half * square * (one - square / twelve * (one - square / thirty))
         if square > small_square:
@@ -161,10 +162,11 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def restraint(body: Body, axis: vec3, state: State, dv: vec3, dw: vec3):
-        """Share of a change of velocities, in the plate frame, to apply, so that it never raises the kinetic energy.
+        """Share of a change of velocities, in the plate frame, that can be applied without a rise of the kinetic
+        energy.
 
-        Every surface element takes power from the core, so the continuous energy cannot grow; where a finite
-        step would overshoot (a core coming to rest), it ends at the least energy along its direction.
+        Every surface element takes power from the core, so the energy cannot grow in continuous time. A finite step may
+        overshoot where a core comes to rest. Then the step ends at the least energy along its direction.
         """
         omega = angular_velocity(body, axis, state.angular_momentum)
         dl = angular_momentum(body, axis, dw)
@@ -177,7 +179,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def restraint_of(body: Body, state: State, dv: vec3, dw: vec3):
-        """The restraint of a change of velocities along the body axes."""
+        """The restraint for a change of velocities along the body axes."""
         dv_plate, dw_plate = wp.quat_rotate(state.attitude, dv), wp.quat_rotate(state.attitude, dw)
         return restraint(body, axis_of(state.attitude), state, dv_plate, dw_plate)
 
@@ -197,7 +199,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def change_between(body: Body, before: State, after: State):
-        """The change that a kick has made."""
+        """The change of the velocities by a kick."""
         momentum = after.angular_momentum - before.angular_momentum
         change = Change()
         change.velocity = wp.quat_rotate_inv(before.attitude, after.velocity - before.velocity)
@@ -213,7 +215,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def mean_load(body: Body, state: State, load: Load, dt: real):
-        """The force and moment, in the plate frame, that a kick applies on average over its step."""
+        """The mean force and moment of a kick over its step, in the plate frame."""
         dv, dw, _, _ = velocity_change(body, load, dt)
         share = restraint_of(body, state, dv, dw)
         spin = body.inertia_axial / body.inertia_transverse * dw[0]

@@ -1,6 +1,6 @@
-"""What hits what: the conditions of every shot, and the scene's own values where they do not differ.
+"""The conditions of every shot.
 
-Every array has one value for all shots or one per shot, and one line reads both.
+Every array has one value for all shots or one value per shot. The same line reads both.
 """
 
 from functools import cache
@@ -25,8 +25,8 @@ def build(variant: Variant) -> SimpleNamespace:
     class Shots:
         """Arrays of shape [1] or [shots], SI and radians.
 
-        Where the core hits and how it arrives (docs/model.md §1); the thickness of the plate [m], the members of Body
-        and Law, and those of Pace that follow from them.
+        Hit point, velocity and attitude on impact (docs/model.md §1); the thickness of the plate [m]; the members of
+        Body and Law, and the members of Pace that follow from them.
         """
 
         hit_y: wp.array(dtype=wp.float64)
@@ -54,11 +54,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Pace:
-        """The time step [s], or if that is 0 the way per step [m] at impact velocity, of which `way_along` at most may
-        lie in the plane of the plate and which takes `longest_time` [s] at most, if a quarter of the way is enough for
-        both; the most that any step may take; and the way [m], at impact velocity, after which a shot that has not
-        ended is given up. `rows` of the trace belong to each shot; none if it is 0: not a build of its own, so that a
-        shot computes the same bits with a trace and without."""
+        """What sets the length of a step.
+
+        `time_step` [s] is constant. If it is 0, a step covers the distance `way` [m] at impact velocity. Two bounds
+        shorten this distance, to a quarter at most: `way_along` [m] in the plane of the plate, and `longest_time` [s].
+        No step covers more than `longest_step` [m]. A shot is given up if it has not ended after `longest_way` [m] at
+        impact velocity. Each shot has `rows` rows of the trace; 0 means no trace. The trace has no build of its own, so
+        a shot computes the same bits with and without it.
+        """
 
         time_step: wp.float64
         way: wp.float64

@@ -21,7 +21,7 @@ class Status(IntEnum):
 
     @property
     def failed(self) -> bool:
-        """Whether the computation, rather than the core, came to its end."""
+        """Whether the computation failed, so that the end of the shot is unknown."""
         return self >= Status.UNFINISHED
 
 
@@ -32,5 +32,5 @@ _SENTENCES = {
     Status.MISSED: "The core passed without touching material.",
     Status.UNFINISHED: "The core was still in the plate when the step limit was reached.",
     Status.LEFT_WINDOW: "The core left the largest window of the plate that memory allows.",
-    Status.NOT_FINITE: "The motion stopped being finite.",
+    Status.NOT_FINITE: "The motion became infinite or undefined.",
 }

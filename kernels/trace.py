@@ -17,7 +17,7 @@ COLUMNS = {
     "force": slice(14, 17),
     "moment": slice(17, 20),
 }
-"""Where a row holds what: the attitude as (x, y, z, w), force and moment as means over the step; SI."""
+"""Columns of a row, SI. The attitude is (x, y, z, w); force and moment are means over the step."""
 WIDTH = COLUMNS["moment"].stop
 """Numbers per row."""
 
@@ -38,7 +38,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def record(trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, force: vec3, moment: vec3):
-        """One traced step: the state after its kick, and the load that made it."""
+        """Write the row of one step: the state after its kick, and the load of the kick."""
         trace[row, time_at] = time
         write_vec3(trace, row, position_at, state.position)
         for k in range(4):

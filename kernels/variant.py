@@ -11,12 +11,12 @@ CPU_FLAGS = (
     "-march=native -mllvm=-inline-threshold=9000 -mstackrealign "
     "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )
-"""What lets a CPU sum and divide in vector registers; NaN and infinity keep their meaning."""
+"""Flags that let the compiler vectorise sums and divisions; NaN and infinity keep their meaning."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One specialisation of the device code; what a scene leaves out is not compiled.
+    """One specialisation of the device code; physics that a scene does not use is not compiled.
 
     Attributes:
         double: float64 instead of float32.
@@ -63,7 +63,8 @@ class Variant:
         return "_".join(["variant", *(field.name for field in fields(self) if getattr(self, field.name))])
 
     def kernel(self, function: Callable[..., None]) -> wp.Kernel:
-        """The launchable kernel of a device function, in a module of its own: what is not launched is not compiled."""
+        """The launchable kernel of a device function. It has its own module, so that only launched kernels are
+        compiled."""
         module = wp.get_module(f"{function.__module__}.{self.name}")
         module.options["enable_backward"] = False
         module.options["cpu_compiler_flags"] = CPU_FLAGS

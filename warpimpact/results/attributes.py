@@ -1,4 +1,4 @@
-"""Names of the global attributes of the Datasets: what is told of a result as a whole."""
+"""Names of the global attributes of the Datasets, which describe a result as a whole."""
 
 from importlib.metadata import version
 
@@ -7,7 +7,7 @@ TITLE = "title"
 HISTORY = "history"
 REFERENCES = "references"
 
-# The campaign and what made a result of it
+# The campaign, and how it was computed
 CAMPAIGN = "campaign"
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
@@ -30,7 +30,7 @@ COUNT = "count"
 REPLICATES = "replicates"
 SYMMETRIES = "symmetries"
 IMAGES = "images"
-"""How many hits in a row are images of each other; like the other two only of a map with `hits.irreducible`."""
+"""How many hits in a row are images of each other. SYMMETRIES, IMAGES and COMPUTED_HITS need `hits.irreducible`."""
 COMPUTED_HITS = "computed_hits"
 
 # Core, plate and output

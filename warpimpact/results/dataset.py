@@ -1,7 +1,8 @@
-"""The Datasets of a hit map, a history and a study: how they are gathered and asked; variables.py tells what they hold.
+"""The Datasets of a hit map, a history and a study: functions that build and read them. variables.py says what they
+hold.
 
-Inside the package everything is SI and radians; `to_dataset` is where angles become degrees. The Dataset
-follows the CF conventions and opens with plain ``xarray.open_dataset``.
+Inside the package everything is in SI and radians; angles become degrees here. The Dataset follows the CF conventions
+and opens with plain ``xarray.open_dataset``.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ _ATTRIBUTES = {
     attr.REFERENCES: "Numerical and experimental investigation of asymmetrical contact between a steel plate "
     "and armour-piercing projectiles",
     "comment": "Plate frame, right-handed: x along the plate normal in the direction of fire, x = 0 at the "
-    "front face; y and z in the plate. What does not exist is NaN.",
+    "front face; y and z in the plate. NaN marks a value that does not exist.",
 }
 
 _STATIONS, _SECTION_POINTS = 101, 1601
@@ -49,12 +50,12 @@ def to_dataset(
     """Gather shots and outcomes into the Dataset of the hit map.
 
     Args:
-        scene: What was shot at what; it records m stand-offs.
+        scene: The scene, which records m stand-offs.
         shots: n shots, SI and radians.
-        outcomes: Their outcomes, of shape (n,) or (n, m), SI and radians; NaN where a quantity does not exist.
+        outcomes: Their outcomes, of shape (n,) or (n, m), SI and radians; NaN where there is no value.
         period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
-        estimates: Of the errors of a run to a tolerance, SI and radians.
+        estimates: Estimated errors of a run to a tolerance, SI and radians.
     """
     coordinates: dict[str, Any] = {
         v.HIT_Y: shots.hit_y,
@@ -81,7 +82,8 @@ def to_dataset(
 
 
 def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
-    """What the solid plate of equal areal density makes of the first shots, to stand beside the Dataset of all.
+    """Outcomes of the first shots against the solid plate of equal areal density, to be merged with the Dataset of all
+    shots.
 
     Args:
         outcomes: SI and radians.
@@ -91,9 +93,9 @@ def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
 
 
 def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
-    """Shots and outcomes of the solid plate under the names of the hits' own, along "hit"; None if there are none.
+    """Shots and outcomes of the solid plate, with the names of a hit map and along "hit"; None if there are none.
 
-    A plate that is solid is its own reference.
+    A solid plate is its own reference.
     """
     if dataset.attrs.get(attr.OPEN_AREA) == 0.0:
         return dataset
@@ -123,14 +125,14 @@ def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> x
 def history_dataset(
     scene: Scene, hit: xarray.Dataset, replay: Replay, *, attributes: Mapping[str, Any]
 ) -> xarray.Dataset:
-    """Gather a replayed shot into the Dataset of its history, which tells enough of core and plate to draw them.
+    """Gather a replayed shot into the Dataset of its history, which has enough data of core and plate to draw them.
 
     Args:
         scene: what was shot at what.
-        hit: the shot and its outcome as `to_dataset` gives them, one hit of it selected; they stay as scalars,
-            the angular velocity at the end as `residual_angular_velocity`.
+        hit: one hit of a Dataset of `to_dataset`. Its values stay as scalars; its angular velocity becomes
+            `residual_angular_velocity`.
         replay: the shot's history.
-        attributes: global attributes over those of `hit`.
+        attributes: global attributes, which override those of `hit`.
     """
     core, plate = scene.core, scene.target.plate
     hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
@@ -201,7 +203,7 @@ def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
 
 
 def images(dataset: xarray.Dataset) -> int:
-    """How many hits in a row are images of each other; 1 but for a map with `hits.irreducible`."""
+    """How many hits in a row are images of each other; 1 without `hits.irreducible`."""
     told = dataset.attrs
     if attr.IMAGES in told or attr.SYMMETRIES not in told:
         return int(told.get(attr.IMAGES, 1))

@@ -1,4 +1,5 @@
-"""Ctrl-C and the SIGTERM of a batch system: they stop alike, and wait for what must not be broken off."""
+"""Ctrl-C and the SIGTERM of a batch system: both stop in the same way, and both wait for the end of a protected
+block."""
 
 import signal
 import threading
@@ -8,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """A batch system ends what has used up its time by SIGTERM: that stops as cleanly as Ctrl-C."""
+    """Treat SIGTERM like Ctrl-C. A batch system sends it to a job whose time is used up."""
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -22,12 +23,12 @@ def terminated_as_interrupted() -> Iterator[None]:
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold signals back until the end of the block, and act on them then.
+    """Hold signals back until the end of the block.
 
-    An exception between any two instructions, as a signal raises it, leaves a lock of xarray's taken, and closing the
-    file waits for that lock for ever.
+    A signal raises an exception between any two instructions. A lock of xarray may then stay locked, and the file
+    cannot be closed: closing waits for this lock forever.
     """
-    if threading.current_thread() is not threading.main_thread():  # which no signal reaches
+    if threading.current_thread() is not threading.main_thread():  # signals reach the main thread only
         yield
         return
     caught: list[int] = []

@@ -1,4 +1,4 @@
-"""Measures: the numbers of a Dataset that a person can ask for (means, quantiles, probabilities) and their tallies."""
+"""Measures: numbers of a Dataset that a user can ask for (means, quantiles, probabilities), and their tallies."""
 
 from __future__ import annotations
 
@@ -49,14 +49,15 @@ class Measure:
     """One number of a result.
 
     Attributes:
-        text: as it was asked for.
-        kind: "mean", "quantile", "probability" (that a variable lies beyond a limit) or "share" (of a status).
+        text: as the user wrote it.
+        kind: "mean", "quantile", "probability" (of a variable beyond a limit) or "share" (of a status).
         variable: of the Dataset, or the status of a share.
-        standoff: distance behind the rear face [m] for a variable that has one.
-        share: of a quantile.
-        above, limit: of a probability, the limit in the units of the Dataset.
+        standoff: distance behind the rear face [m], if the variable depends on it.
+        share: share of the values below a quantile.
+        above, limit: side and limit of a probability, in the units of the Dataset.
 
-    A share counts all shots but those whose computation failed; the others count the cores that passed the plate.
+    A share counts all shots except those whose computation failed. The other kinds count the cores that passed the
+    plate.
     """
 
     text: str
@@ -117,7 +118,7 @@ class Measure:
         return "1" if self.is_binary else _VARIABLES[self.variable].units
 
     def in_units(self, value: object) -> float:
-        """SI value of what a person wrote for a difference of this measure."""
+        """SI value of a difference of this measure that a user wrote."""
         return quantity(_KINDS[self.units])(value)
 
     def shown(self, value: float) -> float:
@@ -125,7 +126,7 @@ class Measure:
         return _shown(self.units, value)
 
     def values(self, dataset: xarray.Dataset) -> Array:
-        """What every shot says, NaN where it does not count; shape [hits]."""
+        """The number of every shot, shape [hits]; NaN for a shot that does not count."""
         if self.kind == "share":
             return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
         column = dataset[self.variable]
@@ -145,7 +146,7 @@ def _shown(units: str, value: float) -> float:
 class Tally:
     """Gathers a measure over shots, in the order of their numbers.
 
-    Means and probabilities take a few numbers whatever the count; a quantile keeps one number per shot.
+    Means and probabilities keep a few numbers in all; a quantile keeps one number per shot.
 
     Args:
         dealt: `replicates`, `images` and `confidence` as in `Dealt`.
@@ -156,14 +157,14 @@ class Tally:
         self.measure, self._dealt = measure, Dealt(kind, share=measure.share, **dealt)
 
     def add(self, dataset: xarray.Dataset) -> None:
-        """Take in the shots that follow."""
+        """Add the next shots."""
         self._dealt.add(self.measure.values(dataset))
 
     def estimate(self) -> Estimate:
-        """What the shots so far say."""
+        """The estimate from the shots so far."""
         return self._dealt.estimate()
 
 
 def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
-    """How the shots of a result were dealt out, for `Dealt`."""
+    """Arguments of `Dealt` that fit the sampling of a result."""
     return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": images(dataset)}

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
 
 
 class Variable(str):
-    """Name of a variable, which is its key in a Dataset, with what the Dataset says about it.
+    """Name of a variable, which is its key in a Dataset, with its metadata.
 
     Attributes:
         dims: names of its dimensions.
         units: as CF writes them; "degree" where the package itself computes in radians.
         long_name: what it is, for people.
         flags: the codes that it may hold, if it holds codes (CF: flag_values, flag_meanings).
-        field: of shots, outcomes or history that it is gathered from.
-        shown_by: commands that show it by themselves; others show it on request, or every variable alike.
+        field: name of the field of shots, outcomes or history that it comes from.
+        shown_by: commands that show it by default. Other commands show it on request, or they show all variables.
     """
 
     dims: tuple[str, ...]
@@ -50,7 +50,7 @@ class Variable(str):
         return self
 
     def __reduce__(self) -> tuple[type[str], tuple[str]]:
-        """A copy in another process is the plain name, which finds the same entries."""
+        """A copy in another process is the plain name. It finds the same entries."""
         return str, (str(self),)
 
     @property
@@ -64,7 +64,7 @@ class Variable(str):
 
     @property
     def is_number_of_hit(self) -> bool:
-        """Whether it has one number per hit, or one per hit and stand-off, which maps and measures can take."""
+        """Whether it has one number per hit, or one per hit and stand-off. Maps and measures need this."""
         return self.flags is None and self.dims in {("hit",), ("hit", "standoff")}
 
 
@@ -79,7 +79,7 @@ AXIS = Variable("axis", ("axis",), "1", "axis of the plate frame")
 
 COORDINATES = (HIT_Y, HIT_Z, STANDOFF, AXIS)
 
-# --- How the core came ---
+# --- Impact ---
 IMPACT_VELOCITY = Variable("impact_velocity", _HIT, "m s-1", "impact velocity", field="velocity")
 OBLIQUITY = Variable("obliquity", _HIT, "degree", "angle between line of fire and plate normal")
 AZIMUTH = Variable("azimuth", _HIT, "degree", "direction of the obliquity, from +y towards +z")
@@ -93,7 +93,7 @@ SPIN = Variable("spin", _HIT, "rad s-1", "spin of the core about its axis on imp
 
 SHOT_VARIABLES = (IMPACT_VELOCITY, OBLIQUITY, AZIMUTH, IMPACT_PITCH, IMPACT_YAW, SPIN)
 
-# --- What else may differ from shot to shot ---
+# --- Plate and core, where they differ from shot to shot ---
 RESISTANCE = Variable("resistance", _HIT, "Pa", "resistance of the plate")
 SHEAR_COEFFICIENT = Variable("shear_coefficient", _HIT, "1", "friction per normal stress")
 DEGRADATION = Variable("degradation", _HIT, "1", "share of the resistance left after an interval of contact")
@@ -101,7 +101,7 @@ THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
 MASS = Variable("mass", _HIT, "kg", "mass of the core")
 
 SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS)
-"""Only of a campaign in which they differ from shot to shot."""
+"""Present only in a campaign in which they differ from shot to shot."""
 
 # --- How the shot ended ---
 STATUS = Variable("status", _HIT, "1", "how the shot ended", flags=Status)
@@ -130,7 +130,7 @@ OUTCOME_VARIABLES = (
 
 
 def _solid(variable: Variable) -> Variable:
-    """The same of the solid plate of equal areal density."""
+    """The same variable for the solid plate of equal areal density."""
     return Variable(
         f"solid_{variable}",
         tuple("solid_hit" if dim == "hit" else dim for dim in variable.dims),
@@ -141,9 +141,9 @@ def _solid(variable: Variable) -> Variable:
 
 
 SOLID_VARIABLES = {_solid(variable): variable for variable in (STATUS, RESIDUAL_VELOCITY, TILT)}
-"""What the solid plate of equal areal density makes of the first shots, and the variable of the hits that each goes
-with; of the first shot alone where no two differ but in where they hit. Only of a perforated plate, where
-`output.solid_reference` asks for it."""
+"""Outcomes of the first shots against the solid plate of equal areal density, each with the variable of the hits that
+it corresponds to. There is one shot if the shots differ only in their hit points. Present only for a perforated plate
+and with `output.solid_reference`."""
 
 LARGEST_BENDING_MOMENT = Variable(
     "largest_bending_moment",
@@ -159,7 +159,7 @@ BENDING_STRESS = Variable(
 BENDING_STRESS_SECTION = Variable("bending_stress_section", _HIT, "m", "distance of its section from the nose")
 
 BENDING_VARIABLES = (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION)
-"""Only of a campaign with output.bending."""
+"""Present only with `output.bending`."""
 
 RESIDUAL_VELOCITY_ERROR = Variable("residual_velocity_error", _HIT, "m s-1", "estimated error of the residual velocity")
 TILT_ERROR = Variable("tilt_error", _AT_STANDOFF, "degree", "estimated error of the tilt")
@@ -167,7 +167,7 @@ CONVERGED = Variable("converged", _HIT, "1", "whether the estimated errors meet 
 LEVEL = Variable("level", _HIT, "1", "level of resolution on which the hit was computed")
 
 ESTIMATE_VARIABLES = (RESIDUAL_VELOCITY_ERROR, TILT_ERROR, CONVERGED, LEVEL)
-"""Only of a run to a tolerance."""
+"""Present only in a run to a tolerance."""
 
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
@@ -175,9 +175,9 @@ OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit c
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *OUTLINE_VARIABLES)
-"""Of every hit map."""
+"""Present in every hit map."""
 HIT_NUMBERS = tuple(v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit)
-"""What shots and their outcomes have as one number per hit, or one per hit and stand-off."""
+"""Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
 # --- History of one hit ---
 TIME = Variable("time", ("time",), "s", "time since the first touch of the front face")
@@ -231,7 +231,7 @@ HISTORY_VARIABLES = (
     SOLID_ALONG_Z,
 )
 RESIDUAL_ANGULAR_VELOCITY = "residual_angular_velocity"
-"""The name in a history of the outcome's angular velocity, whose own name is that of the motion."""
+"""Name of the outcome's angular velocity in a history. Its own name belongs to the motion there."""
 
 # By the axis y or z of the plate frame.
 HIT_POINT = {"y": HIT_Y, "z": HIT_Z}
@@ -239,7 +239,7 @@ OUTLINE = {"y": OUTLINE_Y, "z": OUTLINE_Z}
 CELL = {"y": CELL_Y, "z": CELL_Z}
 SOLID_ALONG = {"y": SOLID_ALONG_Y, "z": SOLID_ALONG_Z}
 
-# --- Study of speed and accuracy; some names are those of a hit map, with a meaning of their own ---
+# --- Study of speed and accuracy; some names also occur in a hit map, with another meaning ---
 SETTING = Variable("setting", ("setting",), "1", "numerics under study")
 QUANTILE = Variable("quantile", ("quantile",), "1", "share of the hits with at most this error")
 STUDY_LEVEL = Variable("level", ("level",), "1", "level of refinement behind the converged answer")
@@ -253,7 +253,7 @@ PATCHES_AROUND = Variable("patches_around", _SETTING, "1", "surface patches arou
 GRID_SPACING = Variable("grid_spacing", _SETTING, "m", "spacing of the plate grid")
 TIME_STEP = Variable("time_step", _SETTING, "s", "time step at impact velocity")
 HITS_PER_SECOND = Variable("hits_per_second", _SETTING, "s-1", "hits computed per second")
-OTHER_STATUS = Variable("other_status", _SETTING, "1", "hits that end otherwise than the converged answer")
+OTHER_STATUS = Variable("other_status", _SETTING, "1", "hits whose status differs from the converged answer")
 SETTLED = Variable("settled", _HIT, "1", "1 where the hit ends with the same status on all levels")
 CONVERGED_STATUS = Variable("status", _HIT, "1", "how the shot ended, converged", flags=Status)
 CONVERGED_VELOCITY = Variable("residual_velocity", _HIT, "m s-1", "residual velocity, converged")
@@ -265,7 +265,7 @@ ERRORS = {
     ),
     TILT: Variable("tilt_error", ("setting", "quantile", "standoff"), "degree", "error of the tilt"),
 }
-"""Of the two quantities of a study, as are the following."""
+"""By the two quantities of a study, as the following tables."""
 FRONTS = {
     RESIDUAL_VELOCITY: Variable(
         "residual_velocity_front", _SETTING, "1", "1 where no faster setting has a smaller 90 % error"
@@ -284,8 +284,8 @@ CHANGES = {
     ),
 }
 UNCERTAINTIES = {
-    RESIDUAL_VELOCITY: Variable("residual_velocity_uncertainty", _HIT, "m s-1", "change of it on the last level"),
-    TILT: Variable("tilt_uncertainty", _AT_STANDOFF, "degree", "change of it on the last level"),
+    RESIDUAL_VELOCITY: Variable("residual_velocity_uncertainty", _HIT, "m s-1", "velocity change on the last level"),
+    TILT: Variable("tilt_uncertainty", _AT_STANDOFF, "degree", "tilt change on the last level"),
 }
 
 STUDY_VARIABLES = (
@@ -309,12 +309,12 @@ STUDY_VARIABLES = (
 
 
 def shown_by(command: str) -> tuple[Variable, ...]:
-    """The variables of a hit map that a command shows by itself."""
+    """The variables of a hit map that a command shows by default."""
     return tuple(variable for variable in HIT_NUMBERS if command in variable.shown_by)
 
 
 def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
-    """Names of the variables that say how the cores came and what they hit, but for where."""
+    """Names of the variables of the impact, and of plate and core where they differ; hit points are not included."""
     return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
 
 

@@ -20,13 +20,13 @@ _SILHOUETTE_STATIONS = 101  # likewise; chords lose 1e-4 of the area
 
 
 class MassProperties(NamedTuple):
-    """What the motion needs to know of a core.
+    """Properties of a core that its motion depends on.
 
     Attributes:
         mass: [kg]
         centre_of_mass: distance behind the nose tip [m].
         inertia_axial: about the axis [kg m²].
-        inertia_transverse: about any transverse line through the centre of mass [kg m²].
+        inertia_transverse: about any line across the axis through the centre of mass [kg m²].
     """
 
     mass: float
@@ -112,16 +112,16 @@ class Core(Model, ABC):
         return float(np.hypot(s - self.mass_properties.centre_of_mass, self.radius(s)).max())
 
     def presented_area(self, inclination: Array) -> Array:
-        """Area of the silhouette in the line of sight that the axis is inclined to [m²].
+        """Area of the silhouette along a line of sight [m²].
 
-        That of a convex body is half of ∮ |n·d| dS (Cauchy). Between stations the body is a frustum, whose normal makes
-        one angle with the axis; a hollow in the profile counts as filled, as far as a line across it reaches.
+        The silhouette of a convex body has the area ½ ∮ |n·d| dS (Cauchy). Between stations the body is a frustum, and
+        its normal makes one angle with the axis. The convex hull of the profile is used, so a hollow counts as filled.
 
         Args:
-            inclination: between axis and line of sight [rad]; nose or base first is the same.
+            inclination: angle between axis and line of sight [rad]; the view from the nose equals that from the base.
 
         Returns:
-            Of the same shape.
+            The area, of the same shape.
         """
         from scipy.spatial import ConvexHull  # half a second to import
 
@@ -133,7 +133,7 @@ class Core(Model, ABC):
         of_axial = np.abs(outwards * np.cos(inclination)[..., None])
         of_radial = np.abs(along * np.sin(inclination)[..., None])
         ratio = np.divide(of_axial, of_radial, out=np.ones_like(of_radial), where=of_radial > of_axial)
-        # Mean of |a + b cos φ| around the axis, and a where it has one sign.
+        # Mean of |a + b cos φ| around the axis; it is a where the sign does not change.
         mean = of_axial * (1.0 - 2.0 / np.pi * np.arccos(ratio)) + of_radial * 2.0 / np.pi * np.sqrt(1.0 - ratio**2)
         return np.asarray(0.5 * (area * mean).sum(axis=-1))
 
@@ -251,7 +251,7 @@ class ConeCore(_NosedCore):
 
 
 class ProfileCore(Core):
-    """Straight between tabulated stations `s` and radii `r` [m], from s = 0 at the nose to the base.
+    """Straight lines between tabulated stations `s` and radii `r` [m], from s = 0 at the nose to the base.
 
     Both may come from `file`, a CSV file with the header s,r in metres.
     """
@@ -278,7 +278,7 @@ class ProfileCore(Core):
     @model_validator(mode="after")
     def _is_a_profile(self) -> Self:
         if len(self.s) != len(self.r):
-            raise ValueError(f"got {len(self.s)} stations s and {len(self.r)} radii r, which must be pairs")
+            raise ValueError(f"got {len(self.s)} stations s and {len(self.r)} radii r, but each s needs one r")
         if self.s[0] != 0:
             raise ValueError(f"got s = {self.s[0]:g} m for the nose tip, but the first station must be 0")
         for row, (before, after) in enumerate(pairwise(self.s), start=2):

@@ -1,4 +1,4 @@
-"""What the models of a scene have in common."""
+"""The base class of the models of a scene."""
 
 from collections.abc import Mapping
 from copy import deepcopy
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 class Model(BaseModel):
-    """A validated, immutable value; a misspelt field is an error that says what may have been meant."""
+    """A validated, immutable value. A misspelt field is an error, and its message suggests the right name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -29,20 +29,21 @@ class Model(BaseModel):
         return values
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A copy with changes that is validated like any other value; what was computed of this one stays behind.
+        """A copy with changes. It is validated like any other value. Values that were computed from the original are
+        not copied.
 
         Args:
-            update: new values of fields, as the model takes them; file names count from the working directory.
-            deep: whether the values that stay are copied, too.
+            update: new values of fields, as the model takes them; file names are relative to the working directory.
+            deep: whether the unchanged values are copied, too.
 
         Raises:
-            ValidationError: a field is unknown, or the copy would be something that cannot be.
+            ValidationError: a field is unknown, or the copy is not valid.
         """
         kept = {name: value for name, value in self if name in self.model_fields_set}
         return type(self).model_validate((deepcopy(kept) if deep else kept) | dict(update or {}))
 
     def __eq__(self, other: object) -> bool:
-        """Whether all fields are the same, whatever was computed from them."""
+        """Whether all fields are equal; values computed from them do not count."""
         return isinstance(other, Model) and type(self) is type(other) and self._values == other._values
 
     @property

@@ -1,4 +1,4 @@
-"""How finely and by which scheme a shot is computed."""
+"""Resolution and scheme with which a shot is computed."""
 
 from typing import Annotated, Any, Literal, Self
 
@@ -9,7 +9,7 @@ from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime
 
 
 class _AsGiven(Model):
-    """A model in which giving a key says something: only what was given is written."""
+    """A model that writes only the keys that were given."""
 
     @model_serializer(mode="wrap")
     def _given(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
@@ -17,7 +17,7 @@ class _AsGiven(Model):
 
 
 class Tolerance(_AsGiven):
-    """What an outcome may be off by; what is not given does not count.
+    """Largest error that an outcome may have; a quantity that is not given has no limit.
 
     Attributes:
         residual_velocity: [m/s].
@@ -35,18 +35,19 @@ class Tolerance(_AsGiven):
 
 
 class Numerics(_AsGiven):
-    """A fidelity, and single settings that go before it; what is None follows from fidelity and scheme.
+    """A fidelity, and single settings that override it. A setting that is None follows from fidelity and scheme.
 
     Attributes:
         fidelity: "draft", "standard" or "reference". A campaign chooses the resolution so that 90 % of its hits are
             within 5 m/s and 5°, 1 m/s and 1°, or 0.2 m/s and 0.2°. A single setting ends that promise.
         scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
         time_step: [s].
-        patches_axial, patches_around: surface patches per length of the core (the consistent scheme takes shorter ones
-            behind the widest station), and around it; a multiple of 4 around it makes mirrored shots mirror exactly.
+        patches_axial, patches_around: surface patches per length of the core and around it. The consistent scheme takes
+            shorter patches behind the widest station. With a multiple of 4 around the core, mirrored shots have exactly
+            mirrored outcomes.
         grid_spacing: spacing of the plate grid [m].
         precision: of the arithmetic.
-        tolerance: instead of a fidelity: each hit is refined until its estimated error meets it.
+        tolerance: replaces the fidelity: each hit is refined until its estimated error is within the tolerance.
     """
 
     fidelity: Literal["draft", "standard", "reference"] = "standard"
@@ -69,5 +70,5 @@ class Numerics(_AsGiven):
     def _tolerance_chooses(self) -> Self:
         chosen = self.model_fields_set - {"tolerance", "precision"}
         if self.tolerance is not None and chosen:
-            raise ValueError(f"got {min(chosen)} beside tolerance, which chooses the resolution itself")
+            raise ValueError(f"got {min(chosen)} beside tolerance, but a tolerance sets the resolution itself")
         return self

@@ -21,23 +21,23 @@ INTERVAL = 1.0e-6
 
 
 class Plate(Model):
-    """An unbounded, or with `size` a rectangular, perforated plate.
+    """A perforated plate. It is unbounded, or rectangular if `size` is given.
 
     Attributes:
         thickness: h [m].
-        resistance: Y, the stress that the material puts against the core [Pa].
+        resistance: Y, the stress of the material against the core [Pa].
         shear_coefficient: η, friction per normal stress.
-        degradation: β, what is left of Y after contact for `degradation_interval`, or over `degradation_distance`; 1
-            means all of it.
+        degradation: β, the share of Y that is left after contact for `degradation_interval` or over
+            `degradation_distance`; 1 means that Y does not fall.
         degradation_interval: Δt_β [s]; None where exposure counts the path.
-        degradation_distance: Δs_β, path of the centre of mass [m]; None where exposure counts the time. By path, the
-            law has no rate: what comes out depends on Y/v² alone.
+        degradation_distance: Δs_β, a path of the centre of mass [m]; None where exposure counts the time. By path, the
+            law has no rate: outcomes depend on Y/v² alone.
         degradation_length: ℓ, how far around a contact the material weakens [m].
         density: [kg/m³].
         size: extent along y and z of a finite plate centred on the origin [m]; None is unbounded.
-        margin: width of a band along the rim that has no holes [m]: those that would reach into it are left out whole;
-            None lets the rim cut holes.
-        pattern: shape and lattice of the holes; with a margin, those that are left on the plate.
+        margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out. None
+            lets the rim cut holes.
+        pattern: shape and lattice of the holes; with a margin, only the holes that are left on the plate.
     """
 
     thickness: PositiveLength
@@ -87,12 +87,12 @@ class Plate(Model):
 
     @property
     def open_area(self) -> float:
-        """Share of holes in a unit cell, or with a margin in all of the plate."""
+        """Share of holes in a unit cell; with a margin, in the whole plate."""
         return self.pattern.open_area
 
     @property
     def ligament(self) -> float:
-        """Smallest distance between two holes, or of a whole hole to the rim [m]; inf where there is none."""
+        """Smallest distance between two holes, or between a whole hole and the rim [m]; inf where there is none."""
         return self.pattern.ligament(self.size)
 
     def is_solid(self, y: Array, z: Array) -> BoolArray:
@@ -102,17 +102,17 @@ class Plate(Model):
 
     @property
     def sampled_cell(self) -> tuple[float, float]:
-        """Extent (y, z) of the cell that hits are spread over [m]: the unit cell, or a plate smaller than it."""
+        """Extent (y, z) of the cell over which hits are spread [m]: the unit cell, or a plate that is smaller."""
         cell_y, cell_z = self.pattern.unit_cell
         return (cell_y, cell_z) if self.size is None else (min(cell_y, self.size[0]), min(cell_z, self.size[1]))
 
     @property
     def solid(self) -> Self:
-        """The plate without holes of the same areal density, of the same material."""
+        """The plate without holes, of the same material and areal density."""
         thickness = self.thickness * (1.0 - self.open_area)
         return self.model_copy(update={"thickness": thickness, "margin": None, "pattern": NoPattern()})
 
     @property
     def areal_density(self) -> float:
-        """Mass per area of the perforated plate, of a unit cell or with a margin of all of it [kg/m²]."""
+        """Mass per area of the perforated plate [kg/m²]: in a unit cell, or with a margin in the whole plate."""
         return self.density * self.thickness * (1 - self.open_area)

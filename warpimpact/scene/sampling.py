@@ -1,4 +1,4 @@
-"""Sampling: shot k as a function of seed and k alone, whatever the batch, the thread, the worker or the order."""
+"""Sampling: shot k depends on the seed and on k alone, not on the batch, the thread, the worker or the order."""
 
 from __future__ import annotations
 
@@ -19,21 +19,20 @@ _HIT_COLUMNS = 2
 
 
 class Sampler:
-    """The shots of a campaign, any of them at any time.
+    """The shots of a campaign. Any part of them can be drawn at any time.
 
-    With hits.irreducible each shot is followed by its images under `symmetries_used`, the first of which it is itself;
-    but for where they hit, they are the same shot.
+    With hits.irreducible the images of a shot under `symmetries_used` follow each other. The first image is the shot
+    itself. Images differ only in their hit points.
 
     Args:
-        impact: velocity and attitude where nothing else is said.
-        hits: where, and how numbers are drawn.
-        plate: hits cover one unit cell of it, or all of it (`Hits.area`).
-        scatter: what differs from shot to shot.
+        impact: velocity and attitude, where hits and scatter do not give them.
+        hits: where the shots hit, and how numbers are drawn.
+        plate: hits cover one unit cell of it, or the whole plate (`Hits.area`).
+        scatter: distributions of quantities that differ from shot to shot.
         replicates: independent scramblings of a sobol sampling.
 
     Raises:
-        ValueError: hits.irreducible beside scatter that leaves no symmetry to all shots; hits on all of a plate without
-            end.
+        ValueError: hits.irreducible beside scatter that removes the symmetry; hits on the whole of an unbounded plate.
     """
 
     def __init__(
@@ -68,7 +67,7 @@ class Sampler:
         return replace(shots[np.repeat(np.arange(len(shots)), len(self._group))], hit_y=hit_y, hit_z=hit_z)
 
     def _originals(self, first: int, count: int) -> Shots:
-        """`count` shots that are no images of another, from number `first` of these on."""
+        """`count` shots that are not images of another shot, from number `first` of these on."""
         columns = [_HIT_COLUMNS + list(QUANTITIES).index(name) for name in self._scatter]
         hit_y, hit_z, *uniform = self._uniform([0, 1, *columns], first, count)
         values = {name: np.full(count, value) for name, value in self._impact}
@@ -100,7 +99,7 @@ class Sampler:
         return (cell // along_z + 0.5) / along_y, (cell % along_z + 0.5) / along_z
 
     def _net(self, first: int, count: int) -> Array:
-        """Sobol points, shape [count, dimensions], dealt out to the replicates in turn."""
+        """Sobol points, shape [count, dimensions]; the replicates give one point each in turn."""
         replicates, last = len(self._sobol), first + count
         points = np.empty((count, self._sobol[0].dimensions))
         for offset, sobol in enumerate(self._sobol):
@@ -111,16 +110,16 @@ class Sampler:
 
 
 def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None) -> Shots:
-    """All shots at once: at the hit points over one unit cell of the plate, or over all of it (`Hits.area`).
+    """All shots at once. Hit points cover one unit cell of the plate, or the whole plate (`Hits.area`).
 
-    With hits.irreducible a shot's images follow it. A campaign of any size takes them from a `Sampler` bit by bit.
+    With hits.irreducible a shot's images follow it. A `Sampler` gives the shots of a large campaign in parts.
     """
     sampler = Sampler(impact, hits, plate, scatter, hits.replicates or 1)
     return sampler.shots(0, len(sampler))
 
 
 class _Sobol:
-    """One scrambled Sobol sequence that stands where it was last read."""
+    """One scrambled Sobol sequence. It remembers how far it was read."""
 
     def __init__(self, dimensions: int, seed: int, replicate: int) -> None:
         self.dimensions, self._seed = dimensions, seed
@@ -132,11 +131,11 @@ class _Sobol:
         from scipy.stats.qmc import Sobol  # a second to import
 
         if self._engine is None or self._engine.num_generated > first:
-            seed = np.random.SeedSequence(self._seed, spawn_key=self._key)  # anew, as the engine counts what it spawns
+            seed = np.random.SeedSequence(self._seed, spawn_key=self._key)  # new: the engine counts what it spawns
             self._engine = Sobol(d=self.dimensions, rng=np.random.default_rng(seed))
         if first > self._engine.num_generated:
             self._engine.fast_forward(first - self._engine.num_generated)
-        # The sequence is balanced at powers of two; scipy wants the first points to be as many.
+        # The sequence is balanced at powers of two. scipy warns if the first draw has another number of points.
         drawn = 1 << (count - 1).bit_length() if first == 0 else count
         points: Array = self._engine.random(drawn)
         return points[:count]
@@ -154,6 +153,6 @@ def _stream(seed: int, column: int, first: int, count: int) -> Array:
 
 
 def _draws(generator: np.random.Philox, first: int, count: int) -> NDArray[np.float64]:
-    """Draws from number `first` on: Philox counts blocks of four, and can start at any."""
+    """Draws from number `first` on. Philox counts in blocks of four and can start at any block."""
     block, within = divmod(first, 4)
     return np.random.Generator(generator.advance(block)).random(within + count)[within:]

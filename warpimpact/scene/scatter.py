@@ -1,4 +1,4 @@
-"""Scatter: distributions of what differs from shot to shot, over scipy.stats."""
+"""Scatter: distributions of quantities that differ from shot to shot, from scipy.stats."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from .units import (
 )
 
 EDGE = 2.0**-31
-"""Uniform numbers are drawn between this and 1 less this, half a step of the Sobol sequence: a normal distribution
-ends at 6.2 standard deviations, so that what it can reach is known beforehand."""
+"""Uniform numbers lie between EDGE and 1 − EDGE. EDGE is half a step of the Sobol sequence. So a normal distribution
+ends at 6.2 standard deviations, and its range is known in advance."""
 
 
 class Quantity(NamedTuple):
-    """What may scatter: its table in a campaign file, and its type."""
+    """A quantity that may scatter: its table in a campaign file, and its type."""
 
     table: str
     type: Any
@@ -47,13 +47,14 @@ QUANTITIES = {
     "thickness": Quantity("plate", PositiveLength),
     "mass": Quantity("core", PositiveMass),
 }
-"""By name. The place in this table is the column of the random numbers: what else scatters changes no draw."""
+"""By name. The position in this table is the column of the random numbers. So the draws of a quantity do not depend on
+which other quantities scatter."""
 OF_THE_SCENE = tuple(name for name, quantity in QUANTITIES.items() if quantity.table != "impact")
-"""Quantities of plate and core, which shots may have of their own."""
+"""Quantities of plate and core that may differ from shot to shot."""
 
 
 def check_range(name: str, low: float, high: float) -> None:
-    """Refuse values of a quantity from `low` to `high` that leave what it may be.
+    """Refuse a range of a quantity, `low` to `high`, that contains values which are not allowed.
 
     Raises:
         ValueError: says what was reached and what is allowed.
@@ -81,7 +82,7 @@ class Distribution(Model, ABC):
 
 
 class Continuous(Distribution, ABC):
-    """One of those that scipy.stats has."""
+    """A distribution from scipy.stats."""
 
     def quantile(self, share: Array) -> Array:
         """As in `Distribution`."""
@@ -94,7 +95,7 @@ class Continuous(Distribution, ABC):
 
 
 class Bounded(Continuous, ABC):
-    """One that ends at low and high."""
+    """A distribution that ends at low and high."""
 
     low: _Finite
     high: _Finite
@@ -133,7 +134,7 @@ class TruncatedNormal(Bounded):
         return stats.truncnorm(*ends, loc=self.mean, scale=self.std)
 
     def quantile(self, share: Array) -> Array:
-        """As in `Distribution`; rounding does not pass the ends."""
+        """As in `Distribution`; clipped, because rounding may exceed the ends."""
         return np.clip(super().quantile(share), self.low, self.high)
 
 
@@ -168,7 +169,8 @@ class Triangular(Bounded):
 
 
 class Lognormal(Continuous):
-    """The logarithm is normal: half lie below the median; `sigma` is the standard deviation of the logarithm."""
+    """The logarithm is normal. Half of the values lie below `median`; `sigma` is the standard deviation of the
+    logarithm."""
 
     distribution: Literal["lognormal"] = "lognormal"
     median: _Positive
@@ -181,7 +183,8 @@ class Lognormal(Continuous):
 
 
 class Discrete(Distribution):
-    """One of some values, as often as the weights say; evenly without them."""
+    """One of several values. Weights are proportional to the probabilities; without weights all values are equally
+    probable."""
 
     distribution: Literal["discrete"] = "discrete"
     values: Annotated[tuple[_Finite, ...], Field(min_length=1)]
@@ -190,7 +193,9 @@ class Discrete(Distribution):
     @model_validator(mode="after")
     def _paired(self) -> Self:
         if self.weights is not None and len(self.weights) != len(self.values):
-            raise ValueError(f"got {len(self.values)} values and {len(self.weights)} weights, which must be pairs")
+            raise ValueError(
+                f"got {len(self.values)} values and {len(self.weights)} weights, but each value needs one weight"
+            )
         return self
 
     def quantile(self, share: Array) -> Array:
@@ -210,9 +215,9 @@ _PURE_NUMBERS = {"distribution", "sigma", "weights"}
 
 
 class Scatter(Model):
-    """What differs from shot to shot beside the hit point; what is None does not.
+    """Distributions of the quantities that differ from shot to shot, beside the hit point; None does not differ.
 
-    In a campaign file a distribution stands in the place of the value itself:
+    In a campaign file a distribution takes the place of the value:
     ``velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }``.
     """
 
@@ -231,7 +236,7 @@ class Scatter(Model):
     @field_validator("*", mode="before")
     @classmethod
     def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
-        """Parameters may carry units of their quantity."""
+        """Parameters may have units of their quantity."""
         if not isinstance(value, dict):
             return value
         assert info.field_name is not None
@@ -252,7 +257,7 @@ class Scatter(Model):
 
     @property
     def given(self) -> dict[str, Distribution]:
-        """The distributions that there are, by name."""
+        """The distributions that are given, by name."""
         return {name: value for name, value in self if value is not None}
 
 

@@ -1,4 +1,4 @@
-"""Scene: one core, what it is shot at, how the material resists, and what is recorded of a shot."""
+"""Scene: one core, its target, how the material resists, and what is recorded of a shot."""
 
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
@@ -34,7 +34,7 @@ class Record(Model):
         return standoffs
 
     def check_bending(self, core: Core) -> None:
-        """Refuse to record the bending moment of a core that has none.
+        """Refuse to record the bending moment of a core that overrides its mass properties.
 
         Raises:
             ValueError: names what the core overrides.
@@ -59,12 +59,12 @@ class Record(Model):
         if self.standoffs and self.standoffs[0] < needed:
             raise ValueError(
                 f"got {self._name}.standoffs of {self.standoffs[0]:g} m, "
-                f"but a core of this size is sure to be out of the plate only from {needed:.4g} m"
+                f"but a core of this size is certain to be out of the plate only from {needed:.4g} m"
             )
 
     @property
     def _name(self) -> str:
-        """What the field is called that holds it."""
+        """Name of the field that holds this record."""
         return type(self).__name__.lower()
 
 
@@ -72,18 +72,18 @@ class Target(Model):
     """What is shot at.
 
     Attributes:
-        plate: its front face lies in x = 0.
+        plate: the plate, with its front face at x = 0.
     """
 
     plate: Plate
 
 
 class Scene(Model):
-    """What is shot at what, and what is recorded; with `Shots` and numerics, all that outcomes depend on.
+    """What is shot at what, and what is recorded. Outcomes depend on the scene, the shots and the numerics only.
 
     Attributes:
         core: the rigid core.
-        target: what it is shot at; a plate alone will do.
+        target: what it is shot at; a plate is accepted, too.
         interaction: stress on the surface of the core.
         record: what is recorded of every shot.
     """

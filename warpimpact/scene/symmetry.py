@@ -1,4 +1,4 @@
-"""Symmetry: the mirror images and shifts under which plate and shot both stay as they are."""
+"""Symmetry: mirror images and shifts that change neither the plate nor the shot."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,8 @@ from .scatter import Scatter
 from .shots import Hits, Impact
 
 _ROUNDING = 1e-12
-"""A component of the unit vector along the line of flight, or an angle [rad], below this is none: cos 90° is 6e-17."""
+"""A smaller component of the unit vector along the line of flight, or a smaller angle [rad], counts as 0: cos 90° is
+6e-17."""
 
 
 @dataclass(frozen=True)
@@ -56,20 +57,21 @@ class Symmetry:
 
 
 SYMMETRIES = tuple(Symmetry(y, z, centred) for y, z, centred in product((1, -1), (1, -1), (False, True)))
-"""All that a scene may have; the first leaves everything where it is. Those that a scene has form a group."""
+"""All symmetries that a scene may have; the first one is the identity. The symmetries of a scene form a group."""
 IDENTITY = SYMMETRIES[0]
 
 
 def symmetries_used(impact: Impact, hits: Hits, plate: Plate) -> tuple[Symmetry, ...]:
-    """Symmetries by which the hits are images of each other; the identity alone where none is asked for or there."""
+    """Symmetries of which the hits are images; the identity alone without `hits.irreducible` or without any
+    symmetry."""
     return symmetries(plate, impact) if hits.irreducible else (IDENTITY,)
 
 
 def check_scatter(hits: Hits, scatter: Scatter) -> None:
-    """Refuse scatter that leaves no symmetry to all shots.
+    """Refuse scatter that removes the symmetry of `hits.irreducible`.
 
     Raises:
-        ValueError: says what scatters.
+        ValueError: names the quantity that scatters.
     """
     turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if name in scatter.given]
     if hits.irreducible and turned:
@@ -80,12 +82,12 @@ def check_scatter(hits: Hits, scatter: Scatter) -> None:
 
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:
-    """Those of SYMMETRIES, in their order, that plate and shot both have."""
+    """The symmetries that plate and shot both have, in the order of SYMMETRIES."""
     return tuple(s for s in SYMMETRIES if s == IDENTITY or (_of_shot(s, impact) and _of_plate(s, plate)))
 
 
 def _of_shot(symmetry: Symmetry, impact: Impact) -> bool:
-    """Whether the image of the shot, but for where it hits, is the shot itself."""
+    """Whether the image of the shot is the shot itself, except for its hit point."""
     across = math.sin(impact.obliquity)
     of_y = across * math.cos(impact.azimuth), impact.yaw
     of_z = across * math.sin(impact.azimuth), impact.pitch
@@ -97,19 +99,19 @@ def _of_shot(symmetry: Symmetry, impact: Impact) -> bool:
 def _of_plate(symmetry: Symmetry, plate: Plate) -> bool:
     """Whether the image of the plate is the plate itself."""
     if plate.size is not None and symmetry.centred:
-        return False  # a plate with a rim has no translation
+        return False  # a rim removes the centring
     return plate.pattern.is_symmetric(symmetry.along_y, symmetry.along_z, centred=symmetry.centred)
 
 
 def irreducible_part(group: Sequence[Symmetry]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """A part of the unit cell of which the images under a group cover the cell once: ((low, high) along y, along z).
+    """A part of the unit cell whose images under a group cover the cell exactly once: ((low, high) along y, along z).
 
-    Both are shares of the extent of the cell, from its middle. Along y what the group does to y counts; what leaves
-    y alone, the identity and perhaps the mirror image in z, divides the cell along z.
+    The limits are shares of the extent of the cell, from its middle. The actions of the group on y divide the cell
+    along y. A mirror image in z alone leaves y as it is, and divides the cell along z.
     """
     actions_y = {(s.along_y, s.centred) for s in group}
     mirrored_z = any((s.along_y, s.along_z, s.centred) == (1, -1, False) for s in group)
     share = 1.0 / len(actions_y)
-    about_a_quarter = actions_y == {(1, False), (-1, True)}  # y → ½ − y leaves ±¼ where they are
+    about_a_quarter = actions_y == {(1, False), (-1, True)}  # y → ½ − y does not move ±¼
     low = -0.5 if share == 1.0 else -0.25 if about_a_quarter else 0.0
     return (low, low + share), (0.0, 0.5) if mirrored_z else (-0.5, 0.5)

@@ -1,4 +1,4 @@
-"""What the bending moment of a core takes: its sections, and the mass ahead of each (kernels/bending.py)."""
+"""Input of the bending moment: the sections of a core and the mass ahead of each (kernels/bending.py)."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from warpimpact.solver.rings import Array, Rings
 
 THINNEST = 0.5
-"""Sections thinner than this share of the largest radius are left out of the nominal stress: at a pointed nose 4M/(πr³)
-has no bound, and within a diameter of where a load acts a beam's stress means little."""
+"""Sections thinner than this share of the largest radius have no nominal stress. 4M/(πr³) has no bound at a pointed
+nose, and beam theory does not hold within a diameter of a load."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Sections:
 
 
 def check_bending(record: Record, numerics: Numerics | Fidelity) -> None:
-    """Refuse to record a bending moment that the numerics do not have.
+    """Refuse numerics that cannot compute the bending moment that is to be recorded.
 
     Raises:
         ValueError: names the scheme.

@@ -10,11 +10,11 @@ import warp as wp
 
 
 class DeviceError(RuntimeError):
-    """The device asked for is not there; the message is for a person."""
+    """The requested device does not exist; the message is for the user."""
 
 
 def find_device(name: str) -> Any:
-    """The Warp device of a name; "auto" takes CUDA where there is one."""
+    """The Warp device of a name; "auto" is CUDA if there is a CUDA device, else the CPU."""
     _start_warp()
     if name == "auto":
         return wp.get_device("cuda:0" if wp.is_cuda_available() else "cpu")
@@ -22,15 +22,17 @@ def find_device(name: str) -> Any:
         return wp.get_device(name)
     except (ValueError, RuntimeError):
         present = ", ".join(str(d) for d in wp.get_devices())
-        raise DeviceError(f'device: got "{name}", which this machine lacks; allowed: auto, {present}') from None
+        raise DeviceError(
+            f'device: got "{name}", but this machine has no such device; allowed: auto, {present}'
+        ) from None
 
 
 def _start_warp() -> None:
-    """Start Warp, quietly and fit for launches from several threads.
+    """Start Warp without its messages, ready for launches from several threads.
 
-    Warp writes its word that there is no CUDA driver straight to file descriptor 2, where it is no concern of who
-    asked for no GPU; everything else written there is passed on. Tile storage on the stack, which no kernel here
-    uses, goes through one unguarded static and crashes threads in debug mode.
+    If there is no CUDA driver, Warp writes a warning directly to file descriptor 2. A user of the CPU does not need it,
+    so it is dropped; all other output on this descriptor is passed on. Tile storage on the stack uses an unprotected
+    static variable, which crashes threads in debug mode. It is disabled, because no kernel here uses it.
     """
     wp.config.log_level = max(wp.config.log_level, wp.LOG_WARNING)
     wp.config.enable_tiles_in_stack_memory = False
@@ -54,9 +56,9 @@ def cores() -> int:
 
 
 def load(kernel: Any, device: Any) -> None:
-    """Have a kernel ready on a device for launches of Warp's own block size, compiled if it is not cached yet.
+    """Load a kernel on a device for launches with Warp's own block size; compile it if it is not cached.
 
-    A module is compiled for one block size; without it Warp would take that of CUDA on a CPU, too, and compile again
-    when the kernel is launched.
+    A module is compiled for one block size. By default Warp loads with the block size of CUDA on a CPU, too, and
+    compiles again at the launch.
     """
     kernel.module.load(device, 1 if device.is_cpu else 256)

@@ -1,4 +1,4 @@
-"""The history of one shot: the columns of its trace by name, and what follows from them."""
+"""The history of one shot: the columns of its trace by name, and quantities that follow from them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class History:
-    """A core in the middle of every step, and where contact ended: plate frame, SI.
+    """The state of a core in the middle of every step and at the end of contact: plate frame, SI.
 
     Attributes:
         time: since the first touch of the front face [s], shape [steps].

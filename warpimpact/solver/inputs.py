@@ -1,4 +1,4 @@
-"""What the kernels read of a scene and its shots, put on one device, once."""
+"""Inputs of the kernels: the arrays of a scene and its shots, put on one device once."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Put:
-    """Puts values on a device of some name, if not said otherwise in the floating-point type `real` of the kernels."""
+    """Puts values on the named device, by default in the floating-point type `real` of the kernels."""
 
     device: str
     real: Any
@@ -36,7 +36,7 @@ class Inputs:
     """The structs of the march (kernels/march.py), filled.
 
     Attributes:
-        stage: the march of the build that the scene needs.
+        stage: the build of the march that the scene needs.
         put: puts values on the device.
         surface, sections, plate, law, shots, pace: structs on the device.
     """
@@ -55,7 +55,7 @@ class Inputs:
         self.pace.rows = arrays.rows
 
     def give_up_after(self, way: float) -> None:
-        """Let no shot go on for longer than a way [m] at impact velocity."""
+        """Give up every shot after this distance [m] at impact velocity."""
         self.shots.longest_way.fill_(way)
 
     def _sections(self, arrays: Arrays) -> Any:
@@ -106,5 +106,5 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
 
 @lru_cache(maxsize=4)
 def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
-    """Material and clearance of a tile, which no kernel changes: kept for the next shots at the same plate."""
+    """Material and clearance of a tile. No kernel changes them, so they are kept for later shots at the same plate."""
     return put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))

@@ -29,13 +29,13 @@ Progress1 = Callable[[int], None]
 Scratch = TypeVar("Scratch")
 
 CPU_CHUNK = 32
-"""Most shots per launch on the CPU: few enough for a smooth progress bar and even threads."""
+"""Most shots per launch on the CPU: few enough for a smooth progress bar and an even load of the threads."""
 CUDA_CHUNK = 65536
 WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
-"""Half the width of a first window in radii of the core, for a straight shot; less on the literal scheme's fine grid,
-which takes longer to lay than some shots to compute again."""
+"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
+its fine grid, large windows cost more time than the repetition of some shots."""
 MAX_DOUBLINGS = 6
-"""How often a shot that leaves its window is computed again in one twice as wide."""
+"""Largest number of times that the windows are doubled for the shots that left theirs."""
 MEMORY_SHARE = 0.5
 """Share of the free memory that scratch may take."""
 
@@ -67,7 +67,7 @@ class March:
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
-        """March all shots; those that leave their window again in wider ones."""
+        """March all shots; repeat those that leave their window in wider windows."""
         progress = progress or (lambda done, total: None)
         count = len(self.shots)
         outcomes = self._empty(self.stage.Outcomes, (count,))
@@ -82,12 +82,13 @@ class March:
         return outcomes
 
     def traces(self, contact: Any) -> list[Array]:
-        """What every shot of a traced march wrote, the state at its end included."""
+        """The trace of every shot of a traced march, with the state at its end."""
         rows = self.history.numpy().reshape(len(self.shots), self.arrays.rows, WIDTH)
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
-        """Share of the resistance left for the first shot after some steps on the CPU, in its window once marched."""
+        """Share of the resistance that is left after some steps of the first shot on the CPU, in the window of its
+        march."""
         scratch = self._scratch(1, *self.cells)
         self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
         first = self.inputs.put(np.zeros(1), wp.int32)
@@ -103,7 +104,7 @@ class March:
         return self.scene.core.mass_properties._replace(**{name: float(self.arrays.shots[name][0]) for name in names})
 
     def nodes(self) -> tuple[Array, Array]:
-        """Where the nodes of the first shot's window are in the plate [m], along y and z."""
+        """Coordinates in the plate of the nodes of the first shot's window, along y and z [m]."""
         hit = self.shots.hit_y[0], self.shots.hit_z[0]
         spacing = self.arrays.grid.spacing
         y, z = (at + (np.arange(count) - count // 2) * spacing for at, count in zip(hit, self.cells, strict=True))
@@ -119,7 +120,7 @@ class March:
         return np.asarray(solid.reshape(shape).mean(axis=(1, 3)))
 
     def report(self, contact: Any) -> dict[str, NDArray[Any]]:
-        """Free flight to the stand-offs, and everything back on the host, by the names of `Outcomes`."""
+        """Compute the free flight to the stand-offs; return all values on the host, by the names of `Outcomes`."""
         count, record = len(self.shots), self.scene.record
         flight, standoffs = free_flight.build(self.variant), np.array(record.standoffs, dtype=np.float64)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
@@ -136,7 +137,8 @@ class March:
         return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
-        """Largest bending moment and stress of every shot, and where; no place without any."""
+        """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is
+        0."""
         found = self.bending.numpy()
         columns = {
             "largest_bending_moment": found["moment"],
@@ -148,7 +150,7 @@ class March:
         return {name: np.where(failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
-        """A struct of arrays, each of the shape that has its number of dimensions."""
+        """A struct of empty arrays; each has the shape with its number of dimensions."""
         filled = struct()
         for name, variable in struct.vars.items():
             array = variable.type
@@ -168,7 +170,7 @@ class March:
             + arrays.core.bounding_radius * turned
         )
         cells_y = cells_z = 2 * (math.ceil(half / arrays.grid.spacing) + 2 * self.inputs.plate.reach + 3)
-        while not self._fits(cells_y, cells_z):  # what leaves a smaller window gets its named status
+        while not self._fits(cells_y, cells_z):  # a shot that leaves a smaller window ends as LEFT_WINDOW
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
 
@@ -268,8 +270,8 @@ class March:
         return _halving(slots, lambda slots: [self._scratch(1, *self.cells) for _ in range(slots)])[1]
 
     def _on_threads(self, launch: Callable[..., int], slots: list[Any], total: int, progress: Progress1) -> None:
-        """Share chunks out over threads, each with one slot: a CPU launch runs its shots one after another on
-        the calling thread, without the interpreter lock."""
+        """Distribute chunks over threads, each with one slot. A CPU launch runs its shots one after another on the
+        calling thread, without the interpreter lock."""
         idle = SimpleQueue[Any]()
         for scratch in slots:
             idle.put(scratch)
@@ -299,7 +301,8 @@ def _chunks(total: int, size: int) -> Iterator[tuple[int, int]]:
 
 
 def _halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
-    """Slots and their scratch: half as many while there is no memory for more, which free memory only estimates."""
+    """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
+    estimate."""
     while True:
         try:
             return slots, allocate(slots)

@@ -14,8 +14,8 @@ from warpimpact.scene import Core
 Array = NDArray[np.float64]
 
 BEHIND = 0.57
-"""Length of the rings behind the core's widest station, in those ahead of it: they touch where the core swings, and
-turn it by the longest levers."""
+"""Length of the rings behind the core's widest station, as a share of the length of those ahead of it. The rings behind
+touch when the core swings, and they have the longest levers."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Rings:
 
 
 def azimuths_of(around: int) -> Array:
-    """Azimuths [rad] of the patches of even rings, then of odd rings, half a patch on; shape [2 around].
+    """Azimuths [rad] of the patches of even rings, then of odd rings, turned by half a patch; shape [2 around].
 
     Both sets are their own mirror images, as the core is.
     """
@@ -42,11 +42,11 @@ def azimuths_of(around: int) -> Array:
 
 
 def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, discs: bool = True) -> Rings:
-    """Divide a core's surface into rings of the profile, `axial` of them per its length ahead of the widest station
-    and more behind it, and rings of the discs that close it.
+    """Divide a core's surface into rings of the profile and rings of the discs that close it.
 
-    Rings wider than `widest` [m] radially are divided. Without `discs` it is the literal scheme's: the profile
-    alone, evenly divided.
+    The profile has `axial` rings per length of the core ahead of the widest station, and shorter rings behind it.
+    Rings wider than `widest` [m] radially are divided. Without `discs` the surface is that of the literal scheme: the
+    profile alone, in rings of equal length.
 
     Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the
     closed surface sum to zero and the work of a straight shot is exact (docs/model.md §6.1).
@@ -79,8 +79,8 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
 
 
 def _stations(core: Core, count: int) -> Array:
-    """Edges of the profile's rings: a length/count apart, BEHIND of that behind the widest station, which is one of
-    them, as are the jumps of the slope unless they outnumber the rings."""
+    """Edges of the profile's rings: length/count apart ahead of the widest station, BEHIND times this distance behind
+    it. The widest station is an edge. Jumps of the slope are edges, too, if they are fewer than `count`."""
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
     inner = np.unique([*breaks, widest])
     apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
@@ -99,7 +99,8 @@ def _divided(core: Core, edges: Array, widest: float) -> Array:
 
 
 def _widest_station(core: Core) -> float:
-    """First station of the largest radius [m]: a ring astride it would partly cancel itself."""
+    """First station of the largest radius [m]. It must be an edge: the loads on a ring across it would partly
+    cancel."""
     stations = np.linspace(0.0, core.length, 1001)
     peak = int(core.radius(stations).argmax())
     low, high = stations[max(peak - 1, 0)], stations[min(peak + 1, len(stations) - 1)]
@@ -140,7 +141,7 @@ def _normals(core: Core, stations: Array, step: Array) -> Array:
 
 
 def _disc_rings(station: float, radius: float, widest: float, *, facing: float) -> tuple[Array, ...]:
-    """The same of a disc that faces along the axis (+1 towards the nose)."""
+    """As `_profile_rings`, for a disc that faces along the axis (+1 towards the nose)."""
     count = int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # below that it is a point
     edges = np.linspace(0.0, radius, count + 1)
     low, high = edges[:-1], edges[1:]

@@ -31,9 +31,9 @@ class Outcomes:
         angular_velocity: after contact, plate frame [rad/s], shape [shots, 3].
         energy_loss: kinetic energy lost [J], shape [shots].
         contact_duration: time in contact [s], shape [shots].
-        tilt: angle between core axis and line of fire [rad], shape [shots, stand-offs]; likewise
-        pitch, yaw: projected angles of the axis [rad], and
-        total_yaw: angle between core axis and residual velocity [rad].
+        tilt: angle between core axis and line of fire [rad], shape [shots, stand-offs].
+        pitch, yaw: projected angles of the axis [rad], shape [shots, stand-offs].
+        total_yaw: angle between core axis and residual velocity [rad], shape [shots, stand-offs].
     """
 
     status: NDArray[np.int8]
@@ -50,13 +50,13 @@ class Outcomes:
 
 @dataclass(frozen=True)
 class BentOutcomes(Outcomes):
-    """Outcomes with what bent the core most, as if it stayed rigid (kernels/bending.py); arrays of shape [shots].
+    """Outcomes with the largest bending of the rigid core (kernels/bending.py); arrays of shape [shots].
 
     Attributes:
-        largest_bending_moment: [N m], 0 for a core that touched nothing; at
-        bending_section: distance behind the nose tip [m].
-        bending_stress: largest nominal stress 4M/(πr³) [Pa] where the core is thick enough (bending.THINNEST); at
-        bending_stress_section: distance behind the nose tip [m].
+        largest_bending_moment: [N m], 0 for a core that touched nothing.
+        bending_section: distance of its section behind the nose tip [m].
+        bending_stress: largest nominal stress 4M/(πr³) [Pa] where the core is thick enough (bending.THINNEST).
+        bending_stress_section: distance of its section behind the nose tip [m].
     """
 
     largest_bending_moment: Array
@@ -67,7 +67,7 @@ class BentOutcomes(Outcomes):
 
 @dataclass(frozen=True)
 class Replay:
-    """One shot with all that happened on the way: SI, float64.
+    """One shot with its full history: SI, float64.
 
     Attributes:
         outcomes: how it ended, each of shape [1] or [1, …].
@@ -98,17 +98,17 @@ def simulate(
     """Compute every shot on its own copy of the target (docs/model.md §§1–5).
 
     Args:
-        numerics: how finely; None is the standard fidelity.
+        numerics: resolution and scheme; None is the standard fidelity.
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
-        threads: of a CPU; None is one for every core that this process may use.
-        progress: called with (shots done, shots) as they come; what it raises ends the computation.
+        threads: number on a CPU; None is one for every core that this process may use.
+        progress: called repeatedly with (shots done, all shots); an exception that it raises ends the computation.
 
     Returns:
         The outcomes at the stand-offs that the scene records; `BentOutcomes` where it records the bending moment.
 
     Raises:
         DeviceError: the device is absent.
-        ValueError: the numerics have a tolerance, or have no bending moment that the scene records.
+        ValueError: the numerics have a tolerance, or they cannot compute the bending moment that the scene records.
     """
     march = March(scene, numerics or Numerics(), shots, find_device(device), threads=threads)
     return _outcomes(march, march.march(progress))
@@ -134,11 +134,12 @@ def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
 
 
 def replay(scene: Scene, shot: Shots, *, numerics: Numerics | Fidelity | None = None, snapshots: int = 6) -> Replay:
-    """One shot again on the CPU, with its history; it ends with the bits of `simulate` on the same CPU.
+    """Compute one shot again on the CPU, with its history. The outcome equals that of `simulate` on the same CPU, bit
+    for bit.
 
     Args:
         shot: shots of length 1; the numerics as in `simulate`.
-        snapshots: how often the plate is shown, evenly from the first touch to the end.
+        snapshots: number of instants at which the plate is shown, evenly from the first touch to the end.
     """
     march = _traced(scene, shot, numerics)
     contact = march.march()

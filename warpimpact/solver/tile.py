@@ -17,15 +17,16 @@ from warpimpact.scene import Pattern, Plate
 Array = NDArray[np.float64]
 
 FINER = 5
-"""Cells of the tile per cell of the exposure's grid, in each direction: a patch takes the one under its centre."""
+"""Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the cell under its centre."""
 BLUR = 3
-"""Cells of the tile over which its material is averaged, in each direction: edges pass patches gradually. Odd."""
+"""Cells of the tile over which its material is averaged, in each direction: a patch then crosses an edge gradually.
+Odd."""
 BLOCKS = 96
-"""Most blocks, in each direction, in which a period is searched for room that no core fills."""
+"""Largest number of blocks of a period, in each direction, in the search for the clearance."""
 SUBSAMPLES = 6
-"""Points per cell of the tile and direction behind a material fraction."""
+"""Points per cell and direction from which a material fraction is computed."""
 AT_A_TIME = 2**13
-"""Cells of the tile that are looked at together."""
+"""Cells of the tile that are computed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +39,9 @@ class Tile:
 
     @cached_property
     def clearance(self) -> Array:
-        """Distance [m] that every cell keeps at least from the material of the whole lattice, shape of `material`."""
-        # In blocks of cells, of which any material makes a wall; seen from one period amid eight others: no hole is
-        # wider than the period, so the nearest wall is among them.
+        """Lower bound of every cell's distance from the material of the whole lattice [m], shape of `material`."""
+        # The search runs over blocks of cells. A block with any material is a wall. One period is searched amid eight
+        # others: no hole is wider than the period, so they contain the nearest wall.
         rows, columns = self.material.shape
         block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
         starts = [np.arange(0, count, size) for count, size in zip(self.material.shape, block, strict=True)]
@@ -50,7 +51,8 @@ class Tile:
         widths = (self.dy * rows / len(starts[0]), self.dz * columns / len(starts[1]))
         free = distance_transform_edt(~np.tile(wall, (3, 3)), sampling=widths)
         own = free[len(starts[0]) : 2 * len(starts[0]), len(starts[1]) : 2 * len(starts[1])]
-        # Two blocks less: distances are from centre to centre, and the last block of a period may be narrower.
+        # Two blocks are subtracted, as distances are from centre to centre and the last block of a period may be
+        # narrower.
         kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
         return np.asarray(np.repeat(np.repeat(kept, block[0], axis=0), block[1], axis=1)[:rows, :columns])
 
@@ -62,14 +64,14 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     cell's centre alone, as the literal scheme does.
 
     Raises:
-        MemoryError: the tile does not fit; the message is for a person.
+        MemoryError: the tile does not fit; the message is for the user.
     """
     return _tile(_Itself(plate.pattern), spacing, sharp)
 
 
 @dataclass(frozen=True, eq=False)
 class _Itself:
-    """A pattern that is the same only as itself: a mask of the same name may have changed on the disk."""
+    """A pattern that equals itself only, because the file of a mask may have changed."""
 
     pattern: Pattern
 
@@ -82,7 +84,7 @@ class _Itself:
 
 @lru_cache(maxsize=4)
 def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
-    """Kept for the next shots at the same plate."""
+    """The tile of a pattern, kept for later shots at the same plate."""
     pattern = itself.pattern
     period_y, period_z = pattern.period
     # An even number, so that a row staggered by half a period sees the same cells.
@@ -93,7 +95,7 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
     if needed > free:
         raise MemoryError(
             f"numerics.grid_spacing: got {spacing:g} m, but the plate's period of {period_y:g} m x {period_z:g} m "
-            f"would take {needed / 2**30:.3g} GiB at that spacing, of {free / 2**30:.3g} GiB free"
+            f"needs {needed / 2**30:.3g} GiB at that spacing, and {free / 2**30:.3g} GiB are free"
         )
     samples = 1 if sharp else SUBSAMPLES
     within = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
@@ -106,18 +108,18 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
         row, column = np.nonzero(pattern.has_edge(middle_y, middle_z, half_diagonal))
         y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
         part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
-    if not sharp:  # no running sum, whose rounding leaves material in the middle of a hole
+    if not sharp:  # no running sum: its rounding would leave material in the middle of a hole
         for axis in range(2):
             material = correlate1d(material, np.full(BLUR, 1.0 / BLUR), axis, mode="wrap")
     return Tile(material, dy, dz)
 
 
 def tent_taps(length: float, cell: float) -> Array:
-    """Weights of the discrete filter that, between bilinear scattering and bilinear reading, acts as the tent K of
+    """Weights of a discrete filter. Together with bilinear scattering and bilinear reading it acts as the tent K of
     half-width ℓ.
 
-    Its half-width is adjusted so that mass and second moment, ℓ²/6, are exact: scattering and reading each add
-    cell²/6 on average. With ℓ below √2 cells nothing is left to filter.
+    Scattering and reading each add cell²/6 to the second moment, on average. The half-width of the filter is adjusted
+    so that mass and second moment, ℓ²/6, are exact in total. If ℓ is at most √2 cells, there is nothing to filter.
     """
     if length <= math.sqrt(2.0) * cell:
         return np.ones(1)

@@ -1,4 +1,4 @@
-"""From the hits of the irreducible part of a unit cell to those of all of it (scene/symmetry.py)."""
+"""Unfolding: from hits in the irreducible part of a unit cell to hits in the whole cell (scene/symmetry.py)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from warpimpact.solver.simulate import Outcomes, Replay
 
 
 def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
-    """Outcomes of every shot's images under a group, one shot's images after the other's: shape [shots · group].
+    """Outcomes of all images of the shots under a group, shape [shots · group]; the images of a shot follow each other.
 
-    A projected angle changes its sign with its axis; the angular velocity is an axial vector; all else stays.
+    A projected angle changes its sign with its axis. The angular velocity is an axial vector. Other outcomes stay.
     """
     every = _repeated(outcomes, len(group))
     signs = np.tile([s.polar for s in group], (len(outcomes.status), 1))
@@ -30,12 +30,12 @@ def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
 
 
 def unfolded_estimates(estimates: Estimates, group: Sequence[Symmetry]) -> Estimates:
-    """Estimates of every shot's images, in the order of `unfolded`: those of the shot."""
+    """Estimates of all images, in the order of `unfolded`; an image has the estimates of its shot."""
     return _repeated(estimates, len(group))
 
 
 def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], image: tuple[float, float]) -> Replay:
-    """A replayed shot as it goes at an image of its hit.
+    """The history of a replayed shot, transformed to an image of its hit.
 
     Args:
         home: hit point (y, z) of the replayed shot [m].
@@ -70,5 +70,5 @@ Columns = TypeVar("Columns", Outcomes, Estimates)
 
 
 def _repeated(columns: Columns, times: int) -> Columns:
-    """Every row several times in turn."""
+    """Every row, `times` times in a row."""
     return replace(columns, **{f.name: np.repeat(getattr(columns, f.name), times, axis=0) for f in fields(columns)})

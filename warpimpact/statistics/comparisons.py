@@ -1,4 +1,4 @@
-"""Intervals of what compares two numbers: differences and ratios."""
+"""Intervals of comparisons: differences and ratios of two numbers."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def difference_of_independent(one: Estimate, other: Estimate) -> tuple[float, fl
 
 
 def confidence_of_each(together: float, count: int) -> float:
-    """Confidence that each of some intervals needs so that all of them hold together (Bonferroni)."""
+    """Confidence of each of `count` intervals, so that all of them hold with the confidence `together` (Bonferroni)."""
     return 1.0 - (1.0 - together) / max(1, count)
 
 
@@ -39,8 +39,8 @@ class Ratio(NamedTuple):
         """Ratio to the mean of other numbers.
 
         Args:
-            estimate: of the numerator.
-            numbers: whose mean it is, shape [shots].
+            estimate: the numerator.
+            numbers: those whose mean is the estimate, shape [shots].
             reference: numbers of the first shots, or one number for all; None where there are none.
             dealt: the arguments of `Dealt` after the kind.
         """
@@ -57,9 +57,9 @@ class Ratio(NamedTuple):
 
 
 def _linearised(numbers: Array, reference: Array, ratio: float) -> Array:
-    """Numbers of the shots whose mean is the ratio of two means, with its error to first order (the delta method).
+    """Numbers per shot whose mean is the ratio of two means, with its error to first order (the delta method).
 
-    Number k of the reference belongs to shot k. Where there are fewer, each stands for several.
+    Number k of the reference belongs to shot k. If the reference has fewer numbers, each of them has a larger weight.
     """
     mean, weight = np.nanmean(reference), np.isfinite(numbers).sum() / np.isfinite(reference).sum()
     linear = numbers / mean

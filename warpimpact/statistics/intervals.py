@@ -1,9 +1,10 @@
-"""Confidence intervals of what shots say: means, shares, quantiles and differences of shares.
+"""Confidence intervals of means, shares, quantiles and differences of shares over shots.
 
-Of independent shots the intervals are Student's for a mean, Wilson's for a share, that of the order statistics for a
-quantile, and Agresti and Min's for a difference of shares among the same shots (Statistics in Medicine 24 (2005) 729).
-Points of a Sobol sampling are not independent; there the shots are dealt out to independent scramblings, and Student's
-interval over the answers of these replicates holds (A. B. Owen, Monte Carlo theory, methods and examples, chapter 17).
+For independent shots, a mean has Student's interval, a share has Wilson's, and a quantile has that of the order
+statistics. A difference of shares among the same shots has the interval of Agresti and Min (Statistics in Medicine 24
+(2005) 729). Points of a Sobol sampling are not independent. Such shots are dealt to independent scramblings, the
+replicates. Student's interval over the results of the replicates is used (A. B. Owen, Monte Carlo theory, methods and
+examples, chapter 17).
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its interval, NaN where there is none.
+    """A number with its interval; NaN where there is none.
 
     Attributes:
-        count: shots that it counts.
+        count: number of shots that count.
         spread: standard deviation over these shots.
     """
 
@@ -41,7 +42,8 @@ class Estimate:
 
 
 def estimate_of(kind: str, values: Array, **dealt: Any) -> Estimate:
-    """What numbers of all shots say, NaN where one does not count; the arguments are those of `Dealt`."""
+    """The estimate from the numbers of all shots; NaN marks a shot that does not count. The arguments are those of
+    `Dealt`."""
     gathered = Dealt(kind, **dealt)
     gathered.add(values)
     return gathered.estimate()
@@ -52,9 +54,9 @@ class Dealt:
 
     Args:
         kind: "mean", "quantile", "share" (of numbers 0 or 1) or "difference" (of two shares, numbers −1, 0 or 1).
-        share: of a quantile.
-        replicates: independent scramblings that the shots are dealt out to in turn; 1 if they are independent.
-        images: how many shots in a row are images of each other, which tell as much as one of them.
+        share: share of the numbers below a quantile.
+        replicates: number of independent scramblings to which the shots are dealt in turn; 1 for independent shots.
+        images: how many shots in a row are images of each other; together they count as one shot.
         confidence: of the interval.
     """
 
@@ -66,7 +68,7 @@ class Dealt:
         self._shots = 0
 
     def add(self, values: Array) -> None:
-        """Take in the numbers of the shots that follow, NaN where one does not count; shape [shots]."""
+        """Add the numbers of the next shots, shape [shots]; NaN marks a shot that does not count."""
         replicates = len(self._replicates)
         dealt_to = (self._shots + np.arange(len(values))) // self._images % replicates
         for replicate, sample in enumerate(self._replicates):
@@ -75,7 +77,7 @@ class Dealt:
         self._shots += len(values)
 
     def estimate(self) -> Estimate:
-        """What the shots so far say."""
+        """The estimate from the shots so far."""
         pooled = _Sample.pooled(self._replicates)
         if pooled.count == 0:
             return Estimate(math.nan, math.nan, math.nan, 0, math.nan)
@@ -84,10 +86,10 @@ class Dealt:
         return Estimate(value, *interval, pooled.count, pooled.deviation)
 
     def _of_replicates(self, pooled: _Sample, value: float) -> tuple[float, float] | None:
-        """Interval from the spread of the replicates, None where there is none to tell from.
+        """Interval from the spread of the replicates; None where they do not give one.
 
-        That of a quantile is Woodruff's: the replicates say how certain the share below it is (R. S. Woodruff, Journal
-        of the American Statistical Association 47 (1952) 635). Their own quantiles would be biased.
+        A quantile has Woodruff's interval: the replicates give the uncertainty of the share below it (R. S. Woodruff,
+        Journal of the American Statistical Association 47 (1952) 635). Quantiles of single replicates would be biased.
         """
         replicates = [sample for sample in self._replicates if sample.count]
         if len(replicates) < 2:
@@ -95,7 +97,7 @@ class Dealt:
         quantile = self._kind == "quantile"
         answers = [float((one.values <= value).mean()) if quantile else one.mean for one in replicates]
         half = _student(self._confidence, len(answers)) * float(np.std(answers, ddof=1))
-        # Replicates that all say the same of something that happens or not (never, mostly) tell nothing.
+        # Equal shares in all replicates (mostly 0) say nothing about the uncertainty.
         if half == 0.0 and self._kind != "mean":
             return None
         if not quantile:
@@ -105,7 +107,7 @@ class Dealt:
         return low, high
 
     def _independent(self, sample: _Sample) -> tuple[float, float]:
-        """Interval as of independent shots; images of each other count as one."""
+        """Interval for independent shots; images of each other count as one."""
         from scipy import stats  # a second to import
 
         count = math.ceil(sample.count / self._images)
@@ -132,14 +134,14 @@ class Dealt:
 
 
 def _student(confidence: float, count: int) -> float:
-    """Half width of the interval of a mean of `count` numbers, in their standard deviations."""
+    """Half width of the interval of a mean of `count` numbers, in units of their standard deviation."""
     from scipy import stats
 
     return float(stats.t.isf(0.5 * (1.0 - confidence), count - 1)) / math.sqrt(count)
 
 
 def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, float]:
-    """Agresti and Min's interval: half a shot more in each of the four cells of what the two may say."""
+    """Agresti and Min's interval: adds half a shot to each of the four cells of the 2 × 2 table."""
     from scipy import stats
 
     difference = sample.mean * count
@@ -151,7 +153,7 @@ def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, flo
 
 
 class _Sample:
-    """Count, mean and sum of squared deviations of numbers, and if it keeps them the numbers themselves."""
+    """Count, mean and sum of squared deviations of numbers; with `keeps`, also the numbers themselves."""
 
     def __init__(self, *, keeps: bool) -> None:
         self.count, self.mean, self._squares = 0, 0.0, 0.0
@@ -170,7 +172,7 @@ class _Sample:
         return whole
 
     def add(self, values: Array) -> None:
-        """Take in numbers; none is NaN."""
+        """Add numbers; none may be NaN."""
         if len(values):
             mean = float(values.mean())
             self._merge(len(values), mean, float(np.square(values - mean).sum()))
@@ -192,7 +194,7 @@ class _Sample:
 
     @property
     def values(self) -> Array:
-        """The numbers, if it keeps them."""
+        """The numbers, if they are kept."""
         return np.concatenate(self._kept) if self._kept else np.empty(0)
 
     def quantile(self, share: float) -> float:

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 
 def looks(sampling: str, shards: int) -> Iterator[int]:
-    """Numbers of shards after which a stop rule looks at its interval: few, as every look is a chance to stop on a
-    spread that is small by accident. Sobol points are balanced at powers of two."""
+    """Numbers of shards after which a stop rule looks at its interval. There are few looks, because the spread may be
+    small by accident at any of them. Sobol points are balanced at powers of two."""
     at = 1
     while at < shards:
         yield at

@@ -1,8 +1,8 @@
 """The mean of the worst tenth as a mean over all shots, so that it has the intervals of a mean.
 
 R. T. Rockafellar and S. Uryasev (Journal of Risk 2 (2000) 21) write it as the smallest mean of q + (x − q)₊ / 0.1 over
-q, where q is the quantile of 0.9. At a minimum an error of q changes nothing to first order. The interval is therefore
-that of this mean at the q of the sample.
+q, where q is the quantile of 0.9. At the minimum an error of q has no effect to first order. The interval is therefore
+that of this mean at the sample's q.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from warpimpact.statistics.intervals import Array
 WORST = 0.1
 """Share of the shots that is the worst tenth."""
 _FEWEST = 40
-"""Independent shots that the worst tenth needs for an interval that holds as often as it says."""
+"""Fewest independent shots in the worst tenth for an interval that holds with its stated confidence."""
 
 
 def worst_tenth(values: Array) -> Array:
@@ -25,5 +25,5 @@ def worst_tenth(values: Array) -> Array:
 
 
 def has_interval(count: int, images: int) -> bool:
-    """Whether the worst tenth of so many shots has an interval; `images` of them in a row count as one."""
+    """Whether the worst tenth of `count` shots has an interval; `images` of them in a row count as one."""
     return count * WORST >= _FEWEST * images

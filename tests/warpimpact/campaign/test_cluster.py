@@ -83,7 +83,7 @@ def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
     path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 300"), encoding="utf-8")
     command = ["run", str(path), "-o", str(tmp_path / "a.nc"), "--scheduler"]
     assert main([*command, cluster.scheduler_address, "--device", "cuda:99"]) == 2
-    assert 'device: got "cuda:99", which this machine lacks' in capsys.readouterr().err
+    assert 'device: got "cuda:99", but this machine has no such device' in capsys.readouterr().err
     assert main([*command, "nonsense://nowhere"]) == 2
     assert 'scheduler: got "nonsense://nowhere", which cannot be reached' in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["campaign.toml"]

@@ -1,4 +1,4 @@
-"""Lattices: one hole shape at any places of a rectangular cell that repeats (docs/model.md §3)."""
+"""Lattices: holes of one shape at any places in a rectangular cell that repeats (docs/model.md §3)."""
 
 import math
 from abc import abstractmethod
@@ -17,11 +17,11 @@ from .roundings import area, distance, geometries, neighbours, outline, placed
 
 _MOST_HOLES = 20_000
 _SAME = 1e-9
-"""What two lengths may differ by, as a share of the period, and be the same."""
+"""Two lengths are equal if they differ by less than this share of the period."""
 
 
 class Place(NamedTuple):
-    """Where a hole of a cell lies: its origin [m], and how far it is turned from +y towards +z [rad]."""
+    """The place of a hole in a cell: its origin [m], and its rotation from +y towards +z [rad]."""
 
     y: Length
     z: Length
@@ -31,15 +31,16 @@ class Place(NamedTuple):
 class LatticePattern(Pattern):
     """Holes of one shape in a rectangular cell that repeats.
 
-    A shape is a convex polygon, a line or a point, its `spine`, and all that lies within a `rounding` of it: a slot is
-    a line and a radius, a triangle with rounded corners a smaller triangle and theirs.
+    A shape has a `spine`, which is a convex polygon, a line or a point. The hole is all that lies within the distance
+    `rounding` of the spine. A slot is a line and a radius. A triangle with rounded corners is a smaller triangle and
+    the radius of the corners.
 
     Attributes:
         spacing: extent (a, b) of the cell along y and z [m].
         staggered: shifts every odd row of cells along y by b/2 along z.
-        holes: where the holes of a cell lie, and perhaps a turn of each beyond `rotation`; one, on the origin, if not
-            given.
-        rotation: turn of every hole from +y towards +z [rad].
+        holes: places of the holes in a cell, each with an optional rotation in addition to `rotation`; by default one
+            hole on the origin.
+        rotation: rotation of every hole from +y towards +z [rad].
     """
 
     spacing: tuple[PositiveLength, PositiveLength]
@@ -47,12 +48,12 @@ class LatticePattern(Pattern):
     holes: Annotated[tuple[Place, ...], Field(min_length=1, max_length=_MOST_HOLES)] | None = None
     rotation: Angle = 0.0
     _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
-    """Size and margin of the plate that holes are left on; None is all of an unbounded one."""
+    """Size and margin of the plate that bounds the pattern; None if it is unbounded."""
 
     @property
     @abstractmethod
     def spine(self) -> Array:
-        """Corners of a convex polygon, anticlockwise, or the ends of a line, or a point, before any turn; shape
+        """Corners of a convex polygon, anticlockwise, or the ends of a line, or a point, before any rotation; shape
         [corners, 2] [m]."""
 
     @property
@@ -67,23 +68,23 @@ class LatticePattern(Pattern):
 
     @property
     def _marks(self) -> Array:
-        """Points, shape [marks, 2] [m]: where those of two holes of the shape are the same, the holes are."""
+        """Points, shape [marks, 2] [m]. Two holes of the shape are the same if their marks are the same."""
         return self.spine
 
     def _depth(self, y: Array, z: Array) -> Array:
-        """How far [m] points lie within the edge of the hole on the origin, not turned; negative outside.
+        """Depth of points inside the hole on the origin, not rotated [m]; negative outside.
 
-        It is 0 on the edge and nowhere steeper than 1.
+        It is 0 on the edge, and its slope is at most 1.
         """
         return self.rounding - distance(self.spine, y, z)
 
     def _check_shape(self) -> None:
-        """Raise a ValueError where the sizes make no hole."""
+        """Raise a ValueError if the sizes make no hole."""
 
     @model_validator(mode="after")
     def _leaves_ligaments(self) -> Self:
         if self.staggered and self.holes is not None:
-            raise ValueError("got staggered beside holes, but it is short for two holes; list all of the cell instead")
+            raise ValueError("got staggered beside holes, but it stands for two holes; list all holes of the cell")
         self._check_shape()
         if self.open_area >= 1:
             raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")
@@ -103,7 +104,7 @@ class LatticePattern(Pattern):
 
     @property
     def period(self) -> tuple[float, float]:
-        """That of the unit cell, or the size of the plate that the pattern is bounded by [m]."""
+        """That of the unit cell, or the size of the plate that bounds the pattern [m]."""
         return self.unit_cell if self._plate is None else self._plate[0]
 
     @property
@@ -118,17 +119,17 @@ class LatticePattern(Pattern):
         on_plate = self._on((size, margin))
         if not len(on_plate._places):
             raise ValueError(
-                f"got size = {_millimetres(size)} and margin = {1e3 * margin:g} mm, which leave no hole on the plate"
+                f"got size = {_millimetres(size)} and margin = {1e3 * margin:g} mm, but they leave no hole on the plate"
             )
         return on_plate
 
     @property
     def unbounded(self) -> Self:
-        """The pattern with all its holes, whatever plate it was bounded by."""
+        """The pattern with all its holes, without a plate that bounds it."""
         return self if self._plate is None else self._on(None)
 
     def _on(self, plate: tuple[tuple[float, float], float] | None) -> Self:
-        """The same holes on a plate of some size and margin [m], with nothing computed."""
+        """The same holes on a plate of this size and margin [m]. Computed values are not copied."""
         pattern = copy(self)
         pattern.__dict__ = {name: getattr(self, name) for name in type(self).model_fields}
         pattern._plate = plate
@@ -145,7 +146,7 @@ class LatticePattern(Pattern):
         return nearby if reach <= self._sight else np.ones_like(nearby)
 
     def _deepest(self, y: Array, z: Array) -> Array:
-        """How far points lie within the edge of a hole [m]; negative outside, −inf where no hole is in sight."""
+        """Depth of points inside a hole [m]; negative outside, −inf where no hole is in sight."""
         (count_y, count_z), near = self._bins
         period_y, period_z = self.period
         y, z = y - period_y * np.round(y / period_y), z - period_z * np.round(z / period_z)
@@ -163,8 +164,8 @@ class LatticePattern(Pattern):
         return [outline(spine, self.rounding) for spine in placed(self.spine, self._reaching(y_range, z_range))]
 
     def ligament(self, size: tuple[float, float] | None = None) -> float:
-        """Smallest distance between two holes, or of a whole hole to the rim of a plate of this `size` [m]; exact but
-        for ellipses, which are polygons here."""
+        """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m]. It is
+        exact, except for ellipses, which are polygons here."""
         if size is None:
             return self._nearest[0]
         half = half_sides(size, self.period, np.ptp(self._boxes(self._places), axis=1).max(axis=0))
@@ -206,7 +207,7 @@ class LatticePattern(Pattern):
         if (count := len(self._cell_places) * math.prod(size) / math.prod(self.unit_cell)) > _MOST_HOLES:
             raise ValueError(
                 f"got size = {_millimetres(size)}, a plate of some {count:.3g} holes, but with a margin at most "
-                f"{_MOST_HOLES} can be told apart"
+                f"{_MOST_HOLES} holes are allowed"
             )
         inner = np.array(size) / 2 - margin
         places = self._repeated(self._cell_places, self.unit_cell, (-inner[0], inner[0]), (-inner[1], inner[1]))
@@ -222,7 +223,7 @@ class LatticePattern(Pattern):
         return kept
 
     def _repeated(self, places: Array, period: tuple[float, float], y_range: Range, z_range: Range) -> Array:
-        """Places and those whole periods away, as far as their holes reach into a rectangle."""
+        """Places repeated by whole periods, as far as their holes reach into a rectangle."""
         repeated = []
         for place, (low, high) in zip(places, self._boxes(places), strict=True):
             along_y, along_z = (
@@ -253,15 +254,15 @@ class LatticePattern(Pattern):
 
     @property
     def _sight(self) -> float:
-        """How far from its edge a hole is seen [m]."""
+        """Distance from its edge within which a hole is in sight [m]."""
         return 0.1 * float(np.ptp(self.spine, axis=0).min() + 2 * self.rounding)
 
     @cached_property
     def _bins(self) -> tuple[tuple[int, int], list[tuple[Array, ...]]]:
-        """Bins along y and z that a period divides into, and the holes in sight of each.
+        """Numbers of bins of a period along y and z, and the holes in sight of each bin.
 
-        The k-th entry of the list is origin and cosine and sine of the turn of the k-th such hole, each of shape
-        [bins], NaN in a bin that has no more.
+        Entry k of the list has the origin, and the cosine and sine of the rotation, of the k-th hole of every bin, each
+        of shape [bins]. It is NaN in a bin with fewer holes.
         """
         period, boxes = np.array(self.period), self._boxes(self._places)
         finest = math.ceil(8 * math.sqrt(len(boxes)))
@@ -283,11 +284,12 @@ class LatticePattern(Pattern):
 
 
 def _bin(at: Array, period: Any, count: Any) -> NDArray[np.int64]:
-    """Which of `count` bins of a period about the origin each coordinate lies in; the last ones also beyond it."""
+    """Index of the bin of each coordinate, of `count` bins of a period about the origin. The outermost bins have no
+    end."""
     return np.clip(np.floor((at / period + 0.5) * count), 0, count - 1).astype(np.int64)
 
 
 def _millimetres(pair: Any) -> str:
-    """Two lengths as a person writes them."""
+    """Two lengths as text."""
     y, z = (f"{round(1e3 * length, 6) + 0.0:g}" for length in pair)
     return f"({y}, {z}) mm"

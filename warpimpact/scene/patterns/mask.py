@@ -21,8 +21,8 @@ class MaskPattern(Pattern):
 
     A .npy file holds a two-dimensional array, axis 0 along y and axis 1 along z: zero is hole, one other
     value is material. In a PNG image y runs from left to right and z from bottom to top: black is hole, one
-    other grey is material. In an SVG drawing, which lies alike and has a width and a height in mm, filled shapes are
-    holes; a cell is hole where its middle lies in one.
+    other grey is material. An SVG drawing has the same orientation and must have a width and a height in mm. Filled
+    shapes are holes, and a cell is hole if its middle lies in one.
     """
 
     shape: Literal["mask"] = "mask"
@@ -61,14 +61,14 @@ class MaskPattern(Pattern):
         return ~self.material[i, j]
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        """Closed outlines, each of shape [points, 2] [m], of holes cut off at a rectangle."""
+        """Closed outlines, each of shape [points, 2] [m], of holes; the rectangle cuts them."""
         lines: list[Array] = self._contours(y_range, z_range).lines(0.5)
         return lines
 
     def ligament(self, size: tuple[float, float] | None = None) -> float:
-        """Smallest distance between two holes, or of a whole hole to the rim of a plate of this `size` [m].
+        """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m].
 
-        Outlines cut the corners of cells. A hole that goes on beyond two periods counts as several.
+        Outlines cut the corners of cells. A hole that is longer than two periods counts as several holes.
         """
         import shapely
 
@@ -90,28 +90,30 @@ class MaskPattern(Pattern):
 
     @property
     def resolution(self) -> float:
-        """What the ligament may be off by [m]: a cell."""
+        """Largest error of the ligament [m]: one cell."""
         return self.cell_size
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
         """Whether a mirror image, then half a period along both axes if `centred`, changes no cell."""
-        halves = self.material.repeat(2, axis=0).repeat(2, axis=1)  # of which half a period is a whole number
+        halves = self.material.repeat(2, axis=0).repeat(2, axis=1)  # half a period is a whole number of these
         image = halves[::along_y, ::along_z]
         return np.array_equal(np.roll(image, self.material.shape, axis=(0, 1)) if centred else image, halves)
 
     def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        """Refused: which cells make a hole is not said."""
-        raise ValueError("got a mask beside margin, which leaves out single holes; draw the mask as large as the plate")
+        """Raise a ValueError: a mask does not say which cells make one hole."""
+        raise ValueError(
+            "got a mask beside margin, but a mask has no single holes to leave out; draw it as large as the plate"
+        )
 
     def _contours(self, y_range: Range, z_range: Range) -> Any:
-        """What draws lines between hole, which is 1, and material, which is 0, within a rectangle."""
+        """Generator of contours between holes, which are 1, and material, which is 0, in a rectangle."""
         from contourpy import FillType, LineType, contour_generator
 
         y, z = (
             self._cell_centres(ends, cells) for ends, cells in zip((y_range, z_range), self.material.shape, strict=True)
         )
         hole = self.is_hole(y, z[:, None]).astype(float)
-        hole[[0, -1], :] = hole[:, [0, -1]] = 0.0  # closes the outlines of holes that go on outside
+        hole[[0, -1], :] = hole[:, [0, -1]] = 0.0  # closes the outlines of holes that continue outside
         return contour_generator(y, z, hole, line_type=LineType.Separate, fill_type=FillType.OuterOffset)
 
     def _cell_centres(self, ends: Range, cells: int) -> Array:

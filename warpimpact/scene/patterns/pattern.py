@@ -1,4 +1,4 @@
-"""What any hole pattern tells, and the one without holes."""
+"""The interface of all hole patterns, and the pattern without holes."""
 
 import math
 from abc import ABC, abstractmethod
@@ -14,10 +14,10 @@ Range = tuple[float, float]
 
 
 def half_sides(size: tuple[float, float], cell: tuple[float, float], reach: Array) -> Array:
-    """Half the sides [m] of a plate with the ligaments of one of this `size`, but not much larger than a cell.
+    """Half the sides of a small plate that has the ligaments of a plate of this `size` [m].
 
-    The same rim cuts the same holes where a plate is whole cells smaller on every side, as long as there are two more
-    cells than single holes `reach`.
+    If a plate is smaller by whole cells on every side, its rim cuts the same holes. It must be larger by two cells than
+    the `reach` of a single hole.
     """
     half, sides = np.array(size) / 2, np.array(cell)
     spare: Array = np.maximum(0.0, np.floor((half - reach) / sides) - 2)
@@ -30,11 +30,12 @@ class Pattern(Model, ABC):
     @property
     @abstractmethod
     def period(self) -> tuple[float, float]:
-        """Extent along y and z [m] of a rectangle, centred on the origin, of which the pattern consists."""
+        """Extent along y and z [m] of the rectangle, centred on the origin, that repeats."""
 
     @property
     def unit_cell(self) -> tuple[float, float]:
-        """Extent along y and z [m] of the cell that represents the pattern; its period, but for a bounded one."""
+        """Extent along y and z [m] of the cell that represents the pattern. It is the period, unless the pattern is
+        bounded."""
         return self.period
 
     @property
@@ -49,7 +50,7 @@ class Pattern(Model, ABC):
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
         """Whether the edge of a hole may lie within `reach` of points y, z [m]; bool, of their broadcast shape.
 
-        Where it is False there is none for sure.
+        Where it is False, there is certainly no edge.
         """
         return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
@@ -59,12 +60,12 @@ class Pattern(Model, ABC):
 
     @abstractmethod
     def ligament(self, size: tuple[float, float] | None = None) -> float:
-        """Smallest distance between two holes, or of a whole hole to the rim of a plate of this `size` [m]; inf where
-        there is none. A hole that the rim cuts has no distance to it."""
+        """Smallest distance between two holes, or between a whole hole and the rim of a plate of this `size` [m]; inf
+        where there is none. A hole that the rim cuts has no distance to it."""
 
     @property
     def resolution(self) -> float:
-        """What the ligament may be off by [m]; 0 for shapes that formulas describe."""
+        """Largest error of the ligament [m]; 0 for shapes with exact formulas."""
         return 0.0
 
     @abstractmethod
@@ -77,16 +78,16 @@ class Pattern(Model, ABC):
 
     @property
     def unbounded(self) -> Self:
-        """The pattern with all its holes, whatever plate it was bounded by."""
+        """The pattern with all its holes, without a plate that bounds it."""
         return self
 
     @abstractmethod
     def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m], which
-        becomes its period.
+        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m]. The
+        size becomes its period.
 
         Raises:
-            ValueError: says why that cannot be.
+            ValueError: says why that is impossible.
         """
 
 
@@ -97,7 +98,7 @@ class NoPattern(Pattern):
 
     @property
     def period(self) -> tuple[float, float]:
-        """Extent of the unit cell along y and z [m]; any would do."""
+        """Extent of the unit cell along y and z [m]; the size is arbitrary."""
         return (1e-3, 1e-3)
 
     @property

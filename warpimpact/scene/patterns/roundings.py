@@ -1,5 +1,5 @@
-"""Geometry of rounded convex shapes: all that lies within a rounding of a spine, which is a convex polygon, a line or a
-point. Areas, distances and extents of these are exact. Spines are arrays of shape [corners, 2] [m].
+"""Geometry of rounded convex shapes. A shape is all that lies within the distance `rounding` of a spine, which is a
+convex polygon, a line or a point. Areas, distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
 """
 
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 from ..model import Array
 
 _QUARTER = 16
-"""Chords per quarter of a turn in an outline; those of a circle leave out 1.6e-3 of its area."""
+"""Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
 
 
 def area(spine: Array, rounding: float) -> float:
@@ -22,7 +22,7 @@ def area(spine: Array, rounding: float) -> float:
 def distance(spine: Array, y: Array, z: Array) -> Array:
     """Distance of points y, z from the spine [m], of their broadcast shape; negative within a polygon.
 
-    Mirrored points have the same distance from a mirrored spine, in every bit.
+    Mirrored points have the same distance from a mirrored spine, to the bit.
     """
     ends = list(zip(spine, np.roll(spine, -1, axis=0), strict=True))
     nearest, within = np.array(np.inf), np.array(len(spine) > 2)
@@ -44,7 +44,7 @@ def placed(spine: Array, places: Array) -> Array:
 
 
 def outline(spine: Array, rounding: float) -> Array:
-    """Closed outline of the shape, shape [points, 2] [m]; its points lie on it, chords between them."""
+    """Closed outline of the shape, shape [points, 2] [m]; chords between points on the exact outline."""
     import shapely
 
     shape = geometries(spine[None])[0]
@@ -52,9 +52,9 @@ def outline(spine: Array, rounding: float) -> Array:
 
 
 def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
-    """The two nearest of some geometries, one of them among the `first`: their distance [m], and which they are.
+    """The two nearest geometries, one of them among the `first`: their distance [m] and their indices.
 
-    Two that overlap have the distance 0, and less than two inf.
+    The distance is 0 if they overlap, and inf if there are fewer than two geometries.
     """
     import shapely
 
@@ -70,7 +70,7 @@ def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
 
 
 def geometries(spines: Array) -> Any:
-    """Spines of shape [spines, corners, 2] [m] as an array of what shapely works with, shape [spines]."""
+    """Spines of shape [spines, corners, 2] [m] as an array of shapely geometries, shape [spines]."""
     import shapely
 
     corners = spines.shape[1]

@@ -1,4 +1,4 @@
-"""The shapes of holes. Undirected ones lie with their length along z, before any `rotation`."""
+"""The shapes of holes. Before any `rotation`, the length of a hole lies along z."""
 
 from abc import abstractmethod
 from typing import Literal
@@ -40,7 +40,7 @@ class _OblongPattern(LatticePattern):
         if self.length < self.width:
             raise ValueError(
                 f"got length = {1e3 * self.length:g} mm, "
-                f"but the hole must be at least as long as wide, {1e3 * self.width:g} mm"
+                f"but the length must be at least the width, {1e3 * self.width:g} mm"
             )
 
 
@@ -68,7 +68,7 @@ class EllipsePattern(_OblongPattern):
 
     @property
     def spine(self) -> Array:
-        """A polygon on the ellipse, shape [720, 2] [m], for outlines and distances: 1e-5 of the length off it."""
+        """A polygon on the ellipse, shape [720, 2] [m], for outlines and distances; its error is 1e-5 of the length."""
         turn = 2 * np.pi / _ELLIPSE_CHORDS * np.arange(_ELLIPSE_CHORDS)
         return 0.5 * np.column_stack([self.width * np.cos(turn), self.length * np.sin(turn)])
 
@@ -104,7 +104,7 @@ class _PolygonPattern(LatticePattern):
         if self.corner_radius >= self.inradius:
             raise ValueError(
                 f"got corner_radius = {1e3 * self.corner_radius:g} mm, "
-                f"but it must be smaller than that of the circle within the hole, {1e3 * self.inradius:.4g} mm"
+                f"but it must be smaller than the inradius of the hole, {1e3 * self.inradius:.4g} mm"
             )
 
     @property
@@ -119,7 +119,7 @@ class _PolygonPattern(LatticePattern):
 
 
 class TrianglePattern(_PolygonPattern):
-    """Equilateral triangles of `side` [m], as if sharp: one side along y, apex to +z."""
+    """Equilateral triangles: one side along y, apex to +z. `side` [m] is that of the triangle with sharp corners."""
 
     shape: Literal["triangle"] = "triangle"
     side: PositiveLength
