@@ -1,4 +1,4 @@
-"""The one place where shots of a campaign become a Dataset, on whatever machine."""
+"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ def compute(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> xarray.Dataset:
-    """Compute some shots of a campaign; where it asks for symmetry, the first of each hit's images for all of them.
+    """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
     Args:
         shots: whole groups of images, as the campaign's sampler gives them.
-        solid: shots at the solid plate of equal areal density, too; None are none.
+        solid: shots at the solid plate of equal areal density; None for no such shots.
         device, threads, progress: as in `simulate`.
 
     Returns:
-        The Dataset of results/dataset.py, one entry per shot: a result of its own.
+        The Dataset of results/dataset.py, one entry per shot; it is a complete result.
 
     Raises:
         DeviceError: the device is absent.
@@ -97,7 +97,7 @@ def compute(
 
 
 def _build(campaign: Campaign, shots: Shots, device: str) -> None:
-    """Have the kernels ready, so that the time of computing is that alone."""
+    """Build the kernels first, so that the measured time is that of computing alone."""
     numerics = campaign.numerics
     if numerics.tolerance is not None:
         numerics = Numerics(precision=numerics.precision)
@@ -112,14 +112,14 @@ def _outcomes(
     threads: int | None,
     progress: Progress | None = None,
 ) -> tuple[Outcomes, Estimates | None]:
-    """Outcomes, with estimates of their errors where the numerics have a tolerance."""
+    """Outcomes, and estimates of their errors if the numerics have a tolerance."""
     if numerics.tolerance is None:
         return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
     return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
 
 
 def _impact(campaign: Campaign) -> str:
-    """How the core arrives, as JSON: of each quantity its value or its distribution, that of its mass included."""
+    """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
     scatter = {name: given.model_dump() for name, given in campaign.scatter.given.items()}
     return json.dumps(
         dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
@@ -127,12 +127,12 @@ def _impact(campaign: Campaign) -> str:
 
 
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
-    """By which symmetries hits were unfolded, and how many were computed."""
+    """Symmetries by which hits were unfolded, and the number of computed hits."""
     return {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
 
 
 def made_by(device: str) -> dict[str, str]:
-    """Versions and kind of device: what decides the bits beside the campaign."""
+    """Versions and kind of device: with the campaign, they determine the bits of a result."""
     chosen = find_device(device)
     return {
         **attr.versions(),
@@ -141,7 +141,7 @@ def made_by(device: str) -> dict[str, str]:
 
 
 def _numerics(campaign: Campaign, shots: Shots) -> str:
-    """The numerics in force, every choice made, as one line."""
+    """The numerics as one line, with every default filled in."""
     tolerance = campaign.numerics.tolerance
     if tolerance is not None:
         return (
