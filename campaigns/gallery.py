@@ -15,18 +15,18 @@ from warpimpact.plotting import dispersion, hit_maps, marginals, overview, traje
 from warpimpact.plotting.pressure import pressure
 
 HERE = Path(__file__).parent
-HIT = 34  # tumbles at the edge of a slot
+HIT = 34  # it tumbles at the edge of a slot
 LARGEST = 150_000  # bytes of a picture
 
 
 def save(figure: Figure, path: Path, width: int = 1100) -> None:
-    """Write a PNG of that width [px] with a palette of its own, which halves its size."""
+    """Write a PNG of this width [px]. A palette of its own halves its size."""
     drawn = BytesIO()
     figure.savefig(drawn, dpi=width / figure.get_figwidth())
     Image.open(drawn).convert("RGB").quantize(192, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"{path.relative_to(HERE.parent)}: {path.stat().st_size / 1e3:.0f} kB")
     if path.stat().st_size > LARGEST:
-        raise SystemExit(f"{path}: is larger than the {LARGEST / 1e3:.0f} kB that a picture may have")
+        raise SystemExit(f"{path}: is larger than {LARGEST / 1e3:.0f} kB, the limit for a picture")
 
 
 def main() -> None:

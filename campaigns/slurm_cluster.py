@@ -1,8 +1,8 @@
-"""How does a campaign run on a SLURM cluster? Submit nothing by hand: `python slurm_cluster.py` on a login node.
+"""Runs a campaign on a SLURM cluster: start `python slurm_cluster.py` on a login node. Submit no job by hand.
 
-It needs `pip install 'warpimpact[cluster]' dask-jobqueue`, and your queue and account below. dask-jobqueue submits one
-job per worker; jobs may start late, end early or die, and others take over what they were computing. Where this script
-itself may end, start it again: it continues (`resume`).
+It needs `pip install 'warpimpact[cluster]' dask-jobqueue`. Set your queue and account below. dask-jobqueue submits one
+job per worker. Jobs may start late, end early or die; other jobs then take over their work. If this script itself ends
+early, start it again: it continues the run (`resume`).
 """
 
 from pathlib import Path

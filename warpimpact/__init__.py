@@ -1,6 +1,6 @@
 """Hit maps of hard bullet cores against perforated armour plates.
 
-A name is imported when it is first used, so that ``import warpimpact`` and ``warpimpact --help`` are quick.
+A name is imported at its first use. This keeps ``import warpimpact`` and ``warpimpact --help`` quick.
 """
 
 from importlib import import_module

@@ -1,5 +1,5 @@
 """From a Dataset to numbers and their text: summary, effects, effectiveness, comparison, study.
 
-Change what is asked of a result here; how certain a number is belongs in statistics. It imports campaign and the rooms
-below it, and draws nothing.
+Change what is computed from a result here; the uncertainty of a number belongs in statistics. It imports campaign and
+the rooms below it, and draws nothing.
 """

@@ -1,4 +1,4 @@
-"""What a person wants to know first of a single hit that was computed again."""
+"""The text on a replayed hit: where it was, how it ended, and whether it agrees with the stored outcome."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from warpimpact.results import variables as v
 
 _AGREEMENT = {
     "bit-identical": "The end is bit-identical to the stored outcome.",
-    "within rounding": "The end equals the stored outcome within rounding, as it does after another device.",
-    "different": "The end DIFFERS from the stored outcome, which another version of warpimpact must have computed.",
+    "within rounding": "The end equals the stored outcome within rounding, as expected of another device.",
+    "different": "The end DIFFERS from the stored outcome; probably another version of warpimpact computed it.",
 }
 
 
 def hit_text(history: xarray.Dataset) -> str:
-    """How a replayed hit ended, as a few lines."""
+    """The end of a replayed hit in a few lines."""
     place = ", ".join(f"{axis} = {float(history[v.HIT_POINT[axis]]) * 1e3:.3f} mm" for axis in "yz")
     lines = [
         f"hit {history.attrs[attr.HIT]} at {place}",

@@ -1,4 +1,4 @@
-"""What hits tell about a point between them: a plane through the nearest ones, and how sure it is."""
+"""Local estimates between the hits: a plane through the nearest hits, and its uncertainty."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 NEIGHBOURS = 24
-"""Hits that a plane is fitted to: 21 are left to tell the scatter by, and few enough to stay local."""
+"""Number of hits in the fit of a plane. It leaves 21 degrees of freedom for the scatter, and the fit stays local."""
 _COEFFICIENTS = 3
 
 
 class Local(NamedTuple):
-    """Of points, shape [points]: the value there, half the width of its confidence interval, and the standard
-    deviation of the hits about the plane; all in the unit of the values."""
+    """Estimates at points, each of shape [points] and in the unit of the values: the value, half the width of its
+    confidence interval, and the standard deviation of the hits about the plane."""
 
     value: Array
     half_width: Array
@@ -28,16 +28,16 @@ class Local(NamedTuple):
 
 
 def plane_fit(offsets: Array, values: Array, confidence: float = 0.95) -> Local:
-    """Value at points by least squares: a plane through the values of the hits near each (local linear regression,
-    Cleveland and Devlin 1988, with equal weights).
+    """Value at points by least squares: a plane through the values of the hits near each point (local linear
+    regression, Cleveland and Devlin 1988, with equal weights).
 
-    The interval is Student's with what scatters about the plane, so a bend or a jump of the map within the hits'
-    reach widens it like the scatter of shots does. It takes the hits for independent: where images of each other
-    meet, on an axis of symmetry, it is up to √2 too narrow.
+    The interval is Student's and uses the scatter about the plane. A bend or a jump of the map among the hits widens
+    it in the same way as the scatter of shots. It assumes independent hits. Next to an axis of symmetry, where hits
+    and their images meet, it is up to √2 too narrow.
 
     Args:
-        offsets: of the hits from the point [m], shape [points, hits, 2].
-        values: of the hits, shape [points, hits].
+        offsets: from each point to its hits [m], shape [points, hits, 2].
+        values: values of the hits, shape [points, hits].
     """
     count = values.shape[1]
     reach = np.abs(offsets).max(axis=(1, 2), keepdims=True)
@@ -52,11 +52,10 @@ def plane_fit(offsets: Array, values: Array, confidence: float = 0.95) -> Local:
 
 
 def share_of(hits: Array, confidence: float = 0.95) -> tuple[Array, Array]:
-    """Share of the ones among zeros and ones, and half the width of its interval (Wilson's; it takes the hits for
-    independent).
+    """Share of ones among zeros and ones, and half the width of its interval (Wilson's; it assumes independent hits).
 
     Args:
-        hits: shape [points, hits]; the results have the shape [points].
+        hits: zeros and ones, shape [points, hits]; the results have the shape [points].
     """
     count, share = hits.shape[1], hits.mean(axis=1)
     z = float(normal.ppf(0.5 + 0.5 * confidence))

@@ -1,4 +1,4 @@
-"""The few numbers that tell one perforated plate from another."""
+"""Characteristic numbers of a perforated plate: open area, smallest ligament, areal density."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import math
 
 
 def plate_numbers(open_area: float, ligament: float, areal_density: float, resolution: float = 0.0) -> dict[str, str]:
-    """Numbers of a plate as a person reads them, by their names.
+    """Numbers of a plate as text with units, by name.
 
     Args:
         open_area: share of holes.
-        ligament: the smallest one [m]; inf where there is none, which is then left out.
+        ligament: the smallest one [m]; inf if there is none, and then it is left out.
         areal_density: [kg/m²].
-        resolution: of the ligament [m].
+        resolution: resolution of the ligament [m]; 0 if it is exact.
     """
     numbers = {"open area": f"{open_area:.1%}"}
     if math.isfinite(ligament):

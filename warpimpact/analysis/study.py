@@ -1,9 +1,9 @@
-"""The trade of speed for accuracy, measured on one's own scene and machine.
+"""Error and speed of the numerics, measured on a campaign's scene and on this machine.
 
-The converged answer comes from patches, grid and time step refined together. On every level the error of first order
-in the time step is removed by extrapolation from a second run with twice the step. The grid's and the patches' own
-error is not extrapolated: hit by hit it is no power of the spacing. It falls by about half from level to level, so
-that the change on the last level bounds what is left, and stands for the uncertainty.
+The converged answer comes from patches, grid and time step refined together. On every level, a second run with twice
+the time step serves to extrapolate the error of first order in the step to zero. The error of grid and patches is not
+extrapolated, because for a single hit it follows no power of the spacing. It halves, about, from level to level. So the
+change on the last level bounds the remaining error; it is given as the uncertainty.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ LEVELS = (
     Fidelity(108, 108, 7.5, 0.04),
     Fidelity(162, 160, 11.0, 0.027),
 )
-"""Refinements behind the converged answer, coarse to fine; the uncertainty is the change from the last but one."""
+"""Levels of the converged answer, coarse to fine; the uncertainty is the change from the second last to the last."""
 
 SWEEP = (
     Fidelity(8, 12, 0.7, 0.8),
@@ -53,7 +53,8 @@ SWEEP = (
     Fidelity(56, 48, 4.0, 0.1),
     Fidelity(72, 72, 6.0, 0.07),
 )
-"""Settings beside the named fidelities: near the best of 280 on the slotted plate, coarse to fine."""
+"""Settings to measure besides the named fidelities, coarse to fine. They are close to the best of 280 settings on the
+slotted plate."""
 
 NODAL_STEPS = (1.0e-6, 0.5e-6)
 """Time steps of the paper's literal scheme [s]."""
@@ -62,16 +63,16 @@ QUANTITIES = (v.RESIDUAL_VELOCITY, v.TILT)
 QUANTILES = (0.5, 0.9, 1.0)
 QUOTED = 0.9
 MEASURED_TIME = 1.0
-"""A setting is timed for at least so long in all [s], ..."""
+"""Shortest total time of measuring the speed of a setting [s]."""
 SHORTEST_RUN = 0.3
-"""... the last time in a run of at least this length [s] ..."""
+"""Shortest time of the last run of a setting [s]."""
 SINGLES = 10.0
-"""... and this many times that of a single hit, so that preparation is no part of the cost and a GPU is filled. The
-hits are taken more than once where they are too few for it."""
+"""Shortest time of the last run of a setting, as a multiple of that of a single hit. It makes preparation negligible
+and fills a GPU. The hits are repeated if they are too few for this."""
 
 
 class Answer(NamedTuple):
-    """What the study compares: status and residual velocity [m/s], shape [hits]; tilt [rad], [hits, stand-offs]."""
+    """What the study compares: status and residual velocity [m/s] of shape [hits], tilt [rad] of [hits, stand-offs]."""
 
     status: NDArray[np.int8]
     residual_velocity: Array
@@ -80,14 +81,14 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Converged:
-    """The converged answer and how far it still moved.
+    """The converged answer, and its changes from level to level.
 
     Attributes:
-        answer: that of the finest level.
+        answer: the answer of the finest level.
         settled: whether the status is the same in all runs of all levels, shape [hits].
-        residual_velocity_changes: from the answer of the level before [m/s], shape [levels, hits]; NaN on the first
-            level and where not settled; likewise
-        tilt_changes: [rad], shape [levels, hits, stand-offs].
+        residual_velocity_changes: changes from the answer of the level before [m/s], shape [levels, hits]; NaN on the
+            first level and for hits that are not settled.
+        tilt_changes: the same for tilt [rad], shape [levels, hits, stand-offs].
     """
 
     answer: Answer
@@ -105,14 +106,15 @@ def study(
     settings: Mapping[str, Numerics] | None = None,
     levels: Sequence[Fidelity] = LEVELS,
 ) -> xarray.Dataset:
-    """Measure error and cost of settings of the numerics on a campaign's scene.
+    """Measure error and speed of settings of the numerics on a campaign's scene.
 
     Args:
         hits: how many hits, spread evenly over the campaign's cell.
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
-        progress: called with (hits, hits in all); the share done is that of the estimated work.
-        settings: what to measure; if None, the fidelities, a sweep and the literal scheme (`default_settings`).
-        levels: refinements behind the converged answer, at least two, coarse to fine.
+        progress: called with (hits done, all hits); their ratio is the finished share of the estimated work.
+        settings: settings to measure, by name; None for the fidelities, a sweep and the literal scheme
+            (`default_settings`).
+        levels: levels of the converged answer, at least two, coarse to fine.
 
     Returns:
         The Dataset of results/dataset.py with dimensions setting, quantile, standoff, level and hit.
@@ -156,7 +158,7 @@ def study(
 
 
 def default_settings(campaign: Campaign) -> dict[str, Numerics]:
-    """The fidelities by their names, and the sweep and the literal scheme by what they are."""
+    """The fidelities by their names; the sweep and the literal scheme by their settings."""
     fidelities = {name: Numerics(fidelity=name) for name in FIDELITIES}
     sweep = [spelt_out(setting, campaign.scene, campaign.impact) for setting in SWEEP]
     nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
@@ -172,12 +174,16 @@ def label(campaign: Campaign, numerics: Numerics) -> str:
 
 
 def _time_step(campaign: Campaign, resolution: Resolution) -> float:
-    """Of the campaign's impact [s]."""
+    """Time step at the campaign's impact velocity [s]."""
     return resolution.step_of(campaign.impact, campaign.plate)
 
 
 def extrapolated(double: Answer, single: Answer) -> Answer:
-    """The answer without its error of first order in the time step, from runs with twice the step and once."""
+    """The answer without its error of first order in the time step.
+
+    Args:
+        double, single: runs with twice the time step and with the time step.
+    """
     return Answer(
         single.status,
         np.maximum(2.0 * single.residual_velocity - double.residual_velocity, 0.0),
@@ -186,7 +192,7 @@ def extrapolated(double: Answer, single: Answer) -> Answer:
 
 
 def converged(runs: Sequence[tuple[Answer, Answer]]) -> Converged:
-    """The converged answer of runs with twice the time step and once on each level, coarse to fine."""
+    """The converged answer from the levels, coarse to fine: on each a run with twice the time step and one with it."""
     statuses = np.array([run.status for pair in runs for run in pair])
     settled = (statuses == statuses[-1]).all(axis=0)
     answers = [extrapolated(*pair) for pair in runs]
@@ -205,7 +211,7 @@ def converged(runs: Sequence[tuple[Answer, Answer]]) -> Converged:
 
 
 def front(rates: Array, errors: Array) -> NDArray[np.bool_]:
-    """Which settings no other one beats in both speed and error; arrays of shape [settings]."""
+    """Settings that no other one beats in both speed and error; arrays of shape [settings]."""
     no_worse = (rates[:, None] >= rates) & (errors[:, None] <= errors)
     better = (rates[:, None] > rates) | (errors[:, None] < errors)
     return np.isfinite(errors) & ~(no_worse & better).any(axis=0)
@@ -216,7 +222,7 @@ class _Bench:
 
     def __init__(self, campaign: Campaign, hits: int, device: str, progress: Progress) -> None:
         self.campaign, self.device = campaign, find_device(device)
-        plain = campaign.scene.record.model_copy(update={"bending": False})  # which the literal scheme has not
+        plain = campaign.scene.record.model_copy(update={"bending": False})  # the literal scheme computes no bending
         self.scene = campaign.scene.model_copy(update={"record": plain})
         self.progress, self.work, self.total = progress, 0.0, 0.0
         spread = Hits(count=hits, seed=campaign.hits.seed)
@@ -226,11 +232,11 @@ class _Bench:
         return spelt_out(fidelity, self.campaign.scene, self.campaign.impact)
 
     def expect(self, runs: Sequence[Numerics]) -> None:
-        """Say what is going to be computed, for the progress."""
+        """Announce all runs to come, for the progress."""
         self.total = sum(self._work(numerics) for numerics in runs)
 
     def compute(self, numerics: Numerics) -> tuple[Answer, float]:
-        """Answer, and the time it took [s]; counts as progress."""
+        """Answer, and its computing time [s]; it counts as progress."""
         work, hits = self._work(numerics), len(self.shots)
 
         def show(done: int, total: int) -> None:
@@ -243,7 +249,7 @@ class _Bench:
         return Answer(outcomes.status, outcomes.residual_velocity, outcomes.tilt), elapsed
 
     def measure(self, numerics: Numerics) -> tuple[Answer, float]:
-        """Answer, and hits per second at best, with the kernels built beforehand."""
+        """Answer, and the highest measured hits per second; building the kernels does not count."""
         single = min(self._seconds(numerics, self.shots[:1]) for _ in range(2))  # the first time builds kernels
         shortest = max(SHORTEST_RUN, SINGLES * single)
         answer, elapsed = self.compute(numerics)
@@ -260,7 +266,7 @@ class _Bench:
         return time.perf_counter() - begin
 
     def _work(self, numerics: Numerics) -> float:
-        """Patches times steps of a hit, up to a factor."""
+        """Estimated work of a hit: proportional to patches times steps."""
         resolution = resolve(numerics, self.campaign.scene)
         return resolution.patches_axial * resolution.patches_around / _time_step(self.campaign, resolution)
 
@@ -278,7 +284,7 @@ def _doubled(level: Fidelity) -> Fidelity:
 
 
 def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> dict[str, Any]:
-    """The numerics of every setting with all choices made."""
+    """The numerics of every setting, with every default filled in."""
     resolutions = [resolve(numerics, campaign.scene) for numerics in settings.values()]
     values: dict[str, Any] = {
         name: np.array([getattr(resolution, name) for resolution in resolutions])
@@ -289,7 +295,7 @@ def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> di
 
 
 def _error_values(answers: Sequence[Answer], truth: Converged) -> dict[str, Any]:
-    """Errors of every setting over the settled hits that end as they do in the converged answer."""
+    """Errors of every setting over the settled hits whose status is that of the converged answer."""
     same = np.array([answer.status == truth.answer.status for answer in answers])
 
     def errors(name: str, index: int) -> Array:
@@ -318,6 +324,6 @@ def _converged_values(truth: Converged) -> dict[str, Any]:
 
 
 def _quantiles(errors: Array) -> Array:
-    """QUANTILES over the first axis, of the values that exist; NaN where there is none."""
-    with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # of a slice without values
+    """QUANTILES over the first axis, without NaN; NaN where there is no value."""
+    with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # numpy warns of a slice without values
         return np.asarray(np.nanquantile(errors, QUANTILES, axis=0))

@@ -1,4 +1,4 @@
-"""A study of speed and accuracy in words: its table, and what the literal scheme costs."""
+"""The text of a study: its table, and its comparison with the literal scheme."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from warpimpact.results import variables as v
 
 
 def advantage(dataset: xarray.Dataset, literal: str) -> tuple[str, float] | None:
-    """The fastest consistent setting with 90 % errors no larger than those of a literal one (by its name), at the last
-    stand-off, and how many times as fast it is; None if there is none."""
+    """The fastest consistent setting that is as accurate as a literal one, and its speed over that of the literal one.
+
+    As accurate means 90 % errors that are no larger at the last stand-off. None if there is no such setting.
+
+    Args:
+        literal: name of the literal setting.
+    """
     quoted = dataset.sel(quantile=QUOTED).isel(standoff=-1)
     rival = quoted.sel(setting=literal)
     no_worse = quoted[v.SCHEME] == "consistent"
@@ -23,7 +28,7 @@ def advantage(dataset: xarray.Dataset, literal: str) -> tuple[str, float] | None
 
 
 def study_text(dataset: xarray.Dataset) -> str:
-    """The study as a table, fast to slow, and what the converged answer is worth."""
+    """The study as a table, fast to slow, and the uncertainty of the converged answer."""
     last = dataset.isel(standoff=-1).sortby(v.HITS_PER_SECOND, ascending=False)
     standoff = f"{last[v.STANDOFF].item() * 1e3:g} mm"
     change = last.isel(level=-1).sel(quantile=QUOTED)
@@ -40,7 +45,7 @@ def study_text(dataset: xarray.Dataset) -> str:
     ]
     if unsettled:
         lines.append(
-            f"left out, as their status still depends on the numerics: {unsettled} of {dataset.sizes['hit']} hits"
+            f"left out: {unsettled} of {dataset.sizes['hit']} hits, because their status depends on the numerics"
         )
     return "\n".join(lines)
 
@@ -48,8 +53,8 @@ def study_text(dataset: xarray.Dataset) -> str:
 def _advantage_line(dataset: xarray.Dataset, literal: str) -> str:
     found = advantage(dataset, literal)
     if found is None:
-        return f"{literal}: no setting of the consistent scheme is as close"
-    return f"{literal}: {found[0]} is no further off and {found[1]:.3g} times as fast"
+        return f"{literal}: no setting of the consistent scheme is as accurate"
+    return f"{literal}: {found[0]} is at least as accurate and {found[1]:.3g} times as fast"
 
 
 def _heads() -> str:

@@ -1,4 +1,4 @@
-"""Where the plate presses on a core's surface, and how hard, from the history of a hit alone."""
+"""Normal stress on the surface of a core, from the history of a hit alone."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 AROUND = 72
-"""Points round the core on every section of its profile."""
-_SPENT = 1e-9  # share of the resistance that counts as none
-_AT_REST = 1e-5  # a wall that slides along itself closes in by rounding only; a share of its speed
+"""Points around the core on every section of its profile."""
+_SPENT = 1e-9  # a smaller share of the resistance counts as none
+_AT_REST = 1e-5  # share of the speed; less is rounding: a wall that slides along itself does not close in
 
 
 class Surface(NamedTuple):
-    """A core's surface at an instant: points in the plate [m] and outward normals, shape [sections, around, 3]; areas
-    [m²] and normal stress as a share of that of the untouched plate at rest, shape [sections, around]."""
+    """A core's surface at an instant.
+
+    Points in the plate [m] and outward normals have the shape [sections, around, 3]. Areas [m²] and the normal stress,
+    as a share of that of the untouched plate at rest, have the shape [sections, around].
+    """
 
     point: Array
     normal: Array
@@ -33,11 +36,12 @@ class Surface(NamedTuple):
 
 
 def pressed(history: xarray.Dataset, step: int) -> Surface:
-    """The core's surface in a step of its history, and what presses on it by the paper's law (its eqs. 4 and 5).
+    """The core's surface in a step of its history, with the normal stress of the paper's law (its eqs. 4 and 5).
 
-    A point is pressed where it is in the slab and advances along its normal, by the share of the resistance left there.
-    Of 48 hits on the slotted plate without friction, under their largest force, the sum is 0.86 to 1.26 times the
-    recorded force, and within 4° of it. The discs that close nose and base are left out.
+    A point carries stress if it is in the plate and advances along its normal. The stress is the share of the
+    resistance that is left there. For 48 hits on the slotted plate without friction, at their largest force, the sum
+    of the stresses is 0.86 to 1.26 times the recorded force, and its direction is within 4° of it. The discs that close
+    nose and base are left out.
     """
     arm, normal, area = _body(history)
     turn = Rotation.from_quat(history[v.ATTITUDE].values[step])
@@ -52,7 +56,7 @@ def pressed(history: xarray.Dataset, step: int) -> Surface:
 
 
 def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
-    """Points from the centre of mass and normals in the axes of the body, and areas, as of `Surface`."""
+    """Points relative to the centre of mass and normals, both in body axes, and areas; shapes as in `Surface`."""
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
     along, outward = -np.diff(station), np.diff(radius)  # from one section to the next, towards the base
     slant = np.hypot(along, outward)
@@ -68,8 +72,10 @@ def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
 
 
 def _left(history: xarray.Dataset, step: int, point: Array) -> Array:
-    """Share of the resistance left at points of the plate: between snapshots its logarithm, which follows the exposure,
-    changes evenly; 0 beyond what the snapshots show."""
+    """Share of the resistance left at points of the plate; 0 outside the cells of the snapshots.
+
+    Between snapshots the logarithm is interpolated, because it is proportional to the exposure.
+    """
     share = history[v.RESISTANCE_SHARE]
     spent = xarray.where(share > _SPENT, share, _SPENT)
     now = np.exp(xarray.apply_ufunc(np.log, spent).interp(snapshot=history[v.TIME][step]))

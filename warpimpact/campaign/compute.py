@@ -1,4 +1,4 @@
-"""The one place where shots of a campaign become a Dataset, on whatever machine."""
+"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ def compute(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> xarray.Dataset:
-    """Compute some shots of a campaign; where it asks for symmetry, the first of each hit's images for all of them.
+    """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
     Args:
         shots: whole groups of images, as the campaign's sampler gives them.
-        promise: what a pilot found (`promise_of`); None is to compute with the numerics as they are given.
-        solid: shots at the solid plate of equal areal density, too; None are none.
+        promise: the finding of a pilot (`promise_of`); None to compute with the numerics as they are given.
+        solid: shots at the solid plate of equal areal density; None for no such shots.
         device, threads, progress: as in `simulate`.
 
     Returns:
-        The Dataset of results/dataset.py, one entry per shot: a result of its own.
+        The Dataset of results/dataset.py, one entry per shot; it is a complete result.
 
     Raises:
         DeviceError: the device is absent.
@@ -102,10 +102,10 @@ def compute(
 
 
 def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
-    """What a pilot of the campaign's own hits finds; None where the campaign fixes the resolution itself.
+    """The promise that a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
 
-    The pilot takes the first hits of a sampling whose points are spread evenly in any order, and of a grid or a list
-    some from end to end: it follows from the campaign alone.
+    The pilot takes the first hits of a Sobol or random sampling. It takes hits at even distances from a grid or a list.
+    So it depends on the campaign alone.
 
     Raises:
         DeviceError: the device is absent.
@@ -147,7 +147,7 @@ def promise_in(dataset: xarray.Dataset) -> Promise | None:
 
 
 def _build(scene: Scene, shots: Shots, numerics: Numerics | Fidelity, device: str) -> None:
-    """Have the kernels ready, so that the time of computing is that alone."""
+    """Build the kernels first, so that the measured time is that of computing alone."""
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
         numerics = Numerics(precision=numerics.precision)
     build(scene, shots, numerics=numerics, device=device)
@@ -161,14 +161,14 @@ def _outcomes(
     threads: int | None,
     progress: Progress | None = None,
 ) -> tuple[Outcomes, Estimates | None]:
-    """Outcomes, with estimates of their errors where the numerics have a tolerance."""
+    """Outcomes, and estimates of their errors if the numerics have a tolerance."""
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
         return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
     return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
 
 
 def _impact(campaign: Campaign) -> str:
-    """How the core arrives, as JSON: of each quantity its value or its distribution, that of its mass included."""
+    """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
     scatter = {name: given.model_dump() for name, given in campaign.scatter.given.items()}
     return json.dumps(
         dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
@@ -176,12 +176,12 @@ def _impact(campaign: Campaign) -> str:
 
 
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
-    """By which symmetries hits were unfolded, and how many were computed."""
+    """Symmetries by which hits were unfolded, and the number of computed hits."""
     return {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
 
 
 def made_by(device: str) -> dict[str, str]:
-    """Versions and kind of device: what decides the bits beside the campaign."""
+    """Versions and kind of device: with the campaign, they determine the bits of a result."""
     chosen = find_device(device)
     return {
         **attr.versions(),

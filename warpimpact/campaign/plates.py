@@ -1,4 +1,4 @@
-"""A campaign file with several plates, each of which is a campaign of its own."""
+"""Reads a campaign file with several plates as one campaign per plate."""
 
 import json
 import re
@@ -9,32 +9,32 @@ from ..scene.units import quoted
 from .campaign import Campaign, CampaignError, parsed, read_text
 
 _NAME = re.compile(r"\w[\w .+-]*")
-"""Names of plates: those of their result files, too."""
+"""Names of plates; the result files get the same names."""
 
 
 def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Campaign]:
-    """Read a campaign file with an array of tables `[[plate]]`, each with a `name`; all else is shared.
+    """Read a campaign file with several tables `[[plate]]`, each with a `name`; everything else is shared.
 
     Args:
         path: the TOML file.
-        count: number of hits, in place of the file's.
+        count: number of hits, instead of the file's.
 
     Returns:
         Name of each plate → its campaign, in the order of the file.
 
     Raises:
-        CampaignError: the file is missing, is no TOML, has one plate only, or asks for something that cannot be.
+        CampaignError: the file is missing, is not TOML, has only one plate, or contains an invalid value.
     """
     path = Path(path)
     shared = parsed(read_text(path), str(path))
     plates = shared.pop("plate", None)
     if not isinstance(plates, list) or len(plates) < 2:
-        raise CampaignError(f"{path}: plate: must be two tables [[plate]] or more, each with a name, to be compared")
+        raise CampaignError(f"{path}: plate: a comparison needs two or more tables [[plate]], each with a name")
     campaigns: dict[str, Campaign] = {}
     for place, plate in enumerate(plates):
         name = _name(plate, f"{path}: plate[{place}].name")
         if name in campaigns:
-            raise CampaignError(f'{path}: plate[{place}].name: got "{name}" again, but each plate needs its own')
+            raise CampaignError(f'{path}: plate[{place}].name: got "{name}" again, but each plate needs its own name')
         rest = {key: value for key, value in plate.items() if key != "name"}
         title = {"title": f"{shared['title']}: {name}"} if isinstance(shared.get("title"), str) else {}
         campaigns[name] = Campaign.from_text(
@@ -52,7 +52,7 @@ def _name(plate: Any, place: str) -> str:
     name = plate["name"]
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise CampaignError(
-            f"{place}: got {quoted(name)}, but a name begins with a letter or digit and has only letters, digits, "
-            "blanks and any of _ . + - in it"
+            f"{place}: got {quoted(name)}, but a name begins with a letter or a digit and contains only letters, "
+            "digits, blanks and the characters _ . + -"
         )
     return name

@@ -1,4 +1,4 @@
-"""From a result back to one of its hits, computed again with its history."""
+"""Replay: one hit of a result, computed again with its history."""
 
 from __future__ import annotations
 
@@ -20,29 +20,28 @@ from warpimpact.solver.resolution import Fidelity, level
 from warpimpact.solver.unfold import image_of
 
 ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
-"""How far another device's rounding may move an outcome [m/s, degree]. Between single and double precision, 6144
-hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
+"""Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
+6144 hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
 _OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES)
 
 
 def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
-    """Compute one hit of a result again, on the CPU, from the campaign that the result carries.
+    """Compute one hit of a result again, on the CPU, from the campaign that the result contains.
 
-    Of a hit unfolded by symmetry, the hit that was computed for it is computed again, and its history unfolded.
+    If symmetry unfolded the hit, the computed hit of its group is computed again and its history is unfolded.
 
     Args:
         result: the Dataset of `run`.
         hit: its index in the result.
-        folder: where the files are that the campaign names.
+        folder: folder of the files that the campaign names.
 
     Returns:
-        The Dataset of `results.history_dataset`. Its attribute `agreement` tells how its end compares with the
-        stored outcome: "bit-identical", as it must be on the same CPU; "within rounding", which is all that
-        another device's result can be; or "different".
+        The Dataset of `results.history_dataset`. Its attribute `agreement` compares its end with the stored
+        outcome: "bit-identical", as on the same CPU; "within rounding", as after another device; or "different".
 
     Raises:
-        ResultError: there is no such hit, or the campaign no longer gives it.
-        CampaignError: the campaign in the result cannot be read, for instance because a file it names is missing.
+        ResultError: there is no such hit, or the campaign and its files now give another one.
+        CampaignError: the campaign in the result cannot be read, for example because a file that it names is missing.
     """
     hits = result.sizes["hit"]
     if not 0 <= hit < hits:
@@ -50,7 +49,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     campaign = _campaign(result, folder)
     sampler = campaign.sampler()
     if len(sampler) != hits and (campaign.stop is None or len(sampler) < hits):
-        raise ResultError(f"got a result of {hits} hits, but its campaign and the files it names give {len(sampler)}")
+        raise ResultError(f"got a result with {hits} hits, but its campaign and the files it names give {len(sampler)}")
     scene, group = campaign.scene, campaign.symmetries
     image = hit % len(group)
     images = sampler.shots(hit - image, len(group))
@@ -63,7 +62,9 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     )
     stored = result.isel(hit=hit)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
-        raise ResultError(f"hit: got {hit}, whose shot is no longer what the campaign and the files it names give")
+        raise ResultError(
+            f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
+        )
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
         attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
         attr.HIT: hit,
@@ -84,14 +85,14 @@ def _numerics(campaign: Campaign, result: xarray.Dataset, hit: int) -> Numerics 
 
 def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
     if attr.CAMPAIGN not in result.attrs:
-        raise ResultError("the result does not carry its campaign")
+        raise ResultError("the result does not contain its campaign")
     count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
     text = result.attrs[attr.CAMPAIGN]
     return Campaign.from_text(text, name="the campaign in the result", folder=folder, count=count)
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:
-    """Whether variables agree in every bit, a NaN with a NaN."""
+    """Whether variables agree in every bit; NaN equals NaN."""
     return all(np.array_equal(one[name], other[name], equal_nan=True) for name in names)
 
 

@@ -10,13 +10,13 @@ from ..scene.units import Number, quoted
 
 
 class Stop(Model):
-    """When a campaign is good enough: the half width of a confidence interval.
+    """When a run ends: as soon as a confidence interval is narrow enough.
 
     Attributes:
         quantity: see `Measure.parse`.
-        half_width: at most this, SI.
+        half_width: largest half width of the interval, SI.
         confidence: of the interval.
-        max_count: shots after which it ends anyhow.
+        max_count: number of shots after which the run ends in any case.
     """
 
     quantity: str
@@ -34,7 +34,7 @@ class Stop(Model):
     @classmethod
     def _in_si(cls, value: object, info: ValidationInfo) -> float:
         if "quantity" not in info.data:
-            raise ValueError(f"got {quoted(value)}, which means nothing without a quantity")
+            raise ValueError(f"got {quoted(value)}, but it needs a valid stop.quantity")
         number = Measure.parse(info.data["quantity"]).in_units(value)
         if number <= 0.0:
             raise ValueError(f"got {quoted(value)}, but it must be greater than 0")

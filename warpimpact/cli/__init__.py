@@ -1,6 +1,6 @@
 """The `warpimpact` command: what a person types, progress, tables and clear errors.
 
-A file per group of commands. What is heavy is imported once a command needs it, which keeps `--help` quick. Change
+One file per group of commands. A command imports what is heavy when it runs; this keeps `--help` quick. Change
 arguments, messages and progress here; a number is computed in another room. It imports every other room.
 """
 
@@ -34,7 +34,7 @@ _COMMANDS = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; returns the exit code: 2 after a mistake that the user can put right, 3 when more shots failed
+    """Run one command and return its exit code: 2 after a mistake that the user can correct, 3 when more shots failed
     than the campaign allows, 130 when interrupted."""
     arguments = _parser().parse_args(argv)
     try:

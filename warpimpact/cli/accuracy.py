@@ -1,4 +1,4 @@
-"""Study, validate: how far the numbers can be trusted."""
+"""The commands study and validate: how accurate the results are."""
 
 import argparse
 from pathlib import Path
@@ -14,19 +14,19 @@ def add_study(commands: Commands) -> None:
         commands,
         "study",
         _study,
-        summary="measure what accuracy costs on a campaign's scene",
-        description="Measure error and speed of the numerics, coarse to fine, against a converged answer; write them "
-        "as one netCDF file with a figure beside it. Takes minutes.",
+        summary="measure error and speed of the numerics on a campaign",
+        description="Measure error and speed of the numerics, coarse to fine, against a converged answer. Write one "
+        "netCDF file and a figure beside it. This takes minutes.",
         example="study campaigns/slotted_plate.toml --hits 128",
     )
     add_campaign(parser)
-    add_output(parser, "STUDY.nc", "study (default: the campaign's name with _study, here)")
+    add_output(parser, "STUDY.nc", "study file (default: the campaign's name with _study, in this folder)")
     parser.add_argument(
         "--hits",
         type=at_least(1),
         default=512,
         metavar="N",
-        help="hits, spread over the campaign's cell (default: 512)",
+        help="number of hits, spread over the campaign's cell (default: 512)",
     )
     add_device(parser)
     add_overwrite(parser, "an existing study")
@@ -57,12 +57,16 @@ def add_validate(commands: Commands) -> None:
         commands,
         "validate",
         _validate,
-        summary="compare with the published shots",
-        description="Compute the paper's two shots and print them beside its model, experiment and LS-DYNA.",
+        summary="compute the published shots and compare",
+        description="Compute the paper's two shots. Print them beside the paper's model, its experiment and LS-DYNA.",
         example="validate",
     )
     parser.add_argument(
-        "campaign", type=Path, nargs="?", metavar="CAMPAIGN.toml", help="two hits (default: the bundled ones)"
+        "campaign",
+        type=Path,
+        nargs="?",
+        metavar="CAMPAIGN.toml",
+        help="campaign with two hits (default: the bundled one)",
     )
     add_device(parser)
 

@@ -1,10 +1,11 @@
-"""Compare: which of several plates protects better."""
+"""The command compare: which of several plates protects better."""
 
 import argparse
 import math
 import sys
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from warpimpact.results.interrupts import terminated_as_interrupted
 
@@ -20,10 +21,10 @@ def add_compare(commands: Commands) -> None:
         commands,
         "compare",
         _compare,
-        summary="tell which of several plates protects better",
-        description="Compare plates that were hit by the same shots: rankings, differences with their intervals, and a "
-        "figure. A campaign with several plates is run first, each plate into NAME.nc beside the figure; a plate "
-        "whose result is there already is not run again.",
+        summary="compare plates: which protects better",
+        description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. If "
+        "you give a campaign with several plates, it is run first, each plate into NAME.nc beside the figure. A plate "
+        "whose result exists already is not run again.",
         example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
     )
     parser.add_argument(
@@ -33,22 +34,26 @@ def add_compare(commands: Commands) -> None:
         metavar="RESULT.nc",
         help="two or more results of warpimpact run, or one campaign with several [[plate]] tables",
     )
-    add_output(parser, "FIGURE.png", "figure, PNG, PDF or SVG (default: comparison.png here, or the campaign's name)")
+    add_output(
+        parser,
+        "FIGURE.png",
+        "figure as PNG, PDF or SVG (default: comparison.png, or the campaign's name, in this folder)",
+    )
     parser.add_argument(
         "--angle",
         default="30 deg",
         metavar="ANGLE",
-        help='inclination beyond which a core counts as tilted (default: "%(default)s")',
+        help='a core with a larger inclination counts as tilted (default: "%(default)s")',
     )
     parser.add_argument(
         "--standoff",
         metavar="LENGTH",
-        help='where tilt counts, such as "130 mm" (default: the largest of the results)',
+        help='stand-off at which the tilt counts, such as "130 mm" (default: the largest of the results)',
     )
     add_device(parser)
     add_count(parser)
-    parser.add_argument("--resume", action="store_true", help="continue a campaign that was broken off")
-    parser.add_argument("--overwrite", action="store_true", help="compute the plates of a campaign anew")
+    parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign")
+    parser.add_argument("--overwrite", action="store_true", help="compute all plates of a campaign again")
 
 
 def _compare(arguments: argparse.Namespace) -> int:
@@ -64,7 +69,7 @@ def _compare(arguments: argparse.Namespace) -> int:
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
     if len(paths) < 2:
         raise files.ResultError(
-            f"{arguments.files[0]}: is one result, but two or more, or one campaign, are needed to compare"
+            f"{arguments.files[0]}: got one result, but compare needs at least two results, or one campaign"
         )
     with ExitStack() as stack:
         datasets = [stack.enter_context(files.opened(path)) for path in paths.values()]
@@ -77,28 +82,33 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 
 def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
-    """Angle [rad] and stand-off [m] that a person wrote."""
+    """The angle [rad] and the stand-off [m] of the command line."""
     from warpimpact.results.files import ResultError
     from warpimpact.scene.units import Angle, Length, quantity
 
-    try:
-        angle = quantity(Angle)(arguments.angle)
-        standoff = None if arguments.standoff is None else quantity(Length)(arguments.standoff)
-    except ValueError as error:
-        raise ResultError(f"--angle, --standoff: {error}") from None
+    def read(option: str, kind: Any, text: str) -> float:
+        try:
+            return float(quantity(kind)(text))
+        except ValueError as error:
+            raise ResultError(f"{option}: {error}") from None
+
+    angle = read("--angle", Angle, arguments.angle)
+    standoff = None if arguments.standoff is None else read("--standoff", Length, arguments.standoff)
     if not 0.0 <= angle < math.pi / 2:
         raise ResultError(f'--angle: got "{arguments.angle}", but it must be at least 0 and less than 90 deg')
     return angle, standoff
 
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
-    """The results of a campaign's plates by their names, computed where they are not there."""
+    """Result files of a campaign's plates by name; computes those that do not exist."""
     from warpimpact.campaign.campaign import CampaignError
     from warpimpact.campaign.plates import read_plates
     from warpimpact.campaign.run import run_to_file
 
     if len(arguments.files) > 1:
-        raise CampaignError(f"{arguments.files[0]}: is a campaign, which is compared on its own")
+        raise CampaignError(
+            f"{arguments.files[0]}: got a campaign and other files, but compare takes either one campaign or results"
+        )
     campaigns = read_plates(arguments.files[0], count=arguments.count)
     paths = {name: folder / f"{name}.nc" for name in campaigns}
     for name, campaign in campaigns.items():

@@ -1,4 +1,4 @@
-"""Export, report: a result as it is handed on."""
+"""The commands export and report: a result for other programs and other people."""
 
 import argparse
 from contextlib import ExitStack
@@ -16,8 +16,8 @@ def add_export(commands: Commands) -> None:
         "export",
         _export,
         summary="write a result as CSV, or a replayed hit for ParaView",
-        description="Write a result as CSV with one row per hit, or the history of a hit as a folder of VTK files: "
-        "open core.pvd and plate.pvd of it in ParaView. VTK needs: pip install 'warpimpact[vtk]'",
+        description="Write a result as CSV, one row per hit. Or write the history of a hit as a folder of VTK files; "
+        "open its core.pvd and plate.pvd in ParaView. VTK needs: pip install 'warpimpact[vtk]'",
         example="export slotted.nc -o slotted.csv",
     )
     parser.add_argument(
@@ -26,7 +26,7 @@ def add_export(commands: Commands) -> None:
     add_output(
         parser,
         "RESULT.csv|FOLDER",
-        "CSV file, or new folder for VTK (default: the file's name, beside it, with .csv or _vtk)",
+        "CSV file, or new folder for VTK (default: beside the file, its name with .csv or _vtk)",
     )
     add_overwrite(parser, "an existing CSV file")
 
@@ -42,7 +42,7 @@ def _export(arguments: argparse.Namespace) -> None:
             output = output or path.with_name(f"{path.stem}_vtk")
             check_folder(output.parent)
             if output.exists():
-                raise files.OutputError(f"{output}: exists already; name a new folder")
+                raise files.OutputError(f"{output}: exists already; give a new folder with -o")
             written = write_vtk(dataset.load(), output)
         else:
             output = output or path.with_suffix(".csv")
@@ -59,21 +59,21 @@ def add_report(commands: Commands) -> None:
         "report",
         _report,
         summary="write a report as one HTML file",
-        description="Write a report of one or several results as one HTML file that works offline: what was asked, the "
-        "plates, maps to point at, trajectories to click, numbers with intervals, limits of the model.",
+        description="Write a report of one or several results as one HTML file that works offline. It shows the "
+        "campaign, the plates, interactive maps and trajectories, numbers with intervals, and the limits of the model.",
         example="report slotted.nc -o slotted.html",
     )
     add_results(parser)
-    add_output(parser, "REPORT.html", "report (default: the first result's name, beside it)")
+    add_output(parser, "REPORT.html", "report file (default: beside the first result, its name with .html)")
     parser.add_argument(
         "--trajectories",
         type=at_least(0),
         default=32,
         metavar="N",
-        help="hits of each result to replay: the worst, and others spread evenly (default: 32)",
+        help="number of hits to replay per result: the worst, and others spread evenly (default: 32)",
     )
-    parser.add_argument("--study", type=Path, metavar="STUDY.nc", help="accuracy, as warpimpact study measured it")
-    add_campaign_folder(parser, "where the files are that campaigns name, as in replay")
+    parser.add_argument("--study", type=Path, metavar="STUDY.nc", help="accuracy to show, written by warpimpact study")
+    add_campaign_folder(parser, "folder of the files that the campaigns name (default: the folder of each result)")
     add_overwrite(parser, "an existing report")
 
 
@@ -89,7 +89,7 @@ def _report(arguments: argparse.Namespace) -> None:
         datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
         study = files.read_study(arguments.study) if arguments.study else None
         progress = stack.enter_context(show_count())
-        with folder_told(", --trajectories 0 needs none"):
+        with folder_told(", or --trajectories 0, which needs none of them"):
             write_report(
                 datasets,
                 output,

@@ -1,4 +1,4 @@
-"""Mistakes that a person can put right, and what they are told."""
+"""Errors that the user can correct, and what their messages add."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 def mistakes() -> tuple[type[Exception], ...]:
-    """Errors whose message is for the user."""
+    """Classes of errors whose message is for the user."""
     from warpimpact.campaign.campaign import CampaignError
     from warpimpact.campaign.team import ClusterError
     from warpimpact.results.files import OutputError, ResultError
@@ -17,7 +17,7 @@ def mistakes() -> tuple[type[Exception], ...]:
 
 @contextmanager
 def memory_told(campaign: Path) -> Iterator[None]:
-    """Memory that cannot be had is a mistake of the campaign that asks for it."""
+    """Report a lack of memory as an error of the campaign that needs it."""
     from warpimpact.campaign.campaign import CampaignError
 
     try:
@@ -28,10 +28,10 @@ def memory_told(campaign: Path) -> Iterator[None]:
 
 @contextmanager
 def folder_told(more: str = "") -> Iterator[None]:
-    """What is wrong with the campaign that a result carries, with the option that may help, and more."""
+    """Add the option that may help to an error of the campaign that a result contains; `more` follows it."""
     from warpimpact.campaign.campaign import CampaignError
 
     try:
         yield
     except CampaignError as error:
-        raise CampaignError(f"{error}; --campaign-folder tells where the campaign's files are{more}") from None
+        raise CampaignError(f"{error}; give the folder of the campaign's files with --campaign-folder{more}") from None

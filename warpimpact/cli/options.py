@@ -12,11 +12,11 @@ Command: TypeAlias = Callable[[argparse.Namespace], int | None]
 def add_command(
     commands: Commands, name: str, command: Command, *, summary: str, description: str, example: str
 ) -> argparse.ArgumentParser:
-    """The parser of a new command, of which `command` returns the exit code, None for 0.
+    """Add a command and return its parser. `command` returns the exit code; None means 0.
 
     Args:
-        summary: its line in the help of all commands.
-        example: what a person may type, but for the program's name.
+        summary: the line of the command in `warpimpact --help`.
+        example: a command line, without the program's name.
     """
     parser = commands.add_parser(name, help=summary, description=description, epilog=f"example: warpimpact {example}")
     parser.set_defaults(command=command)
@@ -24,7 +24,9 @@ def add_command(
 
 
 def add_campaign(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("campaign", type=Path, metavar="CAMPAIGN.toml", help="what is shot at what")
+    parser.add_argument(
+        "campaign", type=Path, metavar="CAMPAIGN.toml", help="campaign file: core, plate, shots and numerics"
+    )
 
 
 def add_result(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +46,7 @@ def add_overwrite(parser: argparse.ArgumentParser, replaced: str) -> None:
 
 
 def add_count(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--count", type=int, metavar="N", help="number of hits, in place of the campaign's")
+    parser.add_argument("--count", type=int, metavar="N", help="number of hits, instead of the campaign's")
 
 
 def add_campaign_folder(parser: argparse.ArgumentParser, text: str) -> None:
@@ -56,12 +58,12 @@ def add_device(parser: argparse.ArgumentParser) -> None:
         "--device",
         default="auto",
         metavar="auto|cpu|cuda:0",
-        help="auto takes CUDA where there is any; several for a run: cuda:0,cuda:1",
+        help="where to compute (default: auto, which takes a GPU if there is one); a run takes several: cuda:0,cuda:1",
     )
 
 
 def at_least(least: int) -> Callable[[str], int]:
-    """The reader of a whole number that has a least value."""
+    """Return a parser of whole numbers that are at least `least`."""
 
     def whole_number(text: str) -> int:
         if (number := int(text)) < least:

@@ -1,5 +1,5 @@
-"""The files that a person names: results told apart, and outputs refused before hours of computing what could not be
-written after them."""
+"""Checks of paths: results get different names, and an output that cannot be written is refused before the computing
+starts."""
 
 import tempfile
 from collections.abc import Sequence
@@ -7,17 +7,17 @@ from pathlib import Path
 
 
 def named(paths: Sequence[Path]) -> dict[str, Path]:
-    """Results under names that tell them apart."""
+    """Results by names that differ: the stems of the files, or else the whole paths."""
     from warpimpact.results.files import ResultError
 
-    if len(set(paths)) < len(paths):
-        raise ResultError("the same result is given twice")
+    if repeated := [path for path in paths if paths.count(path) > 1]:
+        raise ResultError(f"{repeated[0]}: got this result {len(repeated)} times, but each result counts once")
     stems = [path.stem for path in paths]
     return dict(zip(stems if len(set(stems)) == len(stems) else map(str, paths), paths, strict=True))
 
 
 def check_output(path: Path, *, overwrite: bool) -> None:
-    """Refuse a file that cannot be written, and one that is there unless it may be replaced."""
+    """Refuse a file that cannot be written, or that exists and must not be replaced."""
     from warpimpact.results.files import OutputError
 
     check_place(path)
@@ -26,11 +26,11 @@ def check_output(path: Path, *, overwrite: bool) -> None:
 
 
 def check_picture(path: Path) -> None:
-    """Refuse a picture that cannot be written; one that is there is replaced."""
+    """Refuse a picture that cannot be written; an existing one is replaced."""
     from warpimpact.results.files import OutputError
 
     if path.suffix not in (".png", ".pdf", ".svg"):
-        raise OutputError(f"{path}: must end with .png, .pdf or .svg")
+        raise OutputError(f"{path}: the name of a picture must end in .png, .pdf or .svg")
     check_place(path)
 
 
@@ -39,12 +39,12 @@ def check_place(path: Path) -> None:
     from warpimpact.results.files import OutputError
 
     if path.is_dir():
-        raise OutputError(f"{path}: is a folder, but the result is one file")
+        raise OutputError(f"{path}: is a folder, but the output is one file")
     check_folder(path.parent)
 
 
 def check_folder(folder: Path) -> None:
-    """Refuse a folder that cannot be written into."""
+    """Refuse a folder in which no file can be written."""
     from warpimpact.results.files import OutputError
 
     try:

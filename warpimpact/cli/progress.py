@@ -1,4 +1,4 @@
-"""How far a computation is: a bar on a terminal, plain lines in a log."""
+"""Progress of a computation: a bar on a terminal, plain lines in a log."""
 
 import sys
 import time
@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from warpimpact.campaign.run import Standing
 
 _LONGEST_SILENCE = 600.0
-"""Of a log [s]."""
+"""Longest time between two lines of a log [s]."""
 
 
 @contextmanager
 def show_standing() -> "Iterator[Callable[[Standing], None]]":
-    """Shows how far a run is, with its running estimates."""
+    """Show the progress of a run, with its running estimates."""
     if not sys.stderr.isatty():
         yield _log_standing()
         return
@@ -33,7 +33,7 @@ def show_standing() -> "Iterator[Callable[[Standing], None]]":
 
 
 def _log_standing() -> "Callable[[Standing], None]":
-    """A line at the start, at every tenth, and after the longest silence at the latest."""
+    """A line at the start, after every tenth of the hits, and after `_LONGEST_SILENCE` at the latest."""
     shown, last, begin = -1, 0.0, time.monotonic()
 
     def show(standing: "Standing") -> None:
@@ -65,7 +65,7 @@ def _running(standing: "Standing") -> str:
 
 @contextmanager
 def show_count() -> Iterator[Callable[[int, int], None]]:
-    """Shows how many hits of how many are done."""
+    """Show how many of the hits are done."""
     if not sys.stderr.isatty():
         yield _log_count()
         return
@@ -81,7 +81,7 @@ def show_count() -> Iterator[Callable[[int, int], None]]:
 
 
 def _log_count() -> Callable[[int, int], None]:
-    """A line at every tenth."""
+    """A line after every tenth of the hits."""
     shown = 0
 
     def show(done: int, total: int) -> None:

@@ -1,4 +1,4 @@
-"""Replay: one hit of a result again, with its history."""
+"""The command replay: compute one hit of a result again, with its history."""
 
 import argparse
 from pathlib import Path
@@ -14,19 +14,19 @@ def add_replay(commands: Commands) -> None:
         "replay",
         _replay,
         summary="compute one hit of a result again, with its history",
-        description="Compute one hit of a result again on the CPU; write its history as netCDF and PNG files. It ends "
-        "bit-identical to the stored outcome where this CPU and version computed that; a result from a GPU is met "
-        "within rounding only.",
+        description="Compute one hit of a result again on the CPU. Write its history as netCDF and PNG files. If the "
+        "same CPU and version computed the result, the end is bit-identical to the stored outcome. If a GPU "
+        "computed it, both agree within rounding.",
         example="replay slotted.nc --hit 34",
     )
     add_result(parser)
-    parser.add_argument("--hit", type=int, required=True, metavar="N", help="which hit of the result, from 0")
-    add_output(parser, "HIT.nc", "history (default: RESULT_hitN.nc beside the result)")
+    parser.add_argument("--hit", type=int, required=True, metavar="N", help="number of the hit in the result, from 0")
+    add_output(parser, "HIT.nc", "history file (default: RESULT_hitN.nc beside the result)")
     add_campaign_folder(
-        parser, "where the files are that the campaign names, such as a hit list (default: the result's folder)"
+        parser, "folder of the files that the campaign names, such as a hit list (default: the result's folder)"
     )
     parser.add_argument(
-        "--animation", type=Path, metavar="HIT.gif", help="film of the hit too; HIT.mp4 where there is FFmpeg"
+        "--animation", type=Path, metavar="HIT.gif", help="also write a film of the hit; HIT.mp4 needs FFmpeg"
     )
     add_overwrite(parser, "an existing history")
 

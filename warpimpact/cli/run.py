@@ -1,4 +1,4 @@
-"""Run: the hit map of a campaign."""
+"""The command run: compute the hit map of a campaign."""
 
 import argparse
 import sys
@@ -27,16 +27,16 @@ def add_run(commands: Commands) -> None:
         example="run campaigns/slotted_plate.toml -o slotted.nc --count 512",
     )
     add_campaign(parser)
-    add_output(parser, "RESULT.nc", "result (default: the campaign's name, here)")
+    add_output(parser, "RESULT.nc", "result file (default: the campaign's name, in this folder)")
     add_device(parser)
     cluster = parser.add_mutually_exclusive_group()
     cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
-    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes of this machine")
+    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
     add_count(parser)
     parser.add_argument(
-        "--resume", action="store_true", help="continue a run that was broken off; begin where there is none"
+        "--resume", action="store_true", help="continue an interrupted run; start a new one if there is none"
     )
-    add_overwrite(parser, "an existing result, and a run that was broken off")
+    add_overwrite(parser, "an existing result or an interrupted run")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -74,7 +74,7 @@ def _run(arguments: argparse.Namespace) -> int:
 
 
 def failure_code(dataset: "xarray.Dataset", path: Path) -> int:
-    """3, and a line, when more shots failed than the campaign allows."""
+    """3 if more shots failed than the campaign allows, with a message; else 0."""
     from warpimpact.results.dataset import failed
 
     share = float(failed(dataset).mean())

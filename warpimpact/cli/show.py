@@ -1,4 +1,4 @@
-"""Inspect, plot, plate: what is there already, in words and pictures."""
+"""The commands inspect, plot and plate: text and figures of results and plates."""
 
 import argparse
 from pathlib import Path
@@ -14,13 +14,13 @@ def add_inspect(commands: Commands) -> None:
         commands,
         "inspect",
         _inspect,
-        summary="tell what is in a result",
-        description="Tell who made a result, from what campaign, its numbers with their intervals, and which shots "
+        summary="print what a result contains",
+        description="Print the origin of a result, its campaign, its numbers with their intervals, and the shots that "
         "failed.",
         example="inspect slotted.nc",
     )
     add_result(parser)
-    parser.add_argument("--campaign", action="store_true", help="print the campaign that it carries, and no more")
+    parser.add_argument("--campaign", action="store_true", help="print only the campaign that the result contains")
 
 
 def _inspect(arguments: argparse.Namespace) -> None:
@@ -36,17 +36,17 @@ def add_plot(commands: Commands) -> None:
         commands,
         "plot",
         _plot,
-        summary="draw the maps of a result, or of several side by side",
+        summary="draw maps of one result, or of several side by side",
         description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
-        "against tilt, and how sure a map is. Of several results, maps side by side in the same colours.",
+        "against tilt, and the uncertainty of a map. For several results: maps side by side with one colour scale.",
         example="plot slotted.nc -o maps",
     )
     add_results(parser)
-    add_output(parser, "FOLDER", "existing folder (default: the result's)")
+    add_output(parser, "FOLDER", "existing folder (default: the folder of the result)")
     parser.add_argument(
         "--probability",
         metavar="QUANTITY",
-        help='only the map of a probability of one result, such as "P(tilt@130mm > 30 deg)"',
+        help='draw only the map of this probability, such as "P(tilt@130mm > 30 deg)"; takes one result',
     )
 
 
@@ -61,7 +61,7 @@ def _plot(arguments: argparse.Namespace) -> None:
     dataset, *others = datasets.values()
     if arguments.probability is not None:
         if others:
-            raise files.ResultError("--probability: got several results, but it draws the map of one")
+            raise files.ResultError(f"--probability: got {len(datasets)} results, but it draws the map of one")
         try:
             figure = probability_map(dataset, arguments.probability)
         except ValueError as error:
@@ -80,12 +80,12 @@ def add_plate(commands: Commands) -> None:
         "plate",
         _plate,
         summary="draw the plate of a campaign to scale",
-        description="Draw the plate of a campaign to scale, with the largest section of the core; tell its open area, "
-        "smallest ligament and areal density. Nothing is computed.",
+        description="Draw the plate of a campaign to scale, with the largest section of the core. Print open area, "
+        "smallest ligament and areal density. No shot is computed.",
         example="plate campaigns/slotted_plate.toml",
     )
     add_campaign(parser)
-    add_output(parser, "PLATE.png", "picture (default: the campaign's name with _plate, here)")
+    add_output(parser, "PLATE.png", "picture file (default: the campaign's name with _plate, in this folder)")
 
 
 def _plate(arguments: argparse.Namespace) -> None:

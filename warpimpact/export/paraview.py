@@ -1,7 +1,7 @@
-"""The history of a hit as files of VTK, which ParaView plays: the core's surface on its way, and the weakening plate.
+"""The history of a hit as VTK files for ParaView: the moving surface of the core, and the plate as it weakens.
 
-Built with PyVista (`pip install 'warpimpact[vtk]'`). A folder holds ``core.pvd`` and ``plate.pvd``, which name the time
-of each of the files beside them. Lengths are in metres in the frame of the plate, times in seconds.
+It needs PyVista (`pip install 'warpimpact[vtk]'`). The folder contains ``core.pvd`` and ``plate.pvd``, which list the
+other files with their times. Lengths are in metres in the frame of the plate, times in seconds.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 AROUND = 48
-"""Points round the core's surface."""
+"""Points around the core's surface."""
 _BODY = (v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY, v.FORCE, v.MOMENT)
 
 
 def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
-    """Write a history into a new folder, whole or not at all; returns the two files to open.
+    """Write a history into a new folder, whole or not at all; return the two files to open.
 
     Args:
         history: a Dataset of `results.history_dataset`.
@@ -43,7 +43,7 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
     try:
         import pyvista  # noqa: F401
     except ImportError:
-        raise OutputError(f"{folder}: VTK needs PyVista: pip install 'warpimpact[vtk]'") from None
+        raise OutputError(f"{folder}: VTK files need PyVista: pip install 'warpimpact[vtk]'") from None
     try:
         with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as aside:
             pieces = Path(aside) / "vtk"
@@ -57,8 +57,8 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
 
 
 def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
-    """The core's surface at every step: quadrilaterals with the velocity [m/s] of each point, and what the history
-    holds of the whole body as field data."""
+    """The core's surface at every step: quadrilaterals with the velocity [m/s] of each point. The field data are the
+    velocity, the angular velocity, the force and the moment of the whole core."""
     import pyvista
 
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
@@ -78,7 +78,7 @@ def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
 
 
 def _faces(rings: int) -> NDArray[np.int64]:
-    """Quadrilaterals between rings, and the polygons that close nose and base, as PyVista takes them."""
+    """Quadrilaterals between rings and the polygons that close nose and base, in PyVista's format."""
     here = np.arange(AROUND)
     nxt = (here + 1) % AROUND
     start = AROUND * np.arange(rings - 1)[:, None]
@@ -105,7 +105,7 @@ def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
 
 
 def _write_series(folder: Path, name: str, kind: str, times: Array, meshes: Iterator[pyvista.DataSet]) -> None:
-    """Write meshes as ``<name>_<number>.<kind>`` and ``<name>.pvd``, which names the time of each."""
+    """Write meshes as ``<name>_<number>.<kind>``, and ``<name>.pvd`` with the time of each."""
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     collection = ElementTree.SubElement(root, "Collection")
     for number, (time, mesh) in enumerate(zip(times, meshes, strict=True)):

@@ -1,4 +1,4 @@
-"""A hit map as a plain table, for pandas and for spreadsheets."""
+"""A hit map as a table, for pandas and for spreadsheets."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from warpimpact.results.files import aside
 def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
-    What a hit has at every stand-off or along every axis gets a column for each: ``tilt_130mm``,
-    ``angular_velocity_x``. ``status`` is a word.
+    A variable with stand-offs or axes gets one column for each: ``tilt_130mm``, ``angular_velocity_x``. ``status`` is a
+    word.
     """
     columns = {}
     for name in (v.HIT_Y, v.HIT_Z, *dataset.data_vars):
@@ -36,12 +36,12 @@ def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
 
 
 def write_csv(dataset: xarray.Dataset, path: Path) -> None:
-    """Write `to_dataframe` as CSV, whole or not at all; of an open file only a slice is in memory at a time.
+    """Write `to_dataframe` as CSV, whole or not at all. Of an open file, one slice at a time is in memory.
 
-    Numbers have all the digits that tell them apart; what does not exist is empty.
+    Numbers have all significant digits; a missing value is empty.
 
     Raises:
-        OutputError: the file cannot be written; what was there before is untouched.
+        OutputError: the file cannot be written; an existing file stays as it is.
     """
     first = 0
     with aside(path) as file:

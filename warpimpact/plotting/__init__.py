@@ -1,4 +1,4 @@
-"""Figures: a Dataset, or a plate, goes in, a matplotlib Figure comes out.
+"""Figures: from a Dataset or a plate to a matplotlib Figure.
 
 Change axes, colours and layout here; a number that a figure shows is computed in analysis or statistics. It imports
 analysis and the rooms below it, but neither export nor report.

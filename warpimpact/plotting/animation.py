@@ -1,4 +1,4 @@
-"""One hit as a film: the core on its way through the plate, in the two views of `plotting.trajectory`."""
+"""Film of one hit: the core passes through the plate, in the two views of `plotting.trajectory`."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _MM, _US = 1e3, 1e6
 
 
 def animation(dataset: xarray.Dataset) -> FuncAnimation:
-    """Film of a history, from the first touch to the end of contact, evenly in time.
+    """Film of a history from the first contact to the end of contact, at constant time intervals.
 
-    Between two steps the core flies straight on and its axis turns evenly, as it does in the model.
+    Between two steps position and axis are interpolated linearly.
     """
     times = np.linspace(float(dataset[v.TIME][0]), float(dataset[v.TIME][-1]), FRAMES)
     between = dataset[[v.PLATE_POSITION, v.CORE_AXIS, v.VELOCITY]].interp(time=times)
@@ -45,24 +45,24 @@ def animation(dataset: xarray.Dataset) -> FuncAnimation:
 
     show(0)
     figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # places hold for all frames, and solving for them takes most of the time
+    figure.set_layout_engine("none")  # the layout is the same in all frames, and solving it takes most of the time
     return FuncAnimation(figure, show, frames=FRAMES, interval=1e3 / _PER_SECOND)
 
 
 def save_animation(dataset: xarray.Dataset, path: Path) -> None:
-    """Write the film of a history as GIF, or as MP4 where there is FFmpeg.
+    """Write the film of a history as GIF, or as MP4 if FFmpeg is installed.
 
     Raises:
-        OutputError: as `writer_for`.
+        OutputError: as in `writer_for`.
     """
     animation(dataset).save(path, writer=writer_for(path), dpi=80)
 
 
 def writer_for(path: Path) -> AbstractMovieWriter:
-    """What writes a film of this name.
+    """The writer for the format that the name of a film asks for.
 
     Raises:
-        OutputError: the name ends otherwise, or there is no FFmpeg for a MP4.
+        OutputError: the name ends neither in .gif nor in .mp4, or FFmpeg is missing for an MP4.
     """
     match path.suffix.lower():
         case ".gif":
@@ -70,8 +70,8 @@ def writer_for(path: Path) -> AbstractMovieWriter:
         case ".mp4" if FFMpegWriter.isAvailable():
             return FFMpegWriter(fps=_PER_SECOND)
         case ".mp4":
-            raise OutputError(f"{path}: a MP4 needs the program ffmpeg, which is not found; a name in .gif does not")
-    raise OutputError(f"{path}: is no film that can be written; its name must end in .gif or .mp4")
+            raise OutputError(f"{path}: an MP4 needs the program ffmpeg, which was not found; a GIF does not need it")
+    raise OutputError(f"{path}: the name of a film must end in .gif or .mp4")
 
 
 def _unit(pose: Pose) -> Pose:

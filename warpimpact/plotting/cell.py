@@ -1,8 +1,8 @@
-"""What hit maps are made of: values of hits as people read them, their colours, and the unit cell painted with them.
+"""Parts of hit maps: values of hits in shown units, their colours, and the coloured unit cell.
 
-Hits that cover the cell are drawn as an image in which every pixel has the colour of the nearest hit, counted
-across the cell's edges; hits that are few or leave gaps are drawn as points. The view is against the line of
-fire, from behind the plate: y to the right, z up, x towards the viewer.
+If the hits cover the cell, they are drawn as an image; every pixel has the colour of the nearest hit, also across the
+cell's edges. If they are few or leave gaps, they are drawn as points. The view is against the line of fire, from
+behind the plate: y to the right, z up, x towards the viewer.
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ if TYPE_CHECKING:
     Scale = tuple[Colormap, Normalize]
 
 PIXELS = 400  # along the longer side of the cell
-FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail that is not there
-WIDEST_GAP = 3.0  # distance to a hit that an image bridges, in mean hit spacings; random hits reach about 2
-GREY = "0.62"  # of hits without a value
-# Okabe and Ito's colours, which stay apart in every kind of colour blindness.
+FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail that they do not have
+WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2
+GREY = "0.62"  # for hits without a value
+# Colours of Okabe and Ito: they differ in every kind of colour blindness.
 STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00")
 
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW}
-_BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them too, but in front of the plate
+_BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them, too, but in front of the plate
 _MM = 1e3
-# Units as people write them, and the factor from those of the Dataset.
+# Units as shown, and the factor from the units of the Dataset.
 _SHOWN_UNITS = {
     "m s-1": (" m/s", 1.0),
     "rad s-1": (" rad/s", 1.0),
@@ -58,8 +58,8 @@ _SHOWN_UNITS = {
 
 
 class Shown(NamedTuple):
-    """A variable of the hits as it is shown: values of shape [hits], NaN where a hit has none; what an axis and a
-    title call it; and whether it has a sign."""
+    """A variable of the hits as it is shown: values of shape [hits], NaN where a hit has none; label of an axis; title;
+    whether it has a sign."""
 
     values: Array
     label: str
@@ -68,7 +68,7 @@ class Shown(NamedTuple):
 
 
 def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Shown:
-    """One variable in the units that people read.
+    """One variable in shown units.
 
     Args:
         dataset: the result of a campaign.
@@ -92,7 +92,7 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None)
 
 
 def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None) -> xarray.DataArray:
-    """The variable, shape (hit,), at one stand-off if it has any."""
+    """The variable, shape [hits], at one stand-off if it has stand-offs."""
     mapped = [name for name in v.HIT_NUMBERS if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
@@ -112,7 +112,7 @@ def words(name: str) -> str:
 
 
 def shots_text(dataset: xarray.Dataset) -> str:
-    """How many hits there are, at what velocity and obliquity."""
+    """Number of hits, velocity and obliquity."""
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     return f"{dataset.sizes['hit']} hits, {velocity}, obliquity {obliquity}"
 
@@ -125,19 +125,19 @@ def range_text(array: xarray.DataArray) -> str:
 
 
 def limits(dataset: xarray.Dataset) -> Array:
-    """Range [mm] along y and z that holds the whole cell and every hit, shape [2, 2]."""
+    """Range [mm] along y and z that contains the whole cell and every hit, shape [2, 2]."""
     half = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2
     hits = hit_points(dataset)
     return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * _MM
 
 
 def hit_points(dataset: xarray.Dataset) -> Array:
-    """Where the hits are [m], shape [hits, 2]."""
+    """Hit points [m], shape [hits, 2]."""
     return np.stack([dataset[v.HIT_Y].values, dataset[v.HIT_Z].values], axis=-1)
 
 
 def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
-    """Colours for the values of all columns: symmetric about a neutral zero if they have a sign; grey for NaN."""
+    """One colour scale for all columns: symmetric about a neutral zero if the values have a sign; grey for NaN."""
     together = np.concatenate(columns)
     finite = together[np.isfinite(together)]
     if signed:
@@ -146,13 +146,13 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
     else:
         lowest, highest = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
         if np.isclose(lowest, highest):
-            lowest = highest  # rounding is no pattern
+            lowest = highest  # do not show rounding as a pattern
     colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=GREY)
     return colours, Normalize(lowest, highest)
 
 
 def draw_values(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale) -> ScalarMappable:
-    """Draw values of the hits, shape [hits], with the holes and a legend; what is returned takes a colour bar."""
+    """Draw values of the hits, shape [hits], with the holes and a legend; return the artist for a colour bar."""
     artist = _paint(axes, dataset, values, *scale)
     exists = np.isfinite(values)
     _furnish(axes, dataset, [] if exists.all() else [Patch(facecolor=GREY, label=_without_value(dataset, exists))])
@@ -174,9 +174,9 @@ def draw_status(axes: Axes, dataset: xarray.Dataset) -> None:
 
 
 def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
-    """Draw the edges of holes so that they show on any colour, and set the axes to the cell, to scale.
+    """Draw the edges of holes, visible on any colour, and set the axes to the cell, to scale.
 
-    Returns the entry of a legend, none of a solid plate.
+    Returns the entry of a legend; no entry for a solid plate.
     """
     (left, right), (bottom, top) = limits(dataset)
     axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="hit y [mm]", ylabel="hit z [mm]", aspect="equal")
@@ -196,8 +196,11 @@ def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
 
 
 def pixels(dataset: xarray.Dataset, count: int = PIXELS) -> Array:
-    """Centres [m] of the cell's pixels, from its lower left corner on, shape [z, y, 2]; `count` along the longer
-    side."""
+    """Centres [m] of the cell's pixels, relative to its lower left corner, shape [z, y, 2].
+
+    Args:
+        count: pixels along the longer side.
+    """
     period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
     counts = np.ceil(count * period / period.max()).astype(int)
     y, z = ((np.arange(n) + 0.5) / n * length for n, length in zip(counts, period, strict=True))
@@ -205,7 +208,7 @@ def pixels(dataset: xarray.Dataset, count: int = PIXELS) -> Array:
 
 
 def tree_of(dataset: xarray.Dataset, which: NDArray[np.bool_] | slice = slice(None)) -> KDTree:
-    """Hits to look up from `pixels`, across the cell's edges."""
+    """Search tree of the hits for `pixels`; it continues across the cell's edges."""
     period = np.asarray(dataset.attrs[attr.PLATE_PERIOD])
     return KDTree((hit_points(dataset)[which] + period / 2) % period, boxsize=period)
 
@@ -229,7 +232,7 @@ def paint_pixels(axes: Axes, dataset: xarray.Dataset, image: Array, scale: Scale
 
 
 def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap, norm: Normalize) -> ScalarMappable:
-    """Colour the cell by values of the hits, shape (hit,): as an image if hits cover it, else as points."""
+    """Colour the cell by values of the hits, shape [hits]: as an image if hits cover it, else as points."""
     nearest = nearest_hits(dataset)
     if nearest is not None:
         return paint_pixels(axes, dataset, values[nearest], (colours, norm))
@@ -249,13 +252,13 @@ def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap
 
 
 def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_]) -> str:
-    """Legend of the grey hits: how they ended."""
+    """Legend entry of the grey hits: their statuses."""
     found = set(dataset[v.STATUS].values[~exists].tolist())
     return fill(", ".join(words(name) for name, code in status_codes(dataset).items() if code in found), 30)
 
 
 def _furnish(axes: Axes, dataset: xarray.Dataset, entries: list[Artist]) -> None:
-    """Add holes and a legend below."""
+    """Add the holes, and a legend below the axes."""
     entries = [*entries, *draw_holes(axes, dataset)]
     if entries:
         below = axes.transAxes + ScaledTranslation(0.0, -0.5, axes.figure.dpi_scale_trans)

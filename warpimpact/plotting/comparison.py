@@ -1,4 +1,4 @@
-"""Plates side by side: every measure with its interval, and the differences of plates beside it."""
+"""Figure of a comparison: every measure of the plates with its interval, and the differences between plates."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ if TYPE_CHECKING:
     from warpimpact.analysis.comparison import Comparison, Difference
     from warpimpact.analysis.effectiveness import Measure
 
-# Okabe and Ito's colours, which stay apart in every kind of colour blindness; a marker for who sees none.
-_STYLES = {  # by the ending of a measure's name; the last is how far off its line it is drawn
+# Colours of Okabe and Ito: they differ in every kind of colour blindness. Markers differ for a print in grey.
+_STYLES = {  # by the ending of a measure's name; the last number is the distance from the line of its plate
     "": ("mean, or share", "o", "#0072B2", -0.12),
     "tenth": ("worst tenth", "s", "#D55E00", 0.12),
     "point": ("worst hit", "x", "#000000", 0.12),
 }
 _GREY = "0.55"
 _ROW, _MARGIN = 0.42, 0.75
-"""Height of a line and of what surrounds the lines of a panel [inch]."""
+"""Height of a line, and of the margin of a panel [inch]."""
 
 
 def comparison_figure(comparison: Comparison) -> Figure:
     """Measures of every plate on the left, differences between plates on the right, with their intervals.
 
-    Differences whose interval holds 0, so that the plates cannot be told apart, have hollow markers.
+    A hollow marker means that the interval of a difference contains 0: the plates cannot be told apart.
 
     Args:
         comparison: the result of `analysis.comparison.compare`.
@@ -50,10 +50,12 @@ def comparison_figure(comparison: Comparison) -> Figure:
         _draw_plates(left, comparison, measures)
         _draw_differences(right, comparison, measures)
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    legend = dict(zip(labels, handles, strict=True))  # each once
+    legend = dict(zip(labels, handles, strict=True))  # each entry once
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
-    how = "compared as independent" if comparison.independent else "the same at every plate"
-    figure.suptitle(f"{comparison.hits} hits, {how}; 95 % intervals; hollow: cannot be told apart", fontsize="medium")
+    how = "compared as independent" if comparison.independent else "the same for every plate"
+    figure.suptitle(
+        f"{comparison.hits} hits, {how}; 95 % intervals; hollow marker: cannot be told apart", fontsize="medium"
+    )
     return figure
 
 
@@ -111,7 +113,7 @@ def _draw_interval(
     label: str | None = None,
     hollow: bool = False,
 ) -> None:
-    """A number with its interval, by marker and colour."""
+    """Draw a number with its interval."""
     value, (marker, colour) = number.value, style
     ends = None if math.isnan(number.low) else [[max(0.0, value - number.low)], [max(0.0, number.high - value)]]
     axes.errorbar(

@@ -1,4 +1,4 @@
-"""Figures of how values spread: along the cell, against each other, and round the value that hits nearby tell."""
+"""Figures of distributions: along the cell, of two variables, and around the local mean of nearby hits."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ if TYPE_CHECKING:
 
 _MM = 1e3
 _LONGER_SIDE = 4.2  # of a map on paper [inch]
-_BLUE, _VERMILION = "#0072B2", "#D55E00"  # Okabe and Ito's colours
-_BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # quantiles, and how dark
-_PER_STRIP, _MOST_STRIPS = 50, 48  # hits that quantiles are taken of at least; strips along one axis at most
+_BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
+_BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
+_PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
 _FINE = 100  # pixels along the longer side of a smoothed map
 _MOST_POINTS = 4000  # more are drawn as a density
 
@@ -46,8 +46,8 @@ _MOST_POINTS = 4000  # more are drawn as a density
 def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """A map with the distribution of its values along y, along z, and over the whole cell.
 
-    Strips of the cell, each with as many hits, give the median and the middle 50 and 90 %. Args and errors are those
-    of `cell.shown`.
+    Strips of the cell with equal numbers of hits give the median and the middle 50 % and 90 %. Arguments and errors are
+    those of `cell.shown`.
     """
     column = shown(dataset, variable, standoff)
     size = _map_size(dataset)
@@ -57,7 +57,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     artist = draw_values(centre, dataset, column.values, scale_of([column.values], signed=column.signed))
     exists = np.isfinite(column.values)
     if exists.any():
-        wide, tall = 1.0 / size  # an inch, as a share of the map
+        wide, tall = 1.0 / size  # one inch as a share of the map
         above = centre.inset_axes((0.0, 1.0 + 0.12 * tall, 1.0, 1.2 * tall), sharex=centre)
         beside = centre.inset_axes((1.0 + 0.12 * wide, 0.0, 1.2 * wide, 1.0), sharey=centre)
         bar = centre.inset_axes((1.0 + 1.6 * wide, 0.0, 0.17 * wide, 1.0))
@@ -78,7 +78,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
 
 
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
-    """Residual velocity against tilt at a stand-off, the largest if None, with the distribution of each."""
+    """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
     figure = Figure(figsize=(7.5, 6.5), layout="constrained")
     figure.suptitle(dataset.attrs.get(attr.TITLE, ""))
     grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
@@ -93,7 +93,7 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
 
 
 def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None = None) -> tuple[Array, Array]:
-    """Draw residual velocity against tilt, with their medians; returns tilt [degree] and velocity [m/s] as drawn."""
+    """Draw residual velocity against tilt, with their medians; return the drawn tilt [degree] and velocity [m/s]."""
     tilt, velocity = (shown(dataset, name, standoff) for name in (v.TILT, v.RESIDUAL_VELOCITY))
     both = np.isfinite(tilt.values) & np.isfinite(velocity.values)
     x, y = tilt.values[both], velocity.values[both]
@@ -111,13 +111,14 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
 
 
 def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """What hits nearby tell of a map, beside half the width of its 95 % interval (`analysis.local.plane_fit`).
+    """The local mean of a map, beside half the width of its 95 % interval (`analysis.local.plane_fit`).
 
     Args:
-        dataset: a result whose hits cover the cell; the others as in `cell.shown`.
+        dataset: a result whose hits cover the cell.
+        variable, standoff: as in `cell.shown`.
 
     Raises:
-        ValueError: the hits do not cover the cell; and as `cell.shown`.
+        ValueError: the hits do not cover the cell; and as in `cell.shown`.
     """
     column = shown(dataset, variable, standoff)
     images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
@@ -126,19 +127,18 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
 
 
 def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
-    """Map of a probability, such as that of a bending stress above the core's strength, from the hits nearby, beside
-    half the width of its 95 % interval (`analysis.local.share_of`).
+    """Map of a probability from the nearest hits, and half the width of its 95 % interval (`analysis.local.share_of`).
 
     Args:
         dataset: a result whose hits cover the cell.
-        quantity: ``P(bending_stress > 1.5 GPa)`` or the like, ``P(perforated)``; as in a campaign's ``stop.quantity``.
+        quantity: such as ``P(bending_stress > 1.5 GPa)`` or ``P(perforated)``, as in a campaign's ``stop.quantity``.
 
     Raises:
-        ValueError: the quantity is no probability, or not one of this result; or the hits do not cover the cell.
+        ValueError: the quantity is no probability, the result does not have it, or the hits do not cover the cell.
     """
     measure = Measure.parse(quantity)
     if not measure.is_binary:
-        raise ValueError(f'got "{quantity}", but a map of probability needs a P(…)')
+        raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
     if measure.kind == "probability" and measure.variable not in dataset:
         raise ValueError(f'got "{quantity}", but the result has no {measure.variable}')
     images = _local(dataset, measure.values(dataset), _covered(dataset), lambda near: share_of(near[1]))
@@ -147,15 +147,15 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
 
 
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
-    """The hit nearest to every pixel, of hits that cover the cell."""
+    """Index of the hit nearest to every pixel; refuses hits that do not cover the cell."""
     nearest = nearest_hits(dataset, _FINE)
     if nearest is None:
-        raise ValueError("the hits do not cover the cell, so nothing is known between them")
+        raise ValueError("the hits do not cover the cell, so there is no estimate between them; more hits are needed")
     return nearest
 
 
 def _two_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], title: str, method: str) -> Figure:
-    """A local value beside half the width of its interval."""
+    """Maps of a local value and of half the width of its interval."""
     width, height = _map_size(dataset)
     figure = Figure(figsize=(2.0 * width + 4.0, height + 1.9), layout="constrained")
     figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{title}")
@@ -173,8 +173,13 @@ def _local(
     nearest: NDArray[np.intp],
     estimate: Callable[[tuple[Array, Array]], tuple[Array, Array]],
 ) -> Array:
-    """What the hits near every pixel tell, shape [2, pixels_z, pixels_y]: an estimate from their offsets [m] and
-    values, and half the width of its interval; NaN where the nearest hit has no value."""
+    """Local estimates at every pixel, shape [2, pixels_z, pixels_y]: the value, and half the width of its interval.
+
+    Both are NaN where the nearest hit has no value.
+
+    Args:
+        estimate: computes both from offsets [m] and values of the nearest hits.
+    """
     images = np.full((2, *nearest.shape), np.nan)
     exists = np.isfinite(values)
     there = exists[nearest]
@@ -195,7 +200,7 @@ def _map_size(dataset: xarray.Dataset) -> Array:
 
 
 def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> None:
-    """Draw quantiles of the values against where they are, upright along the vertical axis."""
+    """Draw quantiles of the values against their places; `upright` puts the places on the vertical axis."""
     strips = np.array_split(np.argsort(places), np.clip(len(places) // _PER_STRIP, 1, _MOST_STRIPS))
     middles = [places[strip].mean() for strip in strips]
 

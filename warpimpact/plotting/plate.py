@@ -1,4 +1,4 @@
-"""A plate to scale: its holes, the cell that repeats, and the largest section of the core.
+"""Figure of a plate to scale: its holes, its unit cell, and the largest section of the core.
 
 The view is that of the maps: against the line of fire, y to the right, z up.
 """
@@ -26,19 +26,19 @@ if TYPE_CHECKING:
 
 _MM = 1e3
 _CELLS = 3  # of an unbounded plate, along each side
-_LONGER_SIDE = 5.0  # of the plate on paper [inch], amid room for axes, title and legend
+_LONGER_SIDE = 5.0  # of the plate on paper [inch], without axes, title and legend
 _ROOM_ACROSS, _BELOW, _ABOVE = 1.5, 1.7, 0.85
 _NARROWEST = 6.0
 _STEEL, _CORE = "0.72", "#D55E00"
 
 
 def plate_figure(plate: Plate, core: Core | None = None, title: str = "") -> Figure:
-    """Picture of a plate, all of a finite one, else three cells by three, with its numbers.
+    """Draw a finite plate as a whole, another one as three by three cells, with its numbers.
 
     Args:
-        plate: what is drawn.
-        core: whose largest section is drawn on the plate, in the middle of it.
-        title: above the picture.
+        plate: the plate.
+        core: its largest section is drawn in the middle of the plate.
+        title: title of the figure.
     """
     figure, axes = _sheet(_extent(plate, core) * _MM)
     patches = [*_holes(plate, axes), *_frames(plate), *([] if core is None else [_section(core)])]
@@ -63,14 +63,14 @@ def plate_figure(plate: Plate, core: Core | None = None, title: str = "") -> Fig
 
 
 def _extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
-    """What is drawn of a plate, along y and z [m]: enough of an unbounded one to hold the core twice."""
+    """Drawn extent along y and z [m]; that of an unbounded plate is at least twice the core's diameter."""
     if plate.size is not None:
         return np.array(plate.size)
     return np.maximum(_CELLS * np.array(plate.pattern.unit_cell), 0.0 if core is None else 4.0 * core.max_radius)
 
 
 def _sheet(extent: NDArray[np.float64]) -> tuple[Figure, Axes]:
-    """Figure with axes about the origin that are to scale; extent in mm."""
+    """Figure with axes to scale, centred on the origin; extent in mm."""
     across, up = _LONGER_SIDE * extent / extent.max()
     width, height = max(across + _ROOM_ACROSS, _NARROWEST), up + _BELOW + _ABOVE
     figure = Figure(figsize=(width, height))
@@ -87,7 +87,7 @@ def _sheet(extent: NDArray[np.float64]) -> tuple[Figure, Axes]:
 
 
 def _holes(plate: Plate, axes: Axes) -> list[Patch]:
-    """All holes that the axes show, as one patch: islands in them stay steel."""
+    """All holes within the axes as one patch; islands in a hole stay steel."""
     ranges = (np.array(ends) / _MM for ends in (axes.get_xlim(), axes.get_ylim()))
     outlines = plate.pattern.outlines(*((low, high) for low, high in ranges))
     if not outlines:
@@ -108,13 +108,13 @@ def _frames(plate: Plate) -> list[Patch]:
 
 
 def _frame(extent: Sequence[float], **style: Any) -> Patch:
-    """Rectangle of an extent [m] about the origin."""
+    """Rectangle of an extent [m], centred on the origin."""
     along_y, along_z = (side * _MM for side in extent)
     return Rectangle((-along_y / 2, -along_z / 2), along_y, along_z, fill=False, linewidth=1.6, **style)
 
 
 def _section(core: Core) -> Patch:
-    """The largest section of the core, about the origin."""
+    """The largest section of the core, centred on the origin."""
     radius = core.max_radius * _MM
     label = f"largest section of the core, \u2300 {2 * radius:.2f} mm"
     return Circle((0.0, 0.0), radius, facecolor=to_rgba(_CORE, 0.45), edgecolor=_CORE, linewidth=1.5, label=label)

@@ -1,4 +1,4 @@
-"""What the plate does to the core's surface, drawn on it (the paper's fig. 5)."""
+"""Figure of the normal stress on the core's surface (the paper's fig. 5)."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from warpimpact.results import variables as v
 
 _MM, _US = 1e3, 1e6
 _ARROW = 5.0  # length of the largest stress [mm]
-_SECTIONS, _SPOKES = 3, 3  # every so manieth section and azimuth gets an arrow
+_SECTIONS, _SPOKES = 3, 3  # every third section and azimuth gets an arrow
 
 
 def pressure(dataset: xarray.Dataset) -> Figure:
-    """The core under the largest force, with the normal stress on its surface as arrows into it.
+    """The core at its largest force; arrows into its surface show the normal stress.
 
-    Colour and length are the stress as a share of that of the untouched plate at rest (`analysis.surface.pressed`).
+    Colour and length show the stress as a share of that of the untouched plate at rest (`analysis.surface.pressed`).
     """
     step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
     surface = pressed(dataset, step)

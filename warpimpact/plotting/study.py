@@ -1,4 +1,4 @@
-"""Error against cost: what a study of the numerics found, for residual velocity and tilt."""
+"""Figure of a study: error against speed, for residual velocity and tilt."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ if TYPE_CHECKING:
 
 _PANELS = {v.RESIDUAL_VELOCITY: "residual velocity [m/s]", v.TILT: "tilt [°]"}
 _BELOW_FLOOR = 0.4  # lowest error shown, in units of the uncertainty
-# Okabe and Ito's colours, which stay apart in every kind of colour blindness.
+# Colours of Okabe and Ito: they differ in every kind of colour blindness.
 _BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.62"
 
 
 def study_figure(dataset: xarray.Dataset) -> Figure:
-    """Error of 90 % of the hits against hits per second, for residual velocity and tilt at the last stand-off.
+    """90 % error against hits per second, for residual velocity and for tilt at the last stand-off.
 
     Args:
         dataset: the result of `analysis.study.study`.
@@ -42,11 +42,11 @@ def study_figure(dataset: xarray.Dataset) -> Figure:
 
 
 def _draw(axes: Axes, quoted: xarray.Dataset, quantity: v.Variable) -> None:
-    """One panel: every setting, the front, the names that people look for, the floor of what can be told."""
+    """One panel: every setting, the front, the named fidelities, and the uncertainty of the converged answer."""
     axes.set(xscale="log", yscale="log", xlabel="hits per second", ylabel=f"{QUOTED:.0%} error of {_PANELS[quantity]}")
     axes.grid(which="major", color="0.9")
     axes.set_axisbelow(True)
-    quoted = quoted.isel(setting=(quoted[v.ERRORS[quantity]] > 0.0).values)  # what a logarithm can show
+    quoted = quoted.isel(setting=(quoted[v.ERRORS[quantity]] > 0.0).values)  # a logarithm has no 0
     literal = (quoted[v.SCHEME] == "nodal").values
     on_front = quoted.isel(setting=quoted[v.FRONTS[quantity]].values == 1).sortby(v.HITS_PER_SECOND)
 
@@ -76,6 +76,6 @@ def _draw(axes: Axes, quoted: xarray.Dataset, quantity: v.Variable) -> None:
 def _name(
     axes: Axes, rates: np.ndarray, errors: np.ndarray, text: str, *, right: float, up: float, ha: str = "left"
 ) -> None:
-    """Write a setting's name so far from its point [pt]."""
+    """Write a setting's name beside its point; the distances `right` and `up` are in points."""
     place = (rates.item(), errors.item())
     axes.annotate(text, place, xytext=(right, up), textcoords="offset points", ha=ha, zorder=6)

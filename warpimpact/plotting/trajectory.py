@@ -1,7 +1,7 @@
-"""Figures of one hit's history: the core on its way through the plate and behind it, its loads, and the plate.
+"""Figures of one hit's history: the core in the plate and behind it, its loads, and the plate.
 
-The core is drawn to scale in two views: x-y, where the angle of its axis is the yaw, and x-z, where it is the pitch.
-It comes from the left; the plate is cut through the hit point.
+The core is drawn to scale in two views: x-y shows the yaw, x-z the pitch. It comes from the left. The plate is cut
+through the hit point.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ INSTANTS = 5  # poses of the core within the plate that are drawn
 
 _MM, _US = 1e3, 1e6
 _ANGLES = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
-_COMPONENTS = {"x": "black", "y": "#0072B2", "z": "#D55E00"}  # Okabe and Ito's colours
-# Blue and green, as in the paper's fig. 5, but light enough for a dark core.
+_COMPONENTS = {"x": "black", "y": "#0072B2", "z": "#D55E00"}  # colours of Okabe and Ito
+# Blue and green as in the paper's fig. 5, but light, because the core is dark.
 _LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
 _STEEL = "0.8"
 _ARROW = 12.0  # length of a load's arrow [mm]
@@ -43,14 +43,14 @@ _AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
 class Pose(NamedTuple):
-    """Where a core is: centre of mass in the plate [m] and unit vector towards the nose, both of shape [3]."""
+    """Position of the centre of mass in the plate's frame [m], and unit vector towards the nose, both of shape [3]."""
 
     position: Array
     axis: Array
 
 
 def passage(dataset: xarray.Dataset) -> Figure:
-    """The core at instants spread evenly over its way through the plate (the paper's figs. 7 and 9)."""
+    """The core at equal intervals of its passage through the plate (the paper's figs. 7 and 9)."""
     poses = poses_in_plate(dataset)
     figure, views = two_views(dataset, poses.values(), "passage through the plate", room=5.0)
     colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
@@ -65,7 +65,7 @@ def passage(dataset: xarray.Dataset) -> Figure:
 
 
 def flight(dataset: xarray.Dataset) -> Figure:
-    """The core on impact and at the stand-offs behind the plate, if it gets there (the paper's figs. 8 and 10)."""
+    """The core on impact, and at the stand-offs if it passes the plate (the paper's figs. 8 and 10)."""
     poses = {"impact": pose_at_step(dataset, 0), **poses_behind(dataset)}
     figure, views = two_views(dataset, poses.values(), "on impact and behind the plate", room=15.0)
     for view, axes in views.items():
@@ -84,7 +84,7 @@ def flight(dataset: xarray.Dataset) -> Figure:
 
 
 def largest_load(dataset: xarray.Dataset) -> Figure:
-    """The core under the largest force, with force and moment as arrows (the paper's fig. 5b)."""
+    """The core at its largest force, with force and moment as arrows (the paper's fig. 5b)."""
     step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
     pose = pose_at_step(dataset, step)
     what = f"under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
@@ -136,7 +136,7 @@ def course(dataset: xarray.Dataset) -> Figure:
 
 
 def plate(dataset: xarray.Dataset) -> Figure:
-    """Resistance left in the plate, from the first touch to the end, seen from behind (the paper's fig. 6)."""
+    """Resistance left in the plate, from the first contact to the end, seen from behind (the paper's fig. 6)."""
     share = dataset[v.RESISTANCE_SHARE]
     columns = min(3, share.sizes["snapshot"])
     rows = -(-share.sizes["snapshot"] // columns)
@@ -172,13 +172,13 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
 
 
 def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
-    """The core at instants spread evenly over its way through the plate, by their times."""
+    """Poses of the core at equal intervals of its passage through the plate, by time."""
     steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
     return {f"{float(dataset[v.TIME][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
 
 
 def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
-    """The core at the stand-offs, by their distances; none of a core that does not pass the plate."""
+    """Poses of the core at the stand-offs, by distance; empty if the core does not pass the plate."""
     standoffs = dataset[v.STANDOFF].values.tolist() if passed(dataset) else []
     return {f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
 
@@ -186,9 +186,9 @@ def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
 def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
     """Outline of the core [m], shape [points, 2]: x, and y or z as `view` says.
 
-    The convex hull of its rings: a groove of a core that has one is not seen.
+    It is the convex hull of the rings; it does not show a groove.
     """
-    _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # completes the axis to three at right angles
+    _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # two directions at right angles to the axis
     station, radius = (dataset[name].values[:, None, None] for name in (v.STATION, v.CORE_RADIUS))
     ring = np.cos(_AROUND)[:, None] * right + np.sin(_AROUND)[:, None] * up
     points = (pose.position + station * pose.axis + radius * ring)[..., [0, "xyz".index(view)]].reshape(-1, 2)
@@ -201,7 +201,7 @@ def pose_at_step(dataset: xarray.Dataset, step: int) -> Pose:
 
 
 def _pose_at(dataset: xarray.Dataset, standoff: float) -> Pose:
-    """The core when it passes a stand-off [m]: its axis from the projected angles, its place in free flight."""
+    """The core when it passes a stand-off [m]: the axis from the projected angles, the position from free flight."""
     there, end = dataset.sel(standoff=standoff), dataset.isel(time=-1)
     yaw, pitch = (np.radians(float(there[name])) for name in (v.YAW, v.PITCH))
     axis = np.sign(np.cos(yaw)) * np.array([1.0, np.tan(yaw), np.tan(pitch)])
@@ -219,7 +219,7 @@ def _title(dataset: xarray.Dataset, what: str) -> str:
 def two_views(
     dataset: xarray.Dataset, poses: Iterable[Pose], what: str, *, room: float
 ) -> tuple[Figure, dict[str, Axes]]:
-    """A figure of two views to scale that hold the plate, all poses of the core and some room [mm] round them."""
+    """A figure with two views to scale that contain the plate, all poses of the core and a margin `room` [mm]."""
     poses = list(poses)
     corners = {}
     for view in _ANGLES:
@@ -257,7 +257,7 @@ def _draw_components(axes: Axes, time: xarray.DataArray, values: xarray.DataArra
 
 
 def _draw_energy(axes: Axes, time: xarray.DataArray, dataset: xarray.Dataset) -> None:
-    """Kinetic energy of translation on the left, and the much smaller one of rotation on the right."""
+    """Kinetic energy of translation on the left axis, and the much smaller one of rotation on the right axis."""
     drawn = ((axes, v.TRANSLATIONAL_ENERGY, "black"), (axes.twinx(), v.ROTATIONAL_ENERGY, "#D55E00"))
     for side, energy, colour in drawn:
         side.plot(time, dataset[energy], color=colour)
@@ -272,7 +272,7 @@ def _cell_edges(centres: xarray.DataArray) -> tuple[float, float]:
 
 
 def _touched(dataset: xarray.Dataset) -> dict[str, tuple[float, float]]:
-    """Range [mm] along y and z that the core has weakened, and some room; all there is if it has weakened nothing."""
+    """Range [mm] along y and z that the core weakened, with a margin; the whole range if it weakened nothing."""
     share = dataset[v.RESISTANCE_SHARE]
     weaker = (share[-1] < share[0]).values
     ranges = {}

@@ -1,4 +1,4 @@
-"""What the page of a report knows of the hits: their numbers, the map's pixels, and some trajectories."""
+"""Data of the hits for the page of a report: their numbers, the pixels of the map, and some trajectories."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 MOST_HITS = 20_000
-"""Hits that a page holds, of all results together: some 3 MB."""
+"""Most hits on a page, for all results together: about 3 MB."""
 WORST_SHARE = 0.25
-"""Of the trajectories, those of the worst hits; the others are spread evenly."""
+"""Share of the trajectories that show the worst hits; the others are spread evenly."""
 _PIXELS = 160
 _BEHIND = "#707070"  # colour of the core behind the plate
 _DIGITS = 5
-_TURN = 1.5  # of an outline from point to point [degree]: 0.01 mm of a core's profile
+_TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.01 mm of a core's profile
 _MM = 1e3
 
 
 def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
-    """The hits that a page holds, in memory, with their numbers as the coordinate "hit": all, or at most so many, those
-    to `keep` and others by chance.
+    """The hits of a page, loaded, with their numbers as the coordinate "hit".
 
-    Every so manieth hit of a grid or of a Sobol sampling would leave out parts of the cell.
+    If there are more than `most`, the hits in `keep` stay and others are chosen at random. Hits at a constant step in a
+    grid or a Sobol sampling would leave out parts of the cell.
     """
     numbers = np.arange(dataset.sizes["hit"])
     if len(numbers) > most:
@@ -47,8 +47,8 @@ def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> 
 
 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
-    """Numbers of the hits that get a trajectory: those that are to come first, those with the largest residual
-    velocity, then again and again the hit that is farthest from all chosen so far, across the cell's edges."""
+    """Numbers of the hits that get a trajectory: those in `first`, those with the largest residual velocity, then
+    repeatedly the hit that is farthest from all chosen ones, with distances across the cell's edges."""
     velocity = shown(dataset, v.RESIDUAL_VELOCITY).values
     worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")[: round(WORST_SHARE * count)]
     numbers = dataset["hit"].values
@@ -69,10 +69,10 @@ def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int
 
 
 def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
-    """What the maps of a page draw, as plain data: the variables, and each result's hits in their units.
+    """Data of the maps of a page: the variables, and the hits of each result in shown units.
 
     Args:
-        datasets: results, each as `thinned` gives it.
+        datasets: results from `thinned`.
     """
     columns = [_columns(dataset) for dataset in datasets]
     shared = {key: column for key, column in columns[0].items() if all(key in others for others in columns)}
@@ -91,7 +91,7 @@ def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
 
 
 def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
-    """The variables that differ from hit to hit, and outcomes in any case, by what people call them."""
+    """All outcomes, and the shot variables that differ from hit to hit, by their shown names."""
     columns = {}
     for variable in (name for name in v.HIT_NUMBERS if name in dataset):
         at_standoff = v.STANDOFF in variable.dims
@@ -120,7 +120,7 @@ def _map_data(dataset: xarray.Dataset, columns: dict[str, Array]) -> dict[str, A
 
 
 def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
-    """The core in two views, in the plate and behind it, and the plate cut through the hit point; lengths in mm."""
+    """The core in two views, in the plate and behind it, and sections of the plate through the hit point [mm]."""
     inside, behind = poses_in_plate(history), poses_behind(history)
     colours = [to_hex(colour) for colour in colormaps["viridis"](np.linspace(0.0, 0.9, len(inside)))]
 
@@ -136,7 +136,7 @@ def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
 
 
 def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float | None]]:
-    """The core in a view, closed [mm]: of its outline, which is convex, a point for every so many degrees it turns."""
+    """Closed outline of the core in a view [mm]; it is convex and has one point for each `_TURN` of its direction."""
     outline = silhouette(history, pose, view) * _MM
     along, up = (np.roll(outline, -1, axis=0) - outline).T
     heading = np.floor(np.degrees(np.arctan2(up, along)) / _TURN)
@@ -145,7 +145,7 @@ def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float 
 
 
 def _solid_ranges(history: xarray.Dataset, view: str) -> list[list[float]]:
-    """From where to where the plate is solid along y or z through the hit point [mm]."""
+    """Ranges [mm] in which the plate is solid along y or z through the hit point."""
     along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * _MM
     solid = np.concatenate([[0], history[v.SOLID_ALONG[view]].values, [0]])
     starts, ends = np.flatnonzero(np.diff(solid) == 1), np.flatnonzero(np.diff(solid) == -1) - 1
@@ -153,5 +153,5 @@ def _solid_ranges(history: xarray.Dataset, view: str) -> list[list[float]]:
 
 
 def _rounded(values: Array) -> list[float | None]:
-    """As short as a page shows them; None for what does not exist."""
+    """Values rounded to `_DIGITS` digits; None for NaN."""
     return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]

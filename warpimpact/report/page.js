@@ -1,11 +1,11 @@
 "use strict";
-// Draws the maps of the page and what a person picks on them. All numbers come from #data.
+// Draws the maps of the page and the hits that the reader selects. All numbers come from #data.
 (() => {
   const data = JSON.parse(document.getElementById("data").textContent);
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const STATUS = "status", MISSING = "#9e9e9e", CHOSEN = "#d55e00";
   const font = { family: "system-ui, sans-serif", size: 12 };
-  // Four digits; what is less than a thousandth of a unit is rounding.
+  // Four digits; less than a thousandth of a unit is rounding.
   const number = (value) => {
     if (value === null) return "–";
     return String(Math.abs(value) < 1e-3 ? 0 : Number(value.toPrecision(4))).replace("-", "−");
@@ -22,7 +22,7 @@
     return [`hit ${result.number[hit]}: ${statusOf(result.status[hit]).label}`, place, ...lines];
   }
 
-  // What the label at the pointer says of every hit: short enough for a telephone.
+  // The label at the pointer for every hit, short enough for a phone.
   function hovers(result, variable) {
     const keys = data.variables.map(({ key }) => key).filter((key) => key === variable || data.main.includes(key));
     return result.number.map((_, hit) => told(result, hit, keys).join("<br>"));
@@ -32,7 +32,7 @@
     return variable === STATUS ? result.status : result.columns[variable];
   }
 
-  // One scale for all results, so that maps can be compared.
+  // One scale for all results makes maps comparable.
   function colours(variable) {
     if (variable === STATUS) {
       const count = data.statuses.length;
@@ -119,7 +119,7 @@
     return Math.hypot(along("y", result.period[0]), along("z", result.period[1]));
   }
 
-  // The core in two views to one scale, x-y above x-z, and the plate cut through the hit point.
+  // The core in two views with one scale, x-y above x-z, and the plate cut through the hit point.
   function drawViews(place, { thickness, solid }, poses) {
     const traces = [], shapes = [];
     [["y", "x", "y"], ["z", "x2", "y2"]].forEach(([view, xaxis, yaxis], row) => {

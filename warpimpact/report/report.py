@@ -1,7 +1,7 @@
-"""A report of one or several results: one HTML file that works without a network, for a person who has no warpimpact.
+"""A report of one or several results: one HTML file that works without a network and without warpimpact.
 
-The maps are drawn by Plotly, whose JavaScript (4.8 MB) stands in the file; everything that comes from a result or a
-campaign is escaped, and the page forbids itself to load anything.
+Plotly draws the maps; the file contains its JavaScript (4.8 MB). All text from a result or a campaign is escaped, and
+the page's security policy forbids it to load anything.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ def write_report(
     """Write the report of some results, whole or not at all.
 
     Args:
-        datasets: results by the names they get; of open files only what is used is read.
+        datasets: results by the names to show; of an open file only the needed parts are read.
         path: the HTML file; an existing one is replaced.
-        folders: where the files are that each campaign names.
-        trajectories: how many hits of each result are replayed, on the CPU.
-        study: error and speed of the numerics on such a scene (`analysis.study.study`).
+        folders: for each result, the folder of the files that its campaign names.
+        trajectories: number of hits of each result to replay on the CPU.
+        study: error and speed of the numerics on a similar scene (`analysis.study.study`).
         progress: called with (hits replayed, hits to replay).
 
     Raises:
@@ -77,7 +77,7 @@ def write_report(
 
 
 def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]], Iterator[int]]:
-    """A function that goes through hits and tells `progress` how many of all lie behind."""
+    """A function that iterates over hits and reports to `progress` how many of all are done."""
     done = 0
 
     def follow(hits: Sequence[int]) -> Iterator[int]:
@@ -92,7 +92,7 @@ def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]]
 
 
 def _page(*, results: Sequence[dict[str, Any]], **content: Any) -> str:
-    """The page, from what page.html names."""
+    """Fill in page.html."""
     environment = Environment(
         loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )

@@ -1,4 +1,4 @@
-"""What the page of a report says of the results, in words, tables and small drawings."""
+"""Text, tables and small drawings of the results for the page of a report."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _PROVENANCE = (
 
 
 class Row(NamedTuple):
-    """A number of a table, and its interval, as text."""
+    """A number of a table and its interval, as text."""
 
     label: str
     value: str
@@ -48,7 +48,7 @@ class Row(NamedTuple):
 
 
 def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
-    """What the page says of a result in words, tables and a drawing; of an open file a slice is in memory at a time."""
+    """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes = dataset.attrs
     return {
         "name": name,
@@ -68,7 +68,7 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
 
 
 def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, str]:
-    """The comparison of plates as text and as a picture; or why there is none."""
+    """The comparison of plates as text and as a picture; if there is none, the text gives the reason."""
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
@@ -79,7 +79,7 @@ def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, str]:
 
 
 def _asked(dataset: xarray.Dataset) -> str:
-    """What was shot at what, as a sentence or two."""
+    """Hits, cell, impact and plate in one or two sentences."""
     y, z = (f"{length * _MM:.4g}" for length in dataset.attrs[attr.PLATE_PERIOD])
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     sampling = f", {dataset.attrs[attr.SAMPLING]} sampling" if attr.SAMPLING in dataset.attrs else ""
@@ -88,13 +88,13 @@ def _asked(dataset: xarray.Dataset) -> str:
     )
     if attr.AREAL_DENSITY in dataset.attrs:
         told = dataset.attrs
-        text += f" The plate is open by {told[attr.OPEN_AREA]:.1%} and weighs {told[attr.AREAL_DENSITY]:.3g} kg/m²."
+        text += f" The plate has {told[attr.OPEN_AREA]:.1%} open area and weighs {told[attr.AREAL_DENSITY]:.3g} kg/m²."
     return text
 
 
 def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
-    """Tables of a campaign with its values as they were written, the one inside another as `plate.pattern`; the number
-    of hits may be that of the command line."""
+    """Tables of a campaign with its values as written; an inner table has a dotted name such as `plate.pattern`. A
+    number of hits from the command line replaces the written one."""
     campaign = dataset.attrs.get(attr.CAMPAIGN, "")
     values = json.loads(campaign) if campaign.startswith("{") else tomllib.loads(campaign)
     tables = dict(_flat(values, ""))
@@ -104,7 +104,7 @@ def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
 
 
 def _flat(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """A table, and those inside it, by their dotted names."""
+    """A table and its inner tables, by dotted names."""
     plain = {key: _plain(value) for key, value in table.items() if not isinstance(value, dict) and value is not None}
     if name and plain:
         yield name, plain
@@ -136,7 +136,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
 
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
-    """The cell that hits are spread over, its holes as the path of an SVG: lengths in mm, y to the right, z up."""
+    """The cell of the hits, with its holes as an SVG path: lengths in mm, y to the right, z up."""
     vertices = np.stack([dataset[v.OUTLINE_Y].values, -dataset[v.OUTLINE_Z].values], axis=-1) * _MM
     gaps = np.flatnonzero(np.isnan(vertices[:, 0]))
     rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(vertices, gaps)]

@@ -258,8 +258,8 @@ def test_the_plates_of_a_file_share_all_else() -> None:
     ("change", "sentence"),
     [
         (('name = "slots"\n', ""), "plate[0].name: is missing, but must be given"),
-        (('"round holes"', '"slots"'), 'plate[1].name: got "slots" again, but each plate needs its own'),
-        (('"slots"', '"../slots"'), 'plate[0].name: got "../slots", but a name begins with a letter or digit and has'),
+        (('"round holes"', '"slots"'), 'plate[1].name: got "slots" again, but each plate needs its own name'),
+        (('"slots"', '"../slots"'), 'plate[0].name: got "../slots", but a name begins with a letter or a digit and'),
         (('"slots"', "3"), "plate[0].name: got 3, but a name begins"),
         (('"4 mm"\nresistance', '"4 kg"\nresistance'), ', plate "slots": plate.thickness: got "4 kg", which is not a'),
     ],
@@ -276,23 +276,27 @@ def test_one_plate_is_run_and_several_are_compared(tmp_path: Path) -> None:
         CampaignError, match=r"plate: got 2 plates, but this takes one; warpimpact compare .* runs them"
     ):
         Campaign.from_toml(TWO_PLATES)
-    with pytest.raises(CampaignError, match=r"plate: must be two tables \[\[plate\]\] or more, each with a name"):
+    with pytest.raises(CampaignError, match=r"plate: a comparison needs two or more tables \[\[plate\]\]"):
         read_plates(TWO_PLATES.with_name("slotted_plate.toml"))
 
 
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["a.nc"], "a.nc: is one result, but two or more, or one campaign, are needed to compare"),
-        (["a.nc", "a.nc"], "the same result is given twice"),
+        (["a.nc"], "a.nc: got one result, but compare needs at least two results, or one campaign"),
+        (["a.nc", "a.nc"], "a.nc: got this result 2 times, but each result counts once"),
         (["a.nc", "b.nc"], "a.nc: cannot be read as a netCDF file"),
-        (["a.nc", "b.nc", "-o", "a.gif"], "a.gif: must end with .png, .pdf or .svg"),
-        (["a.nc", "b.nc", "--angle", "30"], '--angle, --standoff: got "30", which has no unit'),
+        (["a.nc", "b.nc", "-o", "a.gif"], "a.gif: the name of a picture must end in .png, .pdf or .svg"),
+        (["a.nc", "b.nc", "--angle", "30"], '--angle: got "30", which has no unit'),
+        (["a.nc", "b.nc", "--standoff", "30"], '--standoff: got "30", which has no unit'),
         (
             ["a.nc", "b.nc", "--angle", "90 deg"],
             '--angle: got "90 deg", but it must be at least 0 and less than 90 deg',
         ),
-        (["a.toml", "b.nc"], "a.toml: is a campaign, which is compared on its own"),
+        (
+            ["a.toml", "b.nc"],
+            "a.toml: got a campaign and other files, but compare takes either one campaign or results",
+        ),
     ],
 )
 def test_a_wrong_command_is_told_in_one_sentence_and_writes_nothing(

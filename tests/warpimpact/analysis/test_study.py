@@ -235,7 +235,7 @@ def test_text_says_the_errors_fast_to_slow(small: xarray.Dataset) -> None:
     np.testing.assert_allclose([float(cell) for cell in rows["middle"][1:4]], expected, atol=5e-4)
     assert "left out" not in study_text(small)
     small = small.assign(settled=small["settled"] * 0)
-    assert study_text(small).endswith("left out, as their status still depends on the numerics: 16 of 16 hits")
+    assert study_text(small).endswith("left out: 16 of 16 hits, because their status depends on the numerics")
 
 
 def test_report_holds_the_study(

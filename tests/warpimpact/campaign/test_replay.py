@@ -160,10 +160,10 @@ def test_what_cannot_be_replayed_is_refused(result: xarray.Dataset) -> None:
         with pytest.raises(ResultError, match=f"hit: got {hit}, but the result has hits 0 to 2"):
             replay(result, hit, folder=NOWHERE)
     moved = result.assign_coords(hit_y=result["hit_y"] + 1e-6)
-    with pytest.raises(ResultError, match="no longer what the campaign"):
+    with pytest.raises(ResultError, match="names now give another shot"):
         replay(moved, 0, folder=NOWHERE)
     anonymous = result.drop_attrs()
-    with pytest.raises(ResultError, match="does not carry its campaign"):
+    with pytest.raises(ResultError, match="does not contain its campaign"):
         replay(anonymous, 0, folder=NOWHERE)
 
 
@@ -178,7 +178,7 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
     with pytest.raises(CampaignError, match=r"the campaign in the result: hits\.file: .* no file nowhere/hits\.csv"):
         replay(result, 0, folder=NOWHERE)
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n0.002,0.002\n")
-    with pytest.raises(ResultError, match="got a result of 1 hits, but its campaign and the files it names give 2"):
+    with pytest.raises(ResultError, match="got a result with 1 hits, but its campaign and the files it names give 2"):
         replay(result, 0, folder=tmp_path)
 
 

@@ -95,7 +95,7 @@ def test_an_existing_output_is_kept(folder: Path, capsys: pytest.CaptureFixture[
     [
         ("nowhere/a.nc", "nowhere: cannot be written into (No such file or directory)"),
         ("file/a.nc", "file: cannot be written into (Not a directory)"),
-        (".", ".: is a folder, but the result is one file"),
+        (".", ".: is a folder, but the output is one file"),
     ],
 )
 def test_an_output_that_cannot_be_written_is_refused_before_computing(
@@ -139,4 +139,4 @@ def test_results_are_drawn_beside_each_other(
     assert capsys.readouterr().out.split() == [
         f"a_a_{name}.png" for name in ("residual_velocity", "deflection", "tilt")
     ]
-    assert _refusal(["plot", "a.nc", "a.nc"], capsys) == "the same result is given twice"
+    assert _refusal(["plot", "a.nc", "a.nc"], capsys) == "a.nc: got this result 2 times, but each result counts once"

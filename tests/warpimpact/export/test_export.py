@@ -103,7 +103,7 @@ def test_command_writes_a_new_folder_for_a_hit(
     assert main(["export", str(tmp_path / "hit.nc")]) == 0
     assert capsys.readouterr().out == "".join(f"{tmp_path / 'hit_vtk' / name}.pvd\n" for name in ("core", "plate"))
     assert main(["export", str(tmp_path / "hit.nc")]) == 2
-    assert "hit_vtk: exists already; name a new folder" in capsys.readouterr().err
+    assert "hit_vtk: exists already; give a new folder with -o" in capsys.readouterr().err
     assert {path.name for path in tmp_path.iterdir()} == {"hit.nc", "hit_vtk"}
 
 
@@ -111,6 +111,6 @@ def test_without_pyvista_the_way_to_it_is_told(
     history: xarray.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyvista", None)
-    with pytest.raises(files.OutputError, match=r"hit: VTK needs PyVista: pip install 'warpimpact\[vtk\]'"):
+    with pytest.raises(files.OutputError, match=r"hit: VTK files need PyVista: pip install 'warpimpact\[vtk\]'"):
         write_vtk(history, tmp_path / "hit")
     assert not list(tmp_path.iterdir())

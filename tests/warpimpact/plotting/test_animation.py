@@ -69,7 +69,7 @@ def test_frames_show_the_history(folder: Path) -> None:
 def test_other_names_are_refused_before_computing(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     command = ["replay", str(folder / "a.nc"), "--hit", "0", "--animation"]
     assert main([*command, "a.avi"]) == 2
-    assert "a.avi: is no film that can be written; its name must end in .gif or .mp4" in capsys.readouterr().err
+    assert "a.avi: the name of a film must end in .gif or .mp4" in capsys.readouterr().err
     assert main([*command, str(folder / "a.gif")]) == 2
     assert "a.gif: exists already" in capsys.readouterr().err
     assert not (folder / "a_hit0.nc").exists()
@@ -77,5 +77,5 @@ def test_other_names_are_refused_before_computing(folder: Path, capsys: pytest.C
 
 def test_mp4_needs_ffmpeg(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
-    with pytest.raises(files.OutputError, match=r"a\.mp4: a MP4 needs the program ffmpeg"):
+    with pytest.raises(files.OutputError, match=r"a\.mp4: an MP4 needs the program ffmpeg"):
         film.writer_for(Path("a.mp4"))

@@ -123,7 +123,7 @@ def test_every_campaign_of_the_library_can_be_read_and_says_its_question() -> No
 
 def test_a_picture_has_a_name_of_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml"), "-o", str(tmp_path / "a.gif")]) == 2
-    assert "a.gif: must end with .png, .pdf or .svg" in capsys.readouterr().err
+    assert "a.gif: the name of a picture must end in .png, .pdf or .svg" in capsys.readouterr().err
     assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml"), "-o", str(tmp_path / "none" / "a.png")]) == 2
     assert main(["plate", str(CAMPAIGNS / "slotted_plate.toml"), "-o", str(tmp_path / "a.svg")]) == 0
     assert [path.name for path in tmp_path.iterdir()] == ["a.svg"]
