@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpimpact.scene import CirclePattern, Core, Numerics, Plate, Record, Scene, Shots
-from warpimpact.solver import inputs
+from warpimpact.solver import arrays
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.bending import Sections, sections_of
 from warpimpact.solver.rings import Rings
@@ -45,7 +45,7 @@ def test_no_moment_is_left_behind_the_base(monkeypatch: pytest.MonkeyPatch) -> N
         stress[-1] = 1.0  # [1/m³]: its "stress" is its moment
         return replace(sections, stress=stress)
 
-    monkeypatch.setattr(inputs, "sections_of", last_alone)
+    monkeypatch.setattr(arrays, "sections_of", last_alone)
     outcomes = bent(paper_plate(), slanted_shots(), fidelity="draft")
     assert outcomes.largest_bending_moment.min() > 1.0
     assert (outcomes.bending_stress < 1e-10 * outcomes.largest_bending_moment).all()
