@@ -1,4 +1,4 @@
-"""What the benchmarks share: the checkout, the scene, the clock, the machine."""
+"""Common parts of the benchmarks: the checkout, the scene, the clock, the machine."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ RESULTS = Path(__file__).resolve().parent / "results"
 
 
 def shots_of(campaign: Any, count: int) -> Shots:
-    """A campaign's shots at `count` Sobol points of its seed; those of a smaller count come first."""
+    """A campaign's shots at the first `count` Sobol points of its seed."""
     return make_shots(campaign.impact, Hits(count=count, seed=campaign.hits.seed), campaign.plate)
 
 
 def copied(shots: Shots, copies: int) -> Shots:
-    """The shots `copies` times over."""
+    """The shots, repeated `copies` times."""
     return Shots(**{name: np.tile(values, copies) for name, values in shots.columns.items()})
 
 
@@ -85,7 +85,7 @@ def seconds(work: Callable[[], Any]) -> float:
 
 @contextmanager
 def on_cores(count: int) -> Iterator[None]:
-    """This thread, and those it starts meanwhile, on `count` of the cores it may use."""
+    """Restrict this thread, and those that it starts meanwhile, to `count` of its cores."""
     allowed = os.sched_getaffinity(0)
     os.sched_setaffinity(0, set(sorted(allowed)[:count]))
     try:
@@ -100,7 +100,7 @@ def cores() -> int:
 
 
 def machine() -> dict[str, str | int]:
-    """What the figures were measured on, and when."""
+    """The machine on which the figures were measured, and the date."""
     names = [line.split(":", 1)[1].strip() for line in _cpuinfo() if line.startswith("model name")]
     return {
         "processor": names[0] if names else platform.processor(),
@@ -116,7 +116,7 @@ def _cpuinfo() -> list[str]:
 
 
 def store(name: str, values: dict[str, Any], figure: Any = None) -> None:
-    """Write results/NAME.json and, of a figure, results/NAME.png; say where."""
+    """Write results/NAME.json and, for a figure, results/NAME.png; print the paths."""
     RESULTS.mkdir(exist_ok=True)
     path = RESULTS / f"{name}.json"
     path.write_text(json.dumps(values, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

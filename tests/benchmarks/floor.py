@@ -1,9 +1,9 @@
-"""The floor: what the consistent law asks for per patch and step, and how many of these a hit has (docs/model.md §4).
+"""The floor: the operations of the consistent law per patch and step, and their number per hit (docs/model.md §4).
 
-Counted from the formulas on the patches of rings that reach into the slab: each of them is looked at, those that
-advance into the slab also act. An addition, product, comparison, root, quotient or exponential counts as one. Nothing
-is counted for the motion (once per step), for the filter of the exposure, for laying the window, for addresses, nor
-for rings outside the slab: a march can only be slower.
+Operations are counted from the formulas, for the patches of rings that reach into the slab. Each of these patches is
+examined; those that advance into the slab also act. An addition, product, comparison, root, quotient or exponential
+counts as one. The count leaves out the motion (once per step), the filter of the exposure, the setup of the window,
+addresses and rings outside the slab. So a march can only be slower.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ ACT = 118
 # Place and weights in the grid, 10; material and exposure read, 2 × 9; exposure shared out over four cells, 12; what is
 # left of the resistance, 2; normal and sliding velocity, 27; its size, 6; traction, 13; force and moment, sums, 30.
 LOOK_BYTES, ACT_BYTES = 8, 64
-# Cosine and sine; four nodes of material and of exposure read, and four of exposure gained read and written. What a hit
-# needs of them, a window of some 10 kB and a tile of some 30 kB, lies in the fastest caches all along: from memory come
-# its inputs and outcomes alone, some 200 bytes.
+# Cosine and sine; four nodes of material and of exposure read, and four of exposure gained read and written. A hit
+# needs a window of about 10 kB and a tile of about 30 kB, which stay in the fastest caches. Only its inputs and
+# outcomes, about 200 bytes, come from memory.
 
 
 @dataclass(frozen=True)
 class Work:
-    """Of one hit, averaged over several; patches summed over the steps."""
+    """Work of one hit, averaged over several hits; patches are summed over the steps."""
 
     steps: float
     patches_in_slab: float
@@ -44,7 +44,7 @@ class Work:
 
 
 def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
-    """What the law asks for at one resolution, from the histories of the shots on the CPU."""
+    """Work of the law at one resolution, from the histories of the shots on the CPU."""
     core, plate = campaign.core, campaign.plate
     resolution = resolve(numerics, campaign.scene)
     rings = rings_of(core, resolution.patches_axial, resolution.patches_around, resolution.patch_width)

@@ -1,10 +1,9 @@
-"""warpimpact on a CUDA device: hits per second at every fidelity, how far above the floor, and the same answers as on
-the CPU.
+"""warpimpact on a CUDA device: hits per second at every fidelity, ratio to the floor, and comparison with the CPU.
 
     python tests/benchmarks/gpu.py              # writes results/gpu.json and .png beside it
 
-Needs the checkout and warpimpact's dependencies, no installation. Exit code 1 where the device's answers are further
-from the CPU's than stated, 2 where there is no CUDA device.
+It needs the checkout and warpimpact's dependencies, no installation. The exit code is 1 if the device's answers differ
+from the CPU's by more than stated, and 2 if there is no CUDA device.
 """
 
 from __future__ import annotations
@@ -30,13 +29,14 @@ from warpimpact.solver.simulate import Outcomes, simulate
 FIDELITIES = ("draft", "standard", "reference")
 SMALLEST, GROWTH = 1024, 4
 LONGEST = 4.0
-"""A fidelity's counts grow until a run takes so long [s]."""
+"""The number of hits of a fidelity grows until a run takes this long [s]."""
 DISTINCT = 2**16
-"""Different hits in a run; beyond that they repeat."""
+"""Number of different hits in a run; larger runs repeat them."""
 SAME_HITS, FLOOR_HITS = 512, 16
 TOLERANCE = {"90 %": (0.005, 0.02), "max": (0.1, 0.5)}
-"""Differences from the CPU in single precision: residual velocity [m/s] and tilt at the last stand-off [°]. Sums in
-another order differ like single from double precision: 0.012 m/s and 0.04° at most over 6144 hits."""
+"""Differences from the CPU in single precision: residual velocity [m/s] and tilt at the last stand-off [°]. Another
+order of summation makes as much difference as single precision against double: 0.012 m/s and 0.04° at most over 6144
+hits."""
 LANES = 128
 """float32 lanes per multiprocessor, as on compute capability 8.6, 8.9, 9.0, 10 and 12; 64 on 7.x and 8.0."""
 
@@ -77,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def clock_of(device: Any) -> float:
-    """Highest clock of the multiprocessors [MHz]; exits where nvidia-smi cannot tell."""
+    """Highest clock of the multiprocessors [MHz]; exits if nvidia-smi does not give it."""
     query = ["--query-gpu=clocks.max.sm", "--format=csv,noheader,nounits", f"--id={device.pci_bus_id}"]
     if shutil.which("nvidia-smi") is None:
         sys.exit("gpu.py: error: there is no nvidia-smi to ask for the clock; give --clock")
@@ -85,7 +85,7 @@ def clock_of(device: Any) -> float:
 
 
 def measure(campaign: Campaign, device: str, peak: float) -> dict[str, Any]:
-    """All figures of a device that can do `peak` operations per second; printed as they come."""
+    """All figures of a device with a peak of `peak` operations per second; each is printed when it is known."""
     values: dict[str, Any] = {"fidelities": {}, "tolerance": TOLERANCE, "same": True}
     for name in FIDELITIES:
         numerics = Numerics(fidelity=name)
@@ -110,7 +110,7 @@ def measure(campaign: Campaign, device: str, peak: float) -> dict[str, Any]:
 
 
 def growth(campaign: Campaign, numerics: Numerics, device: str) -> dict[int, float]:
-    """Hits per second of ever more hits."""
+    """Hits per second for growing numbers of hits."""
     shots, rates, count, taken = shots_of(campaign, DISTINCT), {}, SMALLEST, 0.0
     _simulate(campaign, shots[:SMALLEST], numerics, device)  # builds the kernels
     while taken * GROWTH < LONGEST:

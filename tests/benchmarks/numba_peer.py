@@ -1,9 +1,9 @@
-"""The consistent law (docs/model.md §4) as a good Numba programmer would write it: the peer of the CPU kernels.
+"""The consistent law (docs/model.md §4) in Numba, written for speed: the peer of the CPU kernels.
 
-float32 and fast-math; hits in parallel, each thread with its own window of the plate; rings outside the slab are
-skipped; what does not depend on the ring is computed once per azimuth and step, what the second pass needs of the
-first is kept in a list of the patches in contact. Nothing is allocated while a core marches. It knows what the
-benchmark asks of it: a plate without rim, stress Y, β < 1.
+It uses float32 and fast-math. Hits run in parallel; each thread has its own window of the plate. Rings outside the slab
+are skipped. Terms that do not depend on the ring are computed once per azimuth and step. A list of the patches in
+contact passes data from the first pass to the second. The march allocates no memory. It covers only what the benchmark
+needs: a plate without rim, stress Y, β < 1.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ SETTINGS = {
     Setting(40, 80, 4.0, 1.0e-6): (0.15, 0.6),
     Setting(64, 128, 5.0, 0.5e-6): (0.12, 0.3),
 }
-"""Settings near the best of those tried, and what each stands for: no more than 90 % errors of so many m/s and degrees
-of tilt at 130 mm on campaigns/slotted_plate.toml. The second is the resolution of the prototype that set the target."""
+"""Settings near the best ones that were measured, each with its stated 90 % errors: m/s, and degrees of tilt at 130 mm,
+on campaigns/slotted_plate.toml. The second has the resolution of the prototype that set the target."""
 
 
 class Peer:
@@ -110,7 +110,7 @@ class Peer:
         return status, np.linalg.norm(state[2], axis=1), tilt
 
     def _half_window(self, shots: Shots) -> float:
-        """Half the width [m] of the part of the plate that a core reaches, if it keeps its attitude."""
+        """Half the width of the part of the plate that a core reaches if it keeps its attitude [m]."""
         core, plate, steepest = self.core, self.plate, float(shots.obliquity.max())
         turned = float(np.sin(np.hypot(shots.pitch, shots.yaw).max()))
         across = 1.3 * core.max_radius / math.cos(steepest) + plate.thickness * math.tan(steepest)
@@ -166,7 +166,7 @@ def tile_of(plate: Plate, spacing: float) -> tuple[NDArray[np.float32], tuple[fl
 
 
 def tent(length: float, width: float) -> Array:
-    """The tent K at the nodes of a grid; a half-width that is no multiple of the cell's is rounded to one."""
+    """The tent K at the nodes of a grid; its half-width is rounded to a multiple of the cell."""
     reach = max(1, round(length / width))
     weights = 1.0 - np.abs(np.arange(1 - reach, reach)) / reach
     return weights / weights.sum()
@@ -231,7 +231,7 @@ def bilinear(field, index, stride, y, z):
 
 @njit(fastmath=True, error_model="numpy")
 def spread(fields, stride, box, taps_y, taps_z):
-    """Filter the gain with the tent and add half of it to the exposure. The box holds the cells gained in."""
+    """Filter the gain with the tent and add half of it to the exposure. The box holds the cells with a gain."""
     exposure, gain, work = fields[1], fields[2], fields[3]
     low_y, high_y, low_z, high_z = box
     reach_y, reach_z = len(taps_y) // 2, len(taps_z) // 2

@@ -1,8 +1,8 @@
 """The paper's literal scheme (its eqs. 1 to 6; docs/model.md §4) in NumPy, vectorised over points and hits.
 
-36 × 36 points, every one in the slab pushed with Y (−n + η t), t the meridian tangent; the nearest node of a 10 µm
-grid weakens by β once per step in which it is touched. What the points touched is counted per node, so that the plate
-itself is stored once, and only pages of memory that a core comes across are ever used. float64.
+The core has 36 × 36 points. Each point in the slab has the load Y (−n + η t), t the meridian tangent. The nearest node
+of a 10 µm grid weakens by β once per step in which it is touched. Touches are counted per node, so the plate itself is
+stored once, and a core uses only the pages of memory that it touches. float64.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ BATCH = 16
 class Peer:
     """A scene, ready to march; NumPy computes on one core.
 
-    The literal law can push energy into a core. warpimpact withholds what would raise the kinetic energy in a step;
-    `restrained` does so, too, and is for the comparison with it.
+    The literal law can push energy into a core. warpimpact limits a step that would raise the kinetic energy.
+    `restrained` does so, too, for the comparison.
     """
 
     def __init__(self, core: Core, plate: Plate, *, batch: int = BATCH, restrained: bool = False) -> None:

@@ -1,8 +1,8 @@
-"""What a campaign costs besides the march: start, compilation, file, memory; and what its cost depends on.
+"""Costs of a campaign besides the march (start, compilation, file, memory), and what they depend on.
 
     python tests/benchmarks/overheads.py --largest 1000000    # writes results/overheads.json and .png beside it
 
-The commands are run as a user runs them. Nothing here fails for being slow; the targets stand beside the figures.
+The commands are run as a user runs them. A slow result is no failure; the targets stand beside the figures.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ REPEATS = 3
 
 
 class Usage(NamedTuple):
-    """Of one finished command: time on the clock [s], and the most memory it held [bytes]."""
+    """Usage of one finished command: elapsed time [s] and peak memory [bytes]."""
 
     seconds: float
     peak_memory: int
@@ -69,9 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        description="what a campaign costs besides the march, and what its cost depends on"
-    )
+    parser = argparse.ArgumentParser(description="costs of a campaign besides the march, and what they depend on")
     parser.add_argument("--largest", type=int, default=30_000, metavar="N", help="hits at most (default: 30000)")
     return parser
 
@@ -97,7 +95,7 @@ def _run(folder: Path, count: int, **environment: str) -> Usage:
 
 
 def _starts(folder: Path) -> dict[str, float]:
-    """Time of --help, of a run of 100 hits with kernels built, and what building them adds [s]."""
+    """Time of --help, of a run of 100 hits with compiled kernels, and the additional time of compilation [s]."""
     warm = min(_run(folder, 100).seconds for _ in range(REPEATS + 1))  # the first may build them
     cold = _run(folder, 100, WARP_CACHE_PATH=str(folder / "kernels")).seconds
     return {
@@ -130,7 +128,7 @@ def _hits(folder: Path, largest: int) -> list[dict[str, float]]:
 
 
 def _file_share(campaign: Campaign, folder: Path, count: int) -> float:
-    """Share of a run that writing its file takes, beside the imports at a first file."""
+    """Share of a run that it takes to write its file, without the imports at a first file."""
     campaign = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
     files.write(run(campaign, device="cpu"), folder / "first.nc")
     begin = time.perf_counter()
@@ -144,7 +142,7 @@ def _sized(plate: Plate, side: float) -> Plate:
 
 
 def _relabelled(plate: Plate, count: int) -> Plate:
-    """The same plate, with a square of several of its unit cells called one."""
+    """The same plate, with a square of several unit cells as its unit cell."""
     side, cell = math.isqrt(count), plate.pattern.period
     steps = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2) * cell
     holes = [tuple(map(float, step + within)) for step in steps for within in ((0.0, 0.0), (cell[0] / 2, cell[1] / 2))]
@@ -162,7 +160,7 @@ def _shots(campaign: Campaign, yaw: float) -> Shots:
 
 
 def _rates(campaign: Campaign, scenes: dict[float, tuple[Plate, Shots]]) -> dict[float, float]:
-    """Best hits per second of scenes that take turns."""
+    """Best hits per second of scenes that run in turn."""
     rates = dict.fromkeys(scenes, 0.0)
     for _ in range(REPEATS):
         for name, (plate, shots) in scenes.items():

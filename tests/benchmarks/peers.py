@@ -3,8 +3,8 @@
     pip install -e '.[bench]'
     python tests/benchmarks/peers.py            # writes results/peers.json and .png beside it
 
-Exit code 1 where an answer is further from the converged one than its setting states, or where the two programs of the
-literal scheme disagree. NumPy runs on one core; its ratio says so.
+The exit code is 1 if an error is larger than its setting states, or if the two programs of the literal scheme disagree.
+NumPy runs on one core, and its ratio says so.
 """
 
 from __future__ import annotations
@@ -30,16 +30,17 @@ from warpimpact.solver.resolution import Fidelity, spelt_out
 from warpimpact.solver.simulate import simulate
 
 STATED = {"draft": (2.0, 5.0), "standard": (1.0, 1.0), "reference": (0.1, 0.3)}
-"""What warpimpact's fidelities stand for: 90 % errors in m/s and degrees of tilt at the last stand-off."""
+"""Stated 90 % errors of warpimpact's fidelities: m/s, and degrees of tilt at the last stand-off."""
 SAME = (0.01, 0.01)
-"""How far warpimpact's literal scheme in double precision and NumPy's may be apart: m/s and degrees, 90 %."""
+"""Allowed 90 % difference between the literal schemes of warpimpact in double precision and of NumPy: m/s and
+degrees."""
 COARSEST = Fidelity(8, 12, 0.7, 1.0)
-"""Still far more accurate than the literal scheme, whose programs it is the one to compare with."""
+"""The fidelity to compare with programs of the literal scheme. It is still far more accurate than they are."""
 LITERAL_HITS, FLOOR_HITS = 128, 8
 TIMED = 0.5
 """Length of one timed run [s]."""
 ROUNDS = 3
-"""Runs of each contender, in turn with the others; the best counts."""
+"""Runs of each contender, in turn with the others; the best one counts."""
 COLOURS = {"warpimpact": "#0072B2", "Numba": "#D55E00", "NumPy": "0.35"}
 
 
@@ -62,7 +63,7 @@ class Contender:
 
     @property
     def fails(self) -> bool:
-        """Whether it is further off than it states."""
+        """Whether its error is larger than stated."""
         beyond = self.stated is not None and any(np.array(self.error) > self.stated)
         return bool(beyond or self.other_status)
 
@@ -79,7 +80,7 @@ class Contender:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Measure, print, store; 1 where something disagrees."""
+    """Measure, print, store; returns 1 if something disagrees."""
     arguments = _parser().parse_args(argv)
     campaign = Campaign.from_toml(CAMPAIGN)
     shots = shots_of(campaign, arguments.hits)
@@ -195,7 +196,7 @@ def _uncertainty(truth: xarray.Dataset) -> tuple[float, float]:
 
 
 def literal_difference(campaign: Campaign, shots: Shots) -> tuple[float, float]:
-    """How far two independent programs of the literal scheme are apart, 90 % [m/s], [°]."""
+    """Difference between two independent programs of the literal scheme, 90 % [m/s], [°]."""
     ours = _simulate(campaign, shots, Numerics(scheme="nodal", precision="double"))
     peer = numpy_peer.Peer(campaign.core, campaign.plate, restrained=True)
     velocity, tilt = peer(shots, campaign.output.standoffs[-1])
@@ -204,7 +205,8 @@ def literal_difference(campaign: Campaign, shots: Shots) -> tuple[float, float]:
 
 
 def measure(contenders: Sequence[Contender], shots: Shots) -> None:
-    """Best rate of each contender, one core and all; they take turns, so that a disturbance meets all of them."""
+    """Best rate of each contender, on one core and on all. They run in turn, so that a disturbance affects all of
+    them."""
     counts = sorted({1, cores()})
     runs = []
     for one in contenders:
@@ -220,8 +222,8 @@ def measure(contenders: Sequence[Contender], shots: Shots) -> None:
 
 
 def compare(contenders: Sequence[Contender]) -> list[dict[str, Any]]:
-    """What the project sets itself targets for: each fidelity against the fastest Numba setting within what it stands
-    for, all cores against all cores, and against NumPy on its one core; all cores against one."""
+    """The ratios for which the project has targets. Each fidelity is compared with the fastest Numba setting of its
+    stated error, on all cores, and with NumPy on its one core. All cores are compared with one core."""
     ours = {one.setting: one for one in contenders if one.program == "warpimpact"}
     pairs = []
     for name in STATED:

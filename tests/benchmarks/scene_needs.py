@@ -1,7 +1,7 @@
-"""What a scene leaves out costs nothing: each feature off, beside the same physics with the feature on.
+"""Physics that a scene does not use costs nothing: each feature off, beside the same physics with the feature on.
 
-Every pair computes the same outcomes to rounding: what is off is off in the kernels' build, what is on is on with a
-value too small to matter. Both are timed warm, in turn, in one process. Run it as a script:
+Every pair computes the same outcomes except for rounding. A feature that is off is not in the build of the kernels. A
+feature that is on has a value too small to matter. Both are timed warm, in turn, in one process. Run it as a script:
 python tests/benchmarks/scene_needs.py [--hits N]
 """
 

@@ -1,4 +1,4 @@
-"""What `irreducible = true` saves, and how far hits unfolded by symmetry lie from the same hits computed.
+"""Saving of `irreducible = true`, and the difference between unfolded hits and the same hits computed.
 
 Both are timed warm, in turn, in one process. Run it as a script:
 python tests/benchmarks/symmetry_saving.py [CAMPAIGN.toml ...] [--hits N]

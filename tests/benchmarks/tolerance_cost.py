@@ -1,7 +1,7 @@
-"""What a run to a tolerance costs beside one of every hit at the finest level that it used, and how well it does.
+"""Cost of a run to a tolerance, compared with a run of every hit at its finest level, and its errors.
 
-Both are timed warm, in turn, in one process; the errors are those against the converged answer of a study, which
-takes the longest. Run it as a script:
+Both are timed warm, in turn, in one process. Errors are differences from the converged answer of a study, which takes
+the most time. Run it as a script:
 python tests/benchmarks/tolerance_cost.py [CAMPAIGN.toml] [--hits N] [--velocity M_PER_S] [--tilt DEGREES]
 """
 

@@ -1,4 +1,4 @@
-"""What the tests of device functions share: structs and arrays in, poisoned arrays out; float64 throughout."""
+"""Common parts of the tests of device functions: structs and arrays in, poisoned arrays out; all in float64."""
 
 import ctypes
 from typing import Any
@@ -15,7 +15,7 @@ from warpimpact.solver.tile import Tile
 
 
 def records(struct: Any, device: str, **columns: Any) -> wp.array:
-    """An array of structs [n] from columns of shape [n, ...], or of the shape of one for all."""
+    """An array of structs [n] from columns of shape [n, ...]; a column without n holds for all structs."""
     names = struct.numpy_dtype()["names"]
     assert set(columns) <= set(names), "a misspelt member would stay zero unnoticed"
     count = max(len(np.atleast_1d(column)) for column in columns.values())
@@ -26,7 +26,7 @@ def records(struct: Any, device: str, **columns: Any) -> wp.array:
 
 
 def poisoned(shape: int | tuple[int, ...], dtype: Any, device: str) -> wp.array:
-    """An array whose bits are all set: NaN in every float, so that what a kernel leaves out shows."""
+    """An array with all bits set, which is NaN in every float. So a test sees a value that a kernel did not write."""
     array = wp.empty(shape, dtype=dtype, device="cpu")
     ctypes.memset(array.ptr, 0xFF, array.capacity)
     return array.to(device)
@@ -85,7 +85,7 @@ def plate_of(
 
 
 def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str) -> Any:
-    """The Fields of some windows, as the memory comes."""
+    """The Fields of some windows, all values poisoned."""
     fields = struct()
     fields.cells_y, fields.cells_z = cells_y, cells_z
     for name in ("exposure", "gain", "filtered"):
@@ -94,7 +94,7 @@ def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device:
 
 
 def poisoned_touches(struct: Any, slots: int, surface: Any, device: str) -> Any:
-    """The Touches of some slots, as the memory comes."""
+    """The Touches of some slots, all values poisoned."""
     touches = struct()
     for name, variable in struct.vars.items():
         patches = 1 if name in ("ring_area", "sums") else surface.around

@@ -61,7 +61,8 @@ def bend(
 
 
 def struck_at(share: float, device: str, omega: Any = (0.0, 0.0, 0.0), **sections: Any) -> tuple[Any, float]:
-    """What bends the rod, struck at about a share of its length behind the nose; and where exactly [m]."""
+    """The bending of a rod that is struck at about this share of its length behind the nose; and the exact place
+    [m]."""
     rings = rings_of(ROD, RINGS, 8)
     surface = surface_of(Surface, ROD, RINGS, 8, device)
     behind = 0.5 * LENGTH - rings.station

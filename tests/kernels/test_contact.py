@@ -1,4 +1,4 @@
-"""One step's load: its force and damping, and what it does to the plate (docs/model.md §4)."""
+"""The load of one step: its force, its damping and its effect on the plate (docs/model.md §4)."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +49,8 @@ def loads(
     inside: wp.array(dtype=wp.bool),
     loads: wp.array(dtype=Load),
 ) -> None:
-    """The load of one step of every pose, each on a plate of its own, from slot `first` on; none beyond its window."""
+    """The load of one step of every pose, each on its own plate, from slot `first` on; none if the window is too
+    small."""
     i = wp.tid()
     slot = first + i
     window = contacts.open_window(plate, thickness, fields, slot, wp.float64(0.0), wp.float64(0.0))
@@ -73,8 +74,8 @@ def law_of(*, a0: float = STRENGTH, a1: float = 0.0, a2: float = 0.0, **others: 
 
 @dataclass
 class Loaded:
-    """Loads of poses, along the body axes; force and moment [poses, 3] in the plate frame; the exposure
-    [poses, cells_y, cells_z] that they leave behind; and whether their windows hold them: loads are NaN where not."""
+    """Loads of poses, along the body axes; force and moment [poses, 3] in the plate frame; the exposure [poses,
+    cells_y, cells_z] that they cause; and whether the windows hold the poses. If not, loads are NaN."""
 
     load: Any
     force: Array
@@ -99,7 +100,8 @@ def loaded(
     length: float = 0.5e-3,
     spare: int = 0,
 ) -> Loaded:
-    """Loads of poses in windows of some cells, with as many spare slots before and behind, never opened."""
+    """Loads of poses in windows of some cells. There are as many spare slots before and behind, which are never
+    opened."""
     count = len(position)
     plate = plate_of(Plate, tile, np.array(tile.shape) * CELL, CELL, device, length=length)
     fields = poisoned_fields(Fields, count + 2 * spare, *cells, device)
@@ -152,7 +154,7 @@ def test_load_takes_power_from_the_core(device: str) -> None:
     found = loaded(surface_of(Surface, OGIVE, 12, 16, device), law, device, **poses, tile=tile)
     power = (found.force * poses["velocity"]).sum(axis=1) + (found.moment * poses["omega"]).sum(axis=1)
     assert (power <= 0).all()
-    # What closes in no faster than the contact's threshold touches without a load.
+    # A patch that closes in no faster than the threshold of contact touches without a load.
     assert not (power < 0)[~found.load["touching"]].any()
     assert found.load["touching"].sum() > 100
 
@@ -218,7 +220,7 @@ def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float],
 
 @pytest.mark.parametrize("length", [0.3e-3, 0.5e-3, 1.6e-3])
 def test_window_that_just_holds_a_step_gives_what_a_wide_one_gives(length: float, device: str) -> None:
-    # Neighbouring slots are poisoned: a look across the edge shows.
+    # Neighbouring slots are poisoned, so a read across the edge is visible.
     surface = surface_of(Surface, OGIVE, 12, 16, device)
     pose = {"position": np.array([[-3e-3, 0.0, 0.0]]), "attitude": ALIGNED, "velocity": np.array([[800.0, 0, 0]])}
     law, wide = law_of(decay_rate=np.log(0.8) / 1e-6), 96

@@ -123,7 +123,7 @@ def posed(
     thickness: float = THICKNESS,
     dt: float = 1e-6,
 ) -> dict[str, Array]:
-    """What the kernel says of poses; arrays of shape [poses, rings, (patches around,) ...]."""
+    """The kernel's results for poses; arrays of shape [poses, rings, (patches around,) ...]."""
     count, per_ring = len(position), (len(position), surface.rings)
     outputs = {
         **{name: poisoned((*per_ring, surface.around), dtype, device) for name, dtype in PER_PATCH.items()},
@@ -196,7 +196,7 @@ def test_closed_surface_has_no_net_area(core: Core, device: str) -> None:
 
 @pytest.mark.parametrize(("core", "tolerance"), [(OGIVE, 1e-12), (CONE, 1e-12), (PAPER, 1e-3)])
 def test_forward_facing_area_is_the_disc_of_the_largest_radius(core: Core, tolerance: float, device: str) -> None:
-    # Exact where the shoulder is the edge of a ring; the ring astride the paper's smooth one cancels in part.
+    # Exact where the shoulder is the edge of a ring. A ring across the paper's smooth shoulder cancels in part.
     surface = surface_of(Surface, core, 24, 48, device)
     deep = {"position": np.array([[1.0, 0, 0]]), "attitude": np.array([[0.0, 0, 0, 1]])}
     found = posed(surface, device, **deep, thickness=EVERYWHERE)
@@ -256,7 +256,7 @@ def test_passage_immerses_every_patch_for_the_thickness(device: str) -> None:
 
 
 def test_immersed_area_converges_to_that_of_a_fine_surface(device: str) -> None:
-    # Random poses astride the slab; a fine surface counted patch by patch, in or out, is the reference.
+    # Random poses across the slab. The reference is a fine surface, whose patches count in full or not at all.
     poses = random_poses(12, 0.008)
     coarse, fine = (
         posed(surface_of(Surface, PAPER, axial, around, device), device, **poses, dt=0.0)
@@ -297,7 +297,7 @@ def test_patch_along_the_face_is_in_or_out_at_once(ring: str, device: str) -> No
 
 @pytest.mark.parametrize("slant", [0.1, np.pi])
 def test_ring_out_of_reach_of_the_slab_has_nothing_immersed(slant: float, device: str) -> None:
-    # Cores about straight and all ways round, turning fast in a long step.
+    # Nearly straight cores and cores in any attitude, which turn fast in a long step.
     rng = np.random.default_rng(6)
     turned = Rotation.from_rotvec(rng.uniform(-slant, slant, (400, 3)))
     poses = {"position": rng.uniform(-0.015, 0.015, (400, 3)), "attitude": turned.as_quat()}
@@ -307,4 +307,4 @@ def test_ring_out_of_reach_of_the_slab_has_nothing_immersed(slant: float, device
     touching = (found["immersed"] > 0).any(axis=2)
     assert touching.sum() > 1000
     assert not (out_of_reach & touching).any()
-    assert (~out_of_reach & ~touching).sum() < touching.sum() / 2  # nor is the reach a wild guess
+    assert (~out_of_reach & ~touching).sum() < touching.sum() / 2  # and the reach is not far too large

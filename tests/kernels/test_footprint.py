@@ -41,7 +41,7 @@ def footprints(
     rows: wp.array3d(dtype=wp.int32),
     columns: wp.array3d(dtype=wp.int32),
 ) -> None:
-    """The footprints of poses; per ring whether anything is immersed, per patch its first cell."""
+    """The footprints of poses; for each ring, whether it is immersed; for each patch, its first cell."""
     i = wp.tid()
     window = contacts.open_window(plate, real(THICKNESS), fields, i, wp.float64(0.0), wp.float64(0.0))
     pose = surfaces.pose_of(surface, position[i], attitude[i], velocity, omega)
@@ -64,7 +64,7 @@ FOOTPRINTS = VARIANT.kernel(footprints)
 def footprints_of(
     poses: dict[str, Array], cells: tuple[int, int], device: str, *, velocity: Any, omega: Any = (0.0, 0.0, 0.0)
 ) -> tuple[Any, ...]:
-    """Footprints of a cone in windows of cells_y × cells_z; per ring and patch what the kernel says of them."""
+    """Footprints of a cone in windows of cells_y × cells_z, and the kernel's results for each ring and patch."""
     surface = surface_of(Surface, CONE, 12, 24, device)
     plate = plate_of(Plate, np.ones((1, 1)), (CELL, CELL), CELL, device)
     count, per_patch = len(poses["position"]), (surface.rings, surface.around)
@@ -103,7 +103,7 @@ def test_footprint_holds_every_cell_and_ring_that_a_step_touches(device: str) ->
         highest = np.where(touched, cell.max(axis=2) + 1, -1).max(axis=1)
         assert (found["box"][low] <= lowest)[some].all()
         assert (found["box"][high] >= highest)[some].all()
-        # Nor far too large: every step works through the whole box.
+        # And it is not far too large: every step works on the whole box.
         tight = some & (touched.sum(axis=1) == within.sum(axis=1))
         assert tight.sum() > count / 10
         assert (found["box"][low] >= lowest - 4)[tight].all()
@@ -113,8 +113,8 @@ def test_footprint_holds_every_cell_and_ring_that_a_step_touches(device: str) ->
 @pytest.mark.parametrize("axis", ["y", "z"])
 def test_footprint_tells_when_the_window_is_too_small(axis: str, device: str) -> None:
     # The rim of the core, 3 mm off its axis, lies 12 or 13 cells from the hit's; the slack of the box and the reach of
-    # the filter, 1 at ℓ = 2 cells, come on top. The filter's first pass takes rows twice its reach away, and looks
-    # beyond them.
+    # the filter, 1 at ℓ = 2 cells, come on top. The filter's first pass covers rows up to twice its reach away and
+    # reads beyond them.
     pose = {"position": np.array([[2e-3, 0.0, 0.0]]), "attitude": np.array([[0.0, 0.0, 0.0, 1.0]])}
     inside, margin = [], 3 if axis == "y" else 1
     for cells in (36, 34, 32, 30):

@@ -1,4 +1,4 @@
-"""How a curved patch touches: the part of it that closes in, its normal and its closing speed (docs/model.md §4)."""
+"""Grip of a curved patch: the part that closes in, its normal and its closing speed (docs/model.md §4)."""
 
 from typing import Any
 
@@ -74,7 +74,8 @@ def bent(slant: Array, bend: Any, sector: Any, velocity: Array) -> dict[str, Any
 def closing_part(
     slant: Array, bend: float, sector: float, velocity: Array, cells: tuple[int, int]
 ) -> tuple[Array, ...]:
-    """Share of the bent patches that closes in, its mean normal [n, 3] and mean closing speed, of so many elements."""
+    """Share of the bent patches that closes in, its mean normal [n, 3] and mean closing speed, from so many
+    elements."""
     along = bend * (2 * (np.arange(cells[0]) + 0.5) / cells[0] - 1)[:, None]
     around = sector * (2 * (np.arange(cells[1]) + 0.5) / cells[1] - 1)[None, :]
     shares, normals, speeds = [], [], []

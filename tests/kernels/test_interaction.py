@@ -246,7 +246,7 @@ def test_variant_without_rate_has_the_static_stress(device: str) -> None:
 
 
 def single_exponential(x: Array, device: str) -> Array:
-    """e^x in single precision, as the share that is left at a rate of 1/s."""
+    """e^x in single precision, computed as the share that is left at a rate of 1/s."""
     law = SingleLaw()
     law.decay_rate = 1.0
     values = poisoned(len(x), wp.float32, device)

@@ -1,4 +1,4 @@
-"""The march: how a shot starts, how it ends, and that its window is its own affair (docs/model.md §1)."""
+"""The march: how a shot starts and ends, and that its window does not change its outcome (docs/model.md §1)."""
 
 from dataclasses import fields
 from typing import Any
@@ -42,14 +42,14 @@ def at(plate: Plate) -> Scene:
 
 
 def shots_of(**columns: Any) -> Shots:
-    """Shots of 825 m/s at the origin, but for the given columns."""
+    """Shots of 825 m/s at the origin, except for the given columns."""
     values = dict.fromkeys(("hit_y", "hit_z", *Impact.model_fields), 0.0) | {"velocity": 825.0} | columns
     arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(value, dtype=float)) for value in values.values()))
     return Shots(**dict(zip(values, (array.copy() for array in arrays), strict=True)))
 
 
 def slanted_shots(count: int = 40) -> Shots:
-    """Random shots of which no axis comes near the plate."""
+    """Random shots; no axis is nearly parallel to the plate."""
     rng = np.random.default_rng(1)
     return shots_of(
         hit_y=rng.uniform(-5e-3, 5e-3, count),
@@ -153,7 +153,7 @@ def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device
 def test_shot_that_leaves_its_window_is_told_or_computed_in_a_wider_one(
     monkeypatch: pytest.MonkeyPatch, device: str
 ) -> None:
-    # A slow shot against the edge of a hole lies down across the window that would do for a straight one.
+    # A slow shot against the edge of a hole turns across the plate, beyond a window that is enough for a straight shot.
     shots = shots_of(velocity=200.0, hit_y=5e-3)
     outcomes = simulate.simulate(at(HOLES), shots, numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.PERFORATED

@@ -1,4 +1,4 @@
-"""Access to flat arrays: what is written is read, and debug mode stops at what lies outside."""
+"""Access to flat arrays: written values are read, and debug mode stops at an index outside."""
 
 import subprocess
 import sys
@@ -18,7 +18,7 @@ COUNT = 100
 
 
 def access_kernel(dtype: Any) -> Any:
-    """Kernel that writes every third element and reads back all of them."""
+    """Kernel that writes every third element and reads all elements."""
     access = memory.build(dtype)
 
     def fill(values: wp.array(dtype=dtype), array: wp.array(dtype=dtype)) -> None:
@@ -65,7 +65,7 @@ print("came through")
 
 @pytest.mark.parametrize("access", ["read", "write"])
 def test_debug_mode_stops_at_what_lies_outside(access: str, tmp_path: Path) -> None:
-    # Release mode does not look; negative indices do not count from the end.
+    # Release mode does not check; negative indices do not count from the end.
     script = tmp_path / "outside.py"
     script.write_text(SCRIPT)
     for index, inside in ((0, True), (7, True), (8, False), (-1, False)):

@@ -273,7 +273,7 @@ def test_fresh_window_has_no_exposure(device: str) -> None:
 def test_interpolation_reproduces_a_linear_field(device: str) -> None:
     laid, slot = lay_windows(device), 1
     y, z = NODES
-    values = np.full((SLOTS, CELLS_Y, CELLS_Z), np.nan)  # a look into another window shows
+    values = np.full((SLOTS, CELLS_Y, CELLS_Z), np.nan)  # a read of another window is visible
     values[slot] = 3.0 + 2e3 * y[:, None] - 5e3 * z[None, :]
     laid.write("exposure", values)
     at = np.random.default_rng(2).random((500, 2))
@@ -286,7 +286,7 @@ def test_interpolation_reproduces_a_linear_field(device: str) -> None:
 
 
 def test_native_scatter_is_the_plain_one(device: str) -> None:
-    # Neighbours, too, which add to what the last one left.
+    # Neighbours, too: each adds to the value of the last one.
     rng = np.random.default_rng(5)
     stride, count = 37, 1000
     index = rng.integers(0, 60, count).astype(np.int32)
@@ -301,7 +301,7 @@ def test_native_scatter_is_the_plain_one(device: str) -> None:
 def test_scatter_conserves_amount_and_place(device: str) -> None:
     laid, slot, amount = lay_windows(device), 2, 0.7
     y, z = 1.234e-3, -0.815e-3
-    for _ in range(2):  # adds to what is there
+    for _ in range(2):  # adds to the values
         laid.launch(GAIN, laid.fields, laid.windows, slot, y, z, amount)
     gained = laid.read("gain")
     at_y, at_z = NODES
@@ -389,7 +389,7 @@ def test_reading_what_was_scattered_keeps_the_second_moment_of_the_tent(device: 
 
 @pytest.mark.parametrize("length", [0.3e-3, 0.5e-3, 0.8e-3, 1.13e-3])
 def test_step_s_gain_is_convolved_with_the_taps(length: float, device: str) -> None:
-    # Random gain in a box as near the window's edge as the filter's reach allows, over exposure that was there.
+    # Random gain in a box as near the window's edge as the filter's reach allows, on a plate that has exposure.
     laid, slot, rng = lay_windows(device, length=length), 1, np.random.default_rng(7)
     taps, reach = tent_taps(length, CELL), laid.plate.reach
     box = Box()
@@ -400,7 +400,7 @@ def test_step_s_gain_is_convolved_with_the_taps(length: float, device: str) -> N
     before[slot], gain[slot] = rng.random((CELLS_Y, CELLS_Z)), 0.0
     inner = (slot, slice(box.y_low, box.y_high + 1), slice(box.z_low, box.z_high + 1))
     gain[inner] = rng.random(gain[inner].shape)
-    for name, values in (("exposure", before), ("gain", gain)):  # a look into another slot shows
+    for name, values in (("exposure", before), ("gain", gain)):  # a read of another slot is visible
         laid.write(name, values)
     expected = ndimage.convolve(gain[slot], np.outer(taps, taps), mode="constant")
     for kernel, share in ((SPREAD, 0.5), (SETTLE, 1.0)):

@@ -1,4 +1,4 @@
-"""Rigid-body motion: closed forms of the symmetric top, and what a kick may and may not do (docs/model.md §5)."""
+"""Rigid-body motion: closed forms of the symmetric top, and conditions that a kick must meet (docs/model.md §5)."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -88,7 +88,7 @@ def paper_body() -> Any:
 
 
 def random_motion() -> SimpleNamespace:
-    """States of cores that spin and tumble at some 1e4 rad/s, and their inertia in the plate frame."""
+    """States of cores that spin and tumble at about 1e4 rad/s, and their inertia in the plate frame."""
     rng = np.random.default_rng(1)
     attitude = attitudes(rng, COUNT)
     turned = Rotation.from_quat(attitude)
@@ -270,7 +270,7 @@ def test_damped_kick_is_rosenbrock_s_step(device: str) -> None:
     np.testing.assert_allclose(dv, change[:, :3], rtol=0, atol=1e-9 * scale[0])
     np.testing.assert_allclose(dw, change[:, 3:], rtol=0, atol=1e-9 * scale[1])
 
-    # What the step has applied on average is its change of momentum.
+    # The mean load of the step is its change of momentum.
     impulse = np.einsum("nij,nj->ni", inertia, change)
     applied = STIFF * np.concatenate([means["force"], means["moment"]], axis=1)
     np.testing.assert_allclose(applied[:, :3], impulse[:, :3], rtol=0, atol=1e-9 * np.abs(impulse[:, :3]).max())
@@ -310,7 +310,7 @@ def test_kick_never_raises_the_energy(with_drag: bool, dt: float, device: str) -
 
 @pytest.mark.parametrize(("overshoot", "applied"), [(0.9, 0.9), (1.1, 1.0), (1.9, 1.0), (1e3, 1.0)])
 def test_overshooting_kick_stops_at_the_least_energy_along_it(overshoot: float, applied: float, device: str) -> None:
-    # Along a direction d an impulse −m (v·d) takes the most that it can; of a larger one as much is applied.
+    # Along a direction d the impulse −m (v·d) takes the most energy. A larger impulse is reduced to it.
     start = random_motion()
     d = unit_vectors(np.random.default_rng(4), COUNT)
     along = (start.velocity * d).sum(axis=1, keepdims=True) * d

@@ -1,8 +1,8 @@
 """How the unpublished lattice, time step and hit points of campaigns/paper_shots.toml were found.
 
-For every lattice and time step: the hit on the slot's short axis that comes nearest to the paper's first row,
-and the hit near the slot's end that comes nearest to its second. "1.00" means that the worst of a row's five
-numbers is off by 3 m/s or 3 degrees. Run it as a script: python tests/validation/search_hits.py
+For every lattice and time step it prints the hit on the slot's short axis that is nearest to the paper's first row, and
+the hit near the slot's end that is nearest to its second row. "1.00" means that the worst of a row's five numbers
+differs by 3 m/s or 3 degrees. Run it as a script: python tests/validation/search_hits.py
 """
 
 from itertools import product
@@ -24,7 +24,7 @@ REGIONS = {
 
 
 def nearest(campaign: Campaign, plate: Plate, time_step: float, target: Row) -> str:
-    """The hit of a row's region that misses it least, and by how much."""
+    """The hit in a row's region that is nearest to the row, and its difference."""
     y, z = (axis.ravel() for axis in np.meshgrid(*REGIONS[target], indexing="ij"))
     shots = Shots(hit_y=y, hit_z=z, **{name: np.full(len(y), value) for name, value in campaign.impact})
     record = Record(standoffs=STANDOFFS, standoff_point="nose")

@@ -1,4 +1,4 @@
-"""The paper's two model rows (its Tables 1 and 2) from its own parameters, with found hit points."""
+"""The paper's two model rows (its Tables 1 and 2) from its own parameters, at hit points that a search found."""
 
 from importlib.resources import files
 from pathlib import Path

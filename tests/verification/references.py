@@ -1,10 +1,9 @@
-"""Closed forms and quadratures that the simulation is held against; nothing here knows warpimpact.
+"""Closed forms and quadratures to compare the simulation with; nothing here uses warpimpact.
 
-Section numbers (§) are those of docs/model.md. Everything is SI, angles are radians. A core that
-meets a plate here flies straight along the plate's normal, so one coordinate is enough: the depth X of its
-tip below the front face. Station s counts from the tip, and section s lies at depth X − s. Plates take the
-keywords of a scene: thickness h [m], resistance Y [Pa], shear_coefficient η, degradation β,
-degradation_interval Δt_β [s], degradation_length ℓ [m].
+Section numbers (§) are those of docs/model.md. Everything is SI, angles are radians. A core flies straight along the
+plate's normal here, so one coordinate is enough: the depth X of its tip below the front face. Station s counts from the
+tip, and section s lies at depth X − s. Plates take the keywords of a scene: thickness h [m], resistance Y [Pa],
+shear_coefficient η, degradation β, degradation_interval Δt_β [s], degradation_length ℓ [m].
 """
 
 from bisect import bisect
@@ -191,7 +190,7 @@ def nonlocal_degradation_residual(
     state = np.concatenate([[velocity], np.zeros(y.size)])
     for start, stop in pairwise(breaks):
         panel = partial(rate, nose_disc_in=stop <= thickness)
-        # T is smooth only to the order of the tent, which a high-order step cannot use.
+        # T is only as smooth as the tent, so a step of high order has no advantage.
         state, _ = _march(panel, (start, stop), state, method="RK45", rtol=1e-6)
     return float(state[0])
 

@@ -1,4 +1,4 @@
-"""The scenes of the verification: the paper's core and plate, others around them, and what a trace says."""
+"""The scenes of the verification: the paper's core and plate, similar ones, and the columns of a trace."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -34,7 +34,7 @@ STATIC = Interaction()
 
 
 def paper_plate(**changes: Any) -> Plate:
-    """The paper's plate and material (spacing assumed), but for `changes`."""
+    """The paper's plate and material (spacing assumed), except for `changes`."""
     paper = {
         "thickness": 4e-3,
         "resistance": 2.6e9,
@@ -84,7 +84,7 @@ def simulate(
     device: str = "cpu",
     **numerics: Any,
 ) -> simulation.Outcomes:
-    """`warpimpact.simulate` with scene and numerics spelt out."""
+    """`warpimpact.simulate` with scene and numerics as arguments."""
     scene = Scene(core=core, target=plate, interaction=interaction, record=Record(standoffs=standoffs))
     return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
 
@@ -129,7 +129,7 @@ def histories(
     interaction: Interaction = STATIC,
     **numerics: Any,
 ) -> list[History]:
-    """`warpimpact.solver.simulate.trace`, its columns named."""
+    """`warpimpact.solver.simulate.trace` with named columns."""
     scene = Scene(core=core, target=plate, interaction=interaction)
     traced = simulation.trace(scene, shots, numerics=Numerics(**numerics))
     return [_history(core, rows.astype(float)) for rows in traced]

@@ -1,10 +1,10 @@
-"""Outcomes of some campaigns, stored: a change that means to leave results alone leaves every bit of them.
+"""Stored outcomes of some campaigns. A change that must not change results must not change a bit of them.
 
-They are computed in strict arithmetic. With the flags of a release a compiler may sum in another order as soon as the
-code around a sum changes, and another processor rounds otherwise.
+They are computed in strict arithmetic. With the flags of a release a compiler may sum in another order when the code
+around a sum changes, and another processor may round in another way.
 
-``python tests/verification/stored_outcomes.py`` prints them. After a change that means to move them, put its output
-into stored/outcomes.json.
+``python tests/verification/stored_outcomes.py`` prints them. After a change that is meant to change results, put its
+output into stored/outcomes.json.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Bending of a core as a rigid beam: what must hold of any shot."""
+"""Bending of a core as a rigid beam: conditions that every shot must meet."""
 
 from dataclasses import fields, replace
 from typing import Any
@@ -71,7 +71,7 @@ def test_asking_for_it_changes_nothing_else(device: str) -> None:
     scene = Scene(core=PAPER_CORE, target=paper_plate())
     plain = simulation.simulate(scene, slanted_shots(), numerics=numerics, device=device)
     asked = bent(paper_plate(), slanted_shots(), device)
-    for field in fields(Outcomes):  # another build of the kernels may round otherwise
+    for field in fields(Outcomes):  # another build of the kernels may round differently
         np.testing.assert_allclose(getattr(asked, field.name), getattr(plain, field.name), rtol=1e-9, atol=1e-6)
 
 

@@ -73,8 +73,8 @@ def test_scenes_are_what_they_are_called() -> None:
 
 @EVERY_SCENE
 def test_change_of_momentum_is_the_impulse_of_the_load(name: str) -> None:
-    # m Δv = F Δt and ΔL = M Δt in every step, and so over the whole shot. Steps round independently: of some hundred
-    # ε each has no more than one (measured: 0.3 ε).
+    # m Δv = F Δt and ΔL = M Δt in every step, and so over the whole shot. The rounding errors of the steps are
+    # independent, and each is less than one ε (measured: 0.3 ε).
     shots, mass, reach = SCENES[name].shots, PAPER_CORE.mass_properties.mass, PAPER_CORE.bounding_radius
     for k, history in enumerate(traced(name, "double")):
         step = history.time[1] - history.time[0]

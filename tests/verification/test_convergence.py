@@ -6,13 +6,13 @@ import numpy as np
 
 from .scenes import Array, paper_plate, scattered_hits, shots_at, simulate
 
-# Half of the hits are normal, half oblique and yawed; none lies on a line of symmetry.
+# Half of the hits are normal, half are oblique and yawed; none lies on a line of symmetry.
 SHOTS = shots_at(*scattered_hits(64), obliquity=[0.0, 20.0] * 32, azimuth=30.0, yaw=[0.0, 2.0] * 32)
 
 
 def orders(settings: list[dict[str, Any]], device: str) -> Array:
-    """Observed orders of residual velocity and of tilt at 130 mm, shape (2,), over settings each half as coarse as the
-    one before: the slope of log2 of the changes from one to the next, root mean squares over the hits."""
+    """Observed orders of residual velocity and of tilt at 130 mm, shape (2,). Each setting is twice as fine as the one
+    before. The order is the slope of log2 of the changes between settings, as root mean squares over the hits."""
     outcomes = [simulate(paper_plate(), SHOTS, precision="double", device=device, **each) for each in settings]
     answers = np.array([[o.residual_velocity, o.tilt[:, 1]] for o in outcomes])
     changes = np.sqrt(np.mean(np.diff(answers, axis=0) ** 2, axis=2))
@@ -27,13 +27,13 @@ def test_time_step_is_of_first_order(device: str) -> None:
 
 
 def test_patches_are_nearly_of_second_order(device: str) -> None:
-    # A patch acts at its centre, but for edges and rims that cross it. Measured: 1.5 to 1.9.
+    # A patch acts at its centre: second order, except where an edge or a rim crosses it. Measured: 1.5 to 1.9.
     numerics = [{"time_step": 0.4e-6, "patches_axial": n, "patches_around": 2 * n} for n in (16, 32, 64, 128)]
     assert (orders(numerics, device) > 1.2).all()
 
 
 def test_grid_is_nearly_of_second_order(device: str) -> None:
-    # Cells interpolate linearly, but for holes' edges that cross them. Measured: 1.4 to 1.7.
+    # Cells interpolate linearly: second order, except where the edge of a hole crosses them. Measured: 1.4 to 1.7.
     scene = {"time_step": 0.4e-6, "patches_axial": 48, "patches_around": 96}
     spacings = [0.5e-3, 0.25e-3, 0.125e-3, 0.0625e-3]
     assert (orders([{"grid_spacing": spacing, **scene} for spacing in spacings], device) > 1.2).all()

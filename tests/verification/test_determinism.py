@@ -1,4 +1,4 @@
-"""The same shots give the same bits, however they are shared out."""
+"""The same shots give the same bits, however they are distributed."""
 
 from typing import Any
 
@@ -77,7 +77,8 @@ def test_any_chunk(shots: Shots, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_first_window_is_wide_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    # What leaves it is computed again: right, but twice the work. Windows of 1.2 radii lost 9 % of these hits.
+    # A hit that leaves it is computed again: this is right, but twice the work. 9 % of these hits leave windows of 1.2
+    # radii.
     marched, march_some = [], marching.March._march_some
 
     def counted(self: marching.March, pending: Any, *rest: Any) -> None:

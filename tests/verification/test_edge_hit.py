@@ -35,7 +35,7 @@ def impulse(shear_coefficient: float) -> tuple[float, float]:
     )
 
 
-# What is finite: rings and sectors, and the edge, smeared over half a cell of the grid. Measured: 3.4e-3 of the force,
+# Rings and sectors are finite, and the edge is spread over half a cell of the grid. Measured: 3.4e-3 of the force,
 # 3.5e-3 of the moment.
 @pytest.mark.parametrize("shear_coefficient", [0.0, 0.3])
 @pytest.mark.parametrize(("along", "turning"), [("y", [0.0, 0.0, 1.0]), ("z", [0.0, -1.0, 0.0])])
@@ -65,8 +65,8 @@ WEAKENING = {"degradation": 0.3, "degradation_interval": 1e-6, "degradation_leng
 def rod_impulse(points_per_length: int = 40) -> tuple[float, float]:
     """Impulse along −x [N s] and angular impulse about z [N m s] on a flat-nosed rod whose half y < 0 meets the plate.
 
-    The half disc D touches for τ = h/v. Beneath it dT/dt = A, A = ∫_D K: what is not material adds nothing. So a
-    point of it resists with ∫ Y β^(A t/Δt_β) dt = Y (1 − e^(−κAτ))/(κA), κ = −ln β/Δt_β. Quadrature on a grid.
+    The half disc D touches for τ = h/v. Beneath it dT/dt = A, A = ∫_D K: only material adds to it. So a point of it
+    resists with ∫ Y β^(A t/Δt_β) dt = Y (1 − e^(−κAτ))/(κA), κ = −ln β/Δt_β. Quadrature on a grid.
     """
     length = WEAKENING["degradation_length"]
     spacing = length / points_per_length
@@ -79,8 +79,8 @@ def rod_impulse(points_per_length: int = 40) -> tuple[float, float]:
     return float(resistance.sum()), float((y * resistance).sum())
 
 
-# Rings of 0.2 mm and cells of ℓ/4, which smear the edge. Measured: 0.5 % and 1 % less; with exposure gained from holes
-# too, 5 % less. Degradation takes 81 % of the impulse.
+# Rings of 0.2 mm and cells of ℓ/4, which spread the edge. Measured: 0.5 % and 1 % less; 5 % less if holes add exposure,
+# too. Degradation takes 81 % of the impulse.
 def test_exposure_is_gained_from_material_alone(device: str) -> None:
     plate = solid_plate(size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=0.0, **WEAKENING)
     outcomes = simulate(

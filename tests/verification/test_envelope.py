@@ -1,5 +1,5 @@
-"""Stability at the extremes, far beyond any sensible shot: finite outcomes or a named status, kinetic energy that
-never grows in any step, a unit quaternion, and an end within the step limit.
+"""Stability at extremes, far beyond any realistic shot: finite outcomes or a named status, kinetic energy that grows in
+no step, a unit quaternion, and an end within the step limit.
 
 The envelope: speeds 1 to 5000 m/s, Y 0 to 1e12 Pa, β 0 and 1 included, η 0 to 10, Δt_β 1 ns to 1 s, thickness 0.1 to
 200 mm, obliquity 0 to 89°, any attitude, spin ±1e5 rad/s, cores of 1 to 100 mm from needle to disc, holes from

@@ -1,4 +1,5 @@
-"""Finite plates: where a hole was left out is solid plate, where one was kept is the unbounded plate."""
+"""Finite plates: a hit on a hole that was left out is a hit on a solid plate; elsewhere the plate is the unbounded
+one."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The paper's literal scheme on a solid plate: it drifts with its time step, as it must (docs/model.md §4)."""
+"""The paper's literal scheme on a solid plate: its result depends on the time step (docs/model.md §4)."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""How a shot may end, and that the window of the plate behind it makes no difference."""
+"""How a shot may end, and that the size of its window has no effect."""
 
 from typing import Any
 
@@ -122,7 +122,7 @@ def test_limit_velocity_of_a_solid_plate_is_that_of_the_work_balance() -> None:
 
 
 def test_a_flat_nose_does_not_weaken_the_plate_under_itself_alone() -> None:
-    # A disc of patches wider than ℓ leaves gaps in the exposure and takes too much of it itself: too little drag.
+    # A disc of patches wider than ℓ leaves gaps in the exposure and weakens its own cells too much: too little drag.
     core = ProfileCore(s=(0.0, 20e-3), r=(3e-3, 3e-3), mass=4e-3)
     plate = solid_plate(shear_coefficient=0.0, degradation=0.3)
     lost = [

@@ -1,4 +1,4 @@
-"""Shots with a plate and a core of their own: each is what the scene with its numbers gives, whatever its company."""
+"""Shots with their own numbers of plate and core: each has the outcome of a scene with its numbers, in any batch."""
 
 from math import pi
 from typing import Any
@@ -47,7 +47,7 @@ FAR = {"resistance": 1e9, "shear_coefficient": 0.3, "degradation": 0.3, "thickne
 
 
 def core_with(**changes: float) -> Core:
-    """The paper's core but for `changes`."""
+    """The paper's core, except for `changes`."""
     return PolynomialCore(**PAPER_CORE.model_dump() | changes)
 
 
@@ -64,7 +64,7 @@ def simulated(core: Core, plate: Plate, shots: Shots, device: str = "cpu", **num
 
 
 def without(shots: Shots) -> Shots:
-    """The same shots with nothing of their own."""
+    """The same shots without their own numbers of plate and core."""
     return Shots(**{name: values for name, values in shots.columns.items() if name not in own_numbers()})
 
 
@@ -79,7 +79,7 @@ def test_a_shot_depends_on_its_own_numbers_alone(scheme: str, every: int, device
         plain = simulated(core, plate, without(SHOTS)[shot : shot + 1], device, **numerics)
         for name, values in vars(together).items():
             np.testing.assert_array_equal(getattr(alone, name)[0], values[shot], err_msg=name)
-        # Another build of the kernels may round otherwise: measured 1e-6 rad, and nothing in speed and energy.
+        # Another build of the kernels may round differently: measured 1e-6 rad, and no difference in speed and energy.
         assert plain.status[0] == alone.status[0]
         assert plain.residual_velocity[0] == pytest.approx(alone.residual_velocity[0], abs=1e-3)
         assert plain.energy_loss[0] == pytest.approx(alone.energy_loss[0], abs=1e-2)
@@ -107,7 +107,7 @@ def test_every_shot_does_the_work_of_its_own_plate(device: str) -> None:
 
 
 def test_a_given_moment_of_inertia_scales_with_the_mass() -> None:
-    # A core twice as heavy moves against twice the resistance as the light one does against once.
+    # A core of twice the mass against twice the resistance moves like the light core against the resistance.
     core = core_with(inertia_transverse=3e-7)
     double = Shots(**shots_at(5e-3, 2e-3, yaw=5.0).columns | {"mass": np.array([8e-3]), "resistance": np.array([4e9])})
     heavy = simulate(paper_plate(), double, core=core)

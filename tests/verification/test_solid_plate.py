@@ -1,4 +1,4 @@
-"""The work of a straight shot through a solid plate, and what degradation leaves of it (docs/model.md §6.1 to 6.3)."""
+"""The work of a straight shot through a solid plate, without and with degradation (docs/model.md §6.1 to 6.3)."""
 
 from math import pi
 
@@ -15,7 +15,7 @@ from .scenes import PAPER_CORE, shots_at, simulate, solid_plate
 
 PAPER_SHOT = {"velocity": 825.0, "thickness": 4e-3, "resistance": 2.6e9}
 LARGEST_RADIUS = references.PAPER_LARGEST_RADIUS
-# Where a core meets the grid makes no difference to a solid plate: one hit in the middle of a node, one not.
+# The place of the hit on the grid has no effect on a solid plate: one hit in the middle of a node, one not.
 HITS = ([0.0, 0.3e-3], [0.0, 0.1e-3])
 
 
@@ -61,7 +61,7 @@ def test_residual_velocity_is_that_of_the_work(
     assert outcomes.residual_velocity == pytest.approx(expected, abs=tolerance)
     assert (outcomes.status == Status.PERFORATED).all()
     lost = 0.5 * references.PAPER_MASS * (825.0**2 - outcomes.residual_velocity**2)
-    assert outcomes.energy_loss == pytest.approx(lost, rel=1e-5)  # nothing turns: all of it was translation
+    assert outcomes.energy_loss == pytest.approx(lost, rel=1e-5)  # the core does not turn: all energy is translation
 
 
 # (κ, the stated residual velocity at η = 0.05)

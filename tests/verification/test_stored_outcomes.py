@@ -1,4 +1,4 @@
-"""Results are those that are stored, to the bit in strict arithmetic."""
+"""Results in strict arithmetic equal the stored ones, bit for bit."""
 
 import json
 import subprocess
@@ -14,7 +14,7 @@ from .stored_outcomes import CAMPAIGNS, OUTCOMES, STORED, as_numbers
 
 @pytest.fixture(scope="module")
 def outcomes() -> dict[str, Any]:
-    # A process of its own: kernels that others have built here round otherwise.
+    # A separate process: kernels that other tests built here may round in another way.
     command = [sys.executable, stored_outcomes.__file__]
     return dict(json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout))
 

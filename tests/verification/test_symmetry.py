@@ -21,8 +21,8 @@ def shots(y: np.ndarray = Y, z: np.ndarray = Z, **changes: float) -> Shots:
     return shots_at(y, z, **ATTITUDE | changes)
 
 
-# Only rounding tells the scenes apart. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 3e-6 rad
-# and 4e-5 rad of tilt, and where a core points across the view (pitch near 90°); double precision: 5e8 times less.
+# The scenes differ only by rounding. Measured, single precision: 1.2e-4 m/s, 5e-4 J, 3e-2 rad/s of 1.7e4, 3e-6 rad and
+# 4e-5 rad of tilt, and where a core points across the view (pitch near 90°); double precision: 5e8 times less.
 SINGLE_TOLERANCE = {
     "residual_velocity": 1e-3,
     "deflection": 4e-6,
@@ -49,7 +49,7 @@ def test_mirror_image_in_y(precision: str, device: str) -> None:
     scene: dict[str, Any] = {"precision": precision, "device": device}
     plain = simulate(paper_plate(), shots(), **scene)
     mirrored = simulate(paper_plate(), shots(y=-Y, azimuth=150.0, yaw=3.0, spin=-1.7e4), **scene)
-    # ω is an axial vector: what lies in the mirror plane turns round.
+    # ω is an axial vector: its components in the mirror plane change sign.
     expected = replace(plain, yaw=-plain.yaw, angular_velocity=plain.angular_velocity * [-1, 1, -1])
     assert_same(mirrored, expected, precision)
 

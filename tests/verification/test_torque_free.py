@@ -14,7 +14,7 @@ THROUGH_HOLE = {"velocity": 826.0, "pitch": 3.0, "yaw": -2.0, "spin": 1.7e4}
 EPSILON = {"single": 2.0**-23, "double": 2.0**-52}
 PRECISIONS = pytest.mark.parametrize("precision", list(EPSILON))
 
-# Past the edge of a small plate: the nose is pushed aside, and the core goes on without touching.
+# Past the edge of a small plate: the plate pushes the nose aside, and the core flies on without contact.
 SMALL_PLATE = solid_plate(size=(10e-3, 10e-3))
 PAST_THE_EDGE = {"velocity": 600.0, "yaw": 10.0, "pitch": 3.0, "spin": 1.7e4}
 EDGE = (7e-3, 1e-3)
@@ -27,7 +27,7 @@ def test_pass_through_a_wide_hole_is_free_flight(precision: str, device: str) ->
     assert outcomes.status[0] == Status.MISSED
     assert outcomes.residual_velocity[0] == 826.0
     assert outcomes.energy_loss[0] == outcomes.contact_duration[0] == outcomes.deflection[0] == 0.0
-    # Spin about the axis is all there is to L, so the axis stays: its projections are the shot's pitch and yaw.
+    # L is the spin about the axis alone, so the axis stays: its projections are the shot's pitch and yaw.
     pitch, yaw = np.deg2rad([3.0, -2.0])
     few_ulp = 8 * EPSILON[precision]
     assert outcomes.pitch == pytest.approx(pitch, abs=few_ulp)
