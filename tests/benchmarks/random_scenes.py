@@ -11,14 +11,18 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import json
 import math
+import platform
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
@@ -39,10 +43,13 @@ from warpimpact.scene import (
     SlotPattern,
     SquarePattern,
     Target,
+    Tolerance,
     TrianglePattern,
     make_shots,
 )
-from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.promise import PILOT, PROMISES, keep
+from warpimpact.solver.refinement import simulate_to_tolerance
+from warpimpact.solver.resolution import FIDELITIES, LADDER, Fidelity
 from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
@@ -51,7 +58,7 @@ STEEL = 7850.0
 STANDOFF = 0.13
 """Where tilt is compared [m]."""
 FINE = (Fidelity(96, 96, 8.0, 0.05), Fidelity(136, 136, 11.0, 0.035))
-"""Levels behind the answer; each is extrapolated from half and twice... its step: error of second order in the step."""
+"""Levels behind the answer; each is extrapolated from its step and twice its step, of second order."""
 LONG = 0.1
 """Processor time [s] from which on a run is timed as it is, once."""
 PAPER = {"coefficients": (3.0e-4, 0.24, -5.29), "length": 27.86e-3, "diameter": 6.044e-3}
@@ -72,7 +79,7 @@ class Case:
     @property
     def key(self) -> str:
         """The same for the same scene."""
-        text = self.scene.model_dump_json() + self.impact.model_dump_json()
+        text = "".join(model.model_dump_json(exclude_none=True) for model in (self.scene, self.impact))
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
@@ -168,7 +175,9 @@ class Bench:
         text = f"{setting!r} {self.hits}"
         path = (folder or self.folder) / f"{case.key}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.npz"
         if not path.exists():
-            np.savez(path, **_computed(case, setting, self.hits))
+            part = path.with_suffix(".part.npz")  # what was cut off is no answer
+            np.savez(part, **_computed(case, setting, self.hits))
+            part.replace(path)
         with np.load(path) as found:
             return Answer(found["status"], found["velocity"], found["tilt"]), float(found["cost"])
 
@@ -237,42 +246,164 @@ def p90(errors: Array) -> float:
     return float(np.quantile(errors, 0.9, method="higher"))
 
 
-SETTINGS: dict[str, Fidelity | Numerics] = {
-    name: Numerics(fidelity=name) for name in ("draft", "standard", "reference")
-}
+@dataclass(frozen=True)
+class Row:
+    """What one name or tolerance came to on one scene.
+
+    Attributes:
+        level: of LADDER; for a tolerance, the mean over the hits.
+        kept: whether the promise is kept by its own word; for a tolerance, whether all hits converged.
+        told, error: errors of 90 % of the hits as told and as found, in residual velocity [m/s] and tilt [degree].
+        within: share of the hits that are within both errors of the name; for a tolerance, of those called converged.
+        mean, worst_tenth: error of the mean residual velocity and of that of the fastest tenth [m/s].
+        tilted: error of the share of the hits that are tilted by more than 30 degrees.
+        cost: processor time of one core per hit [s].
+    """
+
+    level: float
+    kept: bool
+    told: tuple[float, float]
+    error: tuple[float, float]
+    within: float
+    mean: float
+    worst_tenth: float
+    tilted: float
+    cost: float
 
 
-def row(bench: Bench, case: Case, settings: Sequence[Fidelity | Numerics]) -> list[tuple[float, float, float]]:
-    """(p90 of velocity, p90 of tilt, cost) of the answer's own uncertainty and of some settings."""
+def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
+    """The promise of a name, found by a pilot of other hits."""
+    promise = keep(case.scene, Numerics(fidelity=name), case.shots(PILOT, seed=77), device="cpu")
+    answer, cost = bench.run(case, promise.fidelity)
+    velocity, tilt = off(answer, truth)
+    allowed = PROMISES[name].tolerance
+    within = (velocity <= allowed.residual_velocity) & (tilt <= math.degrees(allowed.tilt))
+    told = (promise.residual_velocity_error, math.degrees(promise.tilt_error))
+    found = (p90(velocity), p90(tilt))
+    level = LADDER.index(promise.fidelity)
+    return Row(level, promise.kept, told, found, float(within.mean()), *aggregates(answer, truth), cost)
+
+
+def to_tolerance(bench: Bench, case: Case, truth: Answer, velocity: float, tilt: float) -> Row:
+    """Hits refined to a tolerance [m/s] and [degree]."""
+    numerics = Numerics(tolerance=Tolerance(residual_velocity=velocity, tilt=math.radians(tilt)))
+    shots = case.shots(bench.hits)
+    begin = time.process_time()
+    outcomes, estimates = simulate_to_tolerance(case.scene, shots, numerics=numerics, device="cpu", threads=1)
+    cost = (time.process_time() - begin) / bench.hits
+    answer = Answer(outcomes.status, outcomes.residual_velocity, outcomes.tilt[:, 0])
+    errors, done = off(answer, truth), estimates.converged
+    within = (errors[0] <= velocity) & (errors[1] <= tilt)
+    share = float(within[done].mean()) if done.any() else math.nan
+    found = (p90(errors[0]), p90(errors[1]))
+    level = float(estimates.level.mean())
+    return Row(level, bool(done.all()), (velocity, tilt), found, share, *aggregates(answer, truth), cost)
+
+
+def aggregates(answer: Answer, truth: Answer) -> tuple[float, float, float]:
+    """Errors of the mean and of the fastest tenth of the residual velocity, and of P(tilt > 30 degrees)."""
+
+    def numbers(one: Answer) -> Array:
+        passed = np.isfinite(one.tilt)
+        fastest = np.sort(one.velocity[np.isfinite(one.velocity)])[-max(1, len(one.velocity) // 10) :]
+        share = float((one.tilt[passed] > math.radians(30.0)).mean()) if passed.any() else 0.0
+        return np.array([np.nanmean(one.velocity), fastest.mean(), share])
+
+    mean, worst, tilted = np.abs(numbers(answer) - numbers(truth))
+    return float(mean), float(worst), float(tilted)
+
+
+NAMES = ("draft", "standard", "reference")
+TOLERANCES = ((1.0, 1.0), (0.5, 0.5))
+
+
+def measured(bench: Bench, case: Case) -> dict[str, Any]:
+    """All rows of a scene, what its answer is uncertain by, and the cost of the plain standard."""
     truth, before = bench.converged(case)
-    rows = [(*map(p90, off(before, truth)), math.nan)]
-    for setting in settings:
-        answer, cost = bench.run(case, setting)
-        rows.append((*map(p90, off(answer, truth)), cost))
-    return rows
+    rows = {name: named(bench, case, truth, name) for name in NAMES}
+    rows |= {f"tolerance {v:g}; {a:g}": to_tolerance(bench, case, truth, v, a) for v, a in TOLERANCES}
+    return {
+        "scene": case.name,
+        "uncertain": [p90(errors) for errors in off(before, truth)],
+        "perforated": float(np.mean(truth.status == Status.PERFORATED)),
+        "plain_standard_cost": bench.run(case, FIDELITIES["standard"])[1],
+        **{name: asdict(row) for name, row in rows.items()},
+    }
+
+
+def held(row: dict[str, Any], name: str, uncertain: Sequence[float]) -> bool:
+    """Whether the errors found are within the promise, up to what the answer itself is uncertain by."""
+    allowed = PROMISES[name].tolerance
+    limits = (allowed.residual_velocity, math.degrees(allowed.tilt))
+    return all(e <= limit + u for e, limit, u in zip(row["error"], limits, uncertain, strict=True))
+
+
+def summed_up(scenes: Sequence[dict[str, Any]]) -> str:
+    """What the promises came to over the scenes."""
+    plain = np.array([scene["plain_standard_cost"] for scene in scenes])
+    head = ("", "kept", "kept, but false", "median error", "worst tenth", "mean; tenth; P", "cost")
+    lines = [f"{len(scenes)} scenes", ("{:20}" + "{:>18}" * 6).format(*head)]
+    for name in (*NAMES, *(name for name in scenes[0] if name.startswith("tolerance"))):
+        rows = [scene[name] for scene in scenes]
+        errors = np.array([row["error"] for row in rows])
+        if name in NAMES:
+            kept = np.array([row["kept"] for row in rows])
+            true = np.array([held(row, name, scene["uncertain"]) for row, scene in zip(rows, scenes, strict=True)])
+            cells = [f"{kept.mean():.0%}", f"{(kept & ~true).mean():.0%}"]
+        else:
+            within = np.array([row["within"] for row in rows])
+            cells = [f"{np.nanmean(within):.1%} of hits", f">= 95 % in {(within >= 0.95).mean():.0%}"]
+        middle, worst = np.quantile(errors, [0.5, 0.9], axis=0)
+        numbers = [np.median([row[key] for row in rows]) for key in ("mean", "worst_tenth", "tilted")]
+        cost = np.median([row["cost"] for row in rows] / plain)
+        cells += [f"{middle[0]:.2g}; {middle[1]:.2g}", f"{worst[0]:.2g}; {worst[1]:.2g}"]
+        cells += ["{:.2g}; {:.2g}; {:.2g}".format(*numbers), f"{cost:.2f}"]
+        lines.append(("{:20}" + "{:>18}" * 6).format(name, *cells))
+    lines.append("errors in m/s; degree of tilt at 130 mm, 90 % of the hits; cost beside the plain standard, median")
+    return "\n".join(lines)
+
+
+def drawn(scenes: Sequence[dict[str, Any]]) -> Figure:
+    """Error against cost of every scene at every name, the promise as a line."""
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.8), layout="constrained")
+    for place, (axis, label) in enumerate(zip(axes, ("residual velocity [m/s]", "tilt at 130 mm [°]"), strict=True)):
+        for colour, name in zip(("C1", "C0", "C2"), NAMES, strict=True):
+            cost = [1e3 * scene[name]["cost"] for scene in scenes]
+            error = [max(scene[name]["error"][place], 1e-3) for scene in scenes]
+            kept = np.array([scene[name]["kept"] for scene in scenes])
+            axis.scatter(cost, error, s=14, color=colour, alpha=np.where(kept, 0.9, 0.25), label=name)
+            allowed = PROMISES[name].tolerance
+            axis.axhline((allowed.residual_velocity, math.degrees(allowed.tilt))[place], color=colour, lw=0.8)
+        axis.set(xscale="log", yscale="log", xlabel="processor time per hit [ms]", ylabel=f"error of {label}, 90 %")
+    axes[0].legend(title="pale: promise not kept")
+    return figure
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scenes", type=int, default=24)
     parser.add_argument("--hits", type=int, default=32)
     parser.add_argument("--cache", type=Path, required=True)
+    parser.add_argument("--output", type=Path, help="JSON file of the rows; a figure goes beside it")
     given = parser.parse_args()
     bench = Bench(given.cache, given.hits)
-    names = list(SETTINGS)
-    print(f"{'scene':42}{'kept':>5}" + "".join(f"{name:>24}" for name in ("uncertain", *names)))
-    table = []
+    scenes = []
     for index in range(given.scenes):
-        case = draw(given.seed, index)
-        table.append(row(bench, case, list(SETTINGS.values())))
-        through = np.mean(bench.converged(case)[0].status == Status.PERFORATED)
-        cells = "".join(f"{v:8.3f}{t:8.3f}{1e6 * c:8.0f}" for v, t, c in table[-1])
-        print(f"{index:3} {case.name:38}{through:5.2f}{cells}", flush=True)
-    values = np.array(table)
-    for name, quantile in (("median", 0.5), ("worst tenth", 0.9)):
-        cells = "".join(f"{v:8.3f}{t:8.3f}{1e6 * c:8.0f}" for v, t, c in np.quantile(values, quantile, axis=0))
-        print(f"{name:47}{cells}")
+        path = given.cache / f"row-{given.seed}-{index}-{given.hits}.json"
+        if not path.exists():
+            path.write_text(json.dumps(measured(bench, draw(given.seed, index))))
+        scenes.append(json.loads(path.read_text()))
+        cells = "".join(
+            f"{row['level']:4.1f}{'' if row['kept'] else '*':1}{row['error'][0]:7.2f}{row['error'][1]:6.2f}"
+            for row in (value for value in scenes[-1].values() if isinstance(value, dict))
+        )
+        print(f"{index:3} {scenes[-1]['scene']:38}{cells}", flush=True)
+    print(summed_up(scenes))
+    if given.output:
+        told = {"seed": given.seed, "hits": given.hits, "machine": platform.machine(), "scenes": scenes}
+        given.output.write_text(json.dumps(told, indent=1) + "\n")
+        drawn(scenes).savefig(given.output.with_suffix(".png"), dpi=110)
 
 
 if __name__ == "__main__":
