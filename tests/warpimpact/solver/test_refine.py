@@ -53,7 +53,7 @@ def test_true_errors_are_within_the_tolerance_for_95_percent_of_hits(limit: Outc
     velocity = np.abs(outcomes.residual_velocity - limit.residual_velocity) <= 0.5
     tilt = (np.abs(outcomes.tilt - limit.tilt) <= np.radians(0.7)).all(axis=1)
     assert np.mean(velocity & tilt) >= 0.95
-    # Not by brute force: most hits need no more than the second level.
+    # The work is not brute force: most hits need at most the second level.
     assert np.median(estimates.level) == 1
     assert estimates.level.max() >= 2
 
@@ -83,7 +83,7 @@ def test_costs_less_than_every_hit_on_the_finest_level_used(monkeypatch: pytest.
     every = patch_steps(shots(64), finest, simulate(SCENE, shots(64), numerics=finest, device="cpu"))
     assert estimates.level.max() >= 2
     assert len(work) == estimates.level.max() + 1
-    # Measured 0.58; were no hit let go before the finest level, 1.40.
+    # Measured 0.58; with every hit on the finest level it is 1.40.
     assert sum(work) < 0.75 * every
 
 
