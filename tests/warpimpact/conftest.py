@@ -45,7 +45,7 @@ def shots_at(hits: np.ndarray) -> Shots:
 
 
 def outcomes_of(status: np.ndarray) -> SimpleNamespace:
-    """Outcomes with NaN for what a status does not have; values differ from hit to hit."""
+    """Outcomes that differ from hit to hit; NaN where a status has no value."""
     n = len(status)
     ramp = np.linspace(0.1, 1.0, n)
     moves = np.isin(status, [Status.PERFORATED, Status.MISSED, Status.RICOCHETED])
@@ -125,7 +125,7 @@ def make_plate_result() -> ResultMaker:
 
 
 def _assert_same_bits(one: Path, other: Path) -> None:
-    """Variable by variable, as it lies in the files."""
+    """Compare two files variable by variable, as stored."""
     with netCDF4.Dataset(one) as a, netCDF4.Dataset(other) as b:
         assert a.variables.keys() == b.variables.keys()
         for name, variable in a.variables.items():

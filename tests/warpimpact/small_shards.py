@@ -1,4 +1,4 @@
-"""Imported where a second of computing shall have many shards, by processes that tests start, too."""
+"""Importing this module makes shards small, so that a short run has many; processes of tests import it, too."""
 
 from warpimpact.campaign import parts
 

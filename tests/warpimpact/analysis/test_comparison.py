@@ -1,5 +1,5 @@
-"""Plates side by side: rankings with known answers, intervals that hold as often as they say, one sentence for what
-cannot be compared."""
+"""Plates side by side: rankings with known answers, intervals that contain the answer as often as they claim, one
+sentence for what cannot be compared."""
 
 import json
 import math
@@ -119,7 +119,7 @@ def test_differences_hold_as_often_as_they_say_all_pairs_together(independent: b
             if independent:
                 common, turned = numbers.random(400), numbers.random(400)
             fraction = 0.4 * common + 0.4 * numbers.random(400) + 0.1 + shift
-            # A tenth of the tilts are no matter of the shot.
+            # A tenth of the tilts do not depend on the shot.
             own = np.where(numbers.random(400) < 0.1, numbers.random(400), turned)
             plates.append(make_plate_result(velocities(fraction), np.where(own < share, 60.0, 10.0)))
         if independent:
@@ -249,7 +249,7 @@ def test_the_plates_of_a_file_share_all_else() -> None:
     slots, holes = (campaign.model_dump(exclude={"plate", "title"}) for campaign in campaigns.values())
     assert slots == holes
     densities = [campaign.plate.areal_density for campaign in campaigns.values()]
-    assert densities[0] == pytest.approx(densities[1], rel=1e-3)  # what the file says of them
+    assert densities[0] == pytest.approx(densities[1], rel=1e-3)  # as in the campaign file
     assert json.loads(campaigns["slots"].text)["title"] == campaigns["slots"].title
     assert math.isclose(campaigns["slots"].plate.open_area, 0.348, abs_tol=5e-4)
 

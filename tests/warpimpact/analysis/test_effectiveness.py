@@ -1,4 +1,4 @@
-"""Effectiveness against values computed by hand, and intervals that hold as often as they say."""
+"""Effectiveness against values computed by hand, and intervals that contain the answer as often as they claim."""
 
 import math
 
@@ -80,7 +80,7 @@ def test_failed_computations_alone_tell_nothing(make_plate_result) -> None:
 
 @pytest.mark.parametrize("count", [400, 1600])
 def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, count: int) -> None:
-    """Velocities that the impact scatters, on both plates alike; the solid plate has only the first 400 shots."""
+    """The impact velocities scatter, equally on both plates; the solid plate has only the first 400 shots."""
     held, numbers, widths = 0, np.random.default_rng(5), []
     for _ in range(TRIALS):
         common = numbers.uniform(0.5, 1.0, count)
@@ -91,7 +91,7 @@ def test_intervals_of_the_ratio_hold_as_often_as_they_say(make_plate_result, cou
         widths.append((measure.ratio_high - measure.ratio_low) / (measure.high - measure.low) * measure.solid)
     assert held >= LEAST
     if count == 400:
-        assert np.median(widths) < 0.6  # what moves both plates alike is no error of the ratio
+        assert np.median(widths) < 0.6  # a change of both plates is no error of the ratio
 
 
 def test_one_shot_at_the_solid_plate_serves_all(make_plate_result) -> None:
@@ -101,7 +101,7 @@ def test_one_shot_at_the_solid_plate_serves_all(make_plate_result) -> None:
     assert (mean.solid, mean.ratio) == (pytest.approx(0.64), pytest.approx(mean.value / 0.64))
     assert (mean.ratio_low, mean.ratio_high) == (pytest.approx(mean.low / 0.64), pytest.approx(mean.high / 0.64))
     assert worst.ratio == pytest.approx(0.81 / 0.64)
-    assert math.isnan(measures["tilted_share"].ratio)  # the solid plate tilts none
+    assert math.isnan(measures["tilted_share"].ratio)  # the solid plate tilts no core
     assert measures["tilted_share"].solid == 0.0
 
 

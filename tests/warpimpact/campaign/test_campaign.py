@@ -1,4 +1,4 @@
-"""Campaign files: what is read, and the one sentence that each mistake gets: file, field, value, cure."""
+"""Campaign files: what is read, and one sentence for each mistake: file, field, value, cure."""
 
 import struct
 from pathlib import Path

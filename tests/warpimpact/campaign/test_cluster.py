@@ -1,4 +1,4 @@
-"""Runs on a cluster of worker processes: the bits of a local run, though a worker is killed on the way."""
+"""Runs on a cluster of worker processes: the bits of a local run, even if a worker is killed during the run."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""Memory: bounded whatever the count, and less of it where an allocation fails."""
+"""Memory: bounded for any count, and smaller after a failed allocation."""
 
 import tracemalloc
 from pathlib import Path

@@ -33,14 +33,14 @@ DRAFT = Numerics(fidelity="draft")
 
 
 def campaign(**changes: Any) -> Campaign:
-    """A few hits on round holes, but for `changes`."""
+    """A few hits on round holes, with `changes`."""
     usual: dict[str, Any] = {"title": "a test", "core": CORE, "plate": HOLES, "impact": STRAIGHT, "hits": Hits(count=3)}
     usual |= {"interaction": Interaction(static=1.1), "numerics": DRAFT, "output": Output(standoff_point="nose")}
     return Campaign(**usual | changes)
 
 
 def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
-    """The result as a file gives it back."""
+    """The result after a round trip through a file."""
     files.write(result, path)
     return files.read(path)
 

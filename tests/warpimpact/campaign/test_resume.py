@@ -1,5 +1,5 @@
-"""Runs that are killed, stopped or run out of disk lose nothing: what is resumed ends with the bits of an undisturbed
-run."""
+"""Runs that are killed, stopped or run out of disk lose nothing: a resumed run ends with the bits of an undisturbed
+one."""
 
 import multiprocessing
 import os
@@ -64,7 +64,7 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
     monkeypatch: pytest.MonkeyPatch,
     assert_same_bits: SameBits,
 ) -> None:
-    # A server that has imported everything forks real processes without the second that imports take.
+    # A server that has imported everything forks real processes; each saves the second of the imports.
     def command(path: Path) -> list[str]:
         return ["run", str(campaign_file), "-o", str(path), "--device", "cpu", "--resume"]
 
@@ -128,7 +128,7 @@ def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pyte
 def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: SameBits
 ) -> None:
-    """Every call that changes a name on the disk is the last one in its turn."""
+    """The run is killed in turn before each call that changes a name on the disk."""
     output, steps = tmp_path / "a.nc", 0
     small = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": 300})})
     straight = tmp_path / "straight.nc"
@@ -176,7 +176,7 @@ def test_the_file_is_chunked_and_compressed(undisturbed: Path) -> None:
 
 
 def stopped_after(shards: int, error: BaseException) -> object:
-    """A follower that breaks off."""
+    """A progress function that interrupts the run."""
 
     def follow(standing: Standing) -> None:
         if standing.done >= 256 * shards and standing.done < standing.total:
@@ -302,7 +302,7 @@ def _with_files_up_to(size: int, *command: str) -> subprocess.CompletedProcess[s
 
 
 def _after(setting: str) -> list[str]:
-    """What runs a command after a setting of its process. No preexec_fn: that hangs now and then where threads run."""
+    """A command that first changes a setting of its process. A preexec_fn sometimes hangs if there are threads."""
     return [sys.executable, "-c", f"import os, resource, signal, sys; {setting}; os.execv(sys.argv[1], sys.argv[1:])"]
 
 

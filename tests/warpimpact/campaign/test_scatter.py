@@ -83,7 +83,7 @@ def line_of(name: str) -> str:
 
 @pytest.fixture
 def own(tmp_path: Path) -> Campaign:
-    """All that plate and core have scatters, and the velocity."""
+    """All quantities of plate and core scatter, and the velocity."""
     changes = [(line_of(name), f"{name} = {distribution}") for name, distribution in OWN.items()]
     return campaign_with(tmp_path, (VELOCITY, NORMAL), *changes)
 
@@ -109,10 +109,10 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     for name in OWN:
         assert np.array_equal(dataset[name], shots.columns[name])
         assert len(np.unique(dataset[name])) == count
-    # What is lost in translation is no more than all that is lost, each core with its own mass.
+    # The loss of translational energy exceeds the total loss by the rotational energy; each core has its own mass.
     energy = 0.5 * dataset.mass * (dataset.impact_velocity**2 - dataset.residual_velocity**2)
     assert (np.abs(energy - dataset.energy_loss) < 0.15 * dataset.energy_loss).all()
-    assert (energy >= dataset.energy_loss * (1.0 - 1e-4)).all()  # what turns was taken from the flight
+    assert (energy >= dataset.energy_loss * (1.0 - 1e-4)).all()  # the energy of rotation comes from the translation
     for hit in (3, 700):
         history = replay(dataset, hit, folder=tmp_path)
         assert history.attrs["agreement"] == "bit-identical"

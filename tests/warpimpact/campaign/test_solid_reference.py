@@ -81,7 +81,7 @@ def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert solid.sizes["hit"] == 100
     np.testing.assert_array_equal(solid["impact_velocity"], dataset["impact_velocity"][:100])
     order = np.argsort(solid["impact_velocity"].values)
-    assert (np.diff(solid["residual_velocity"].values[order]) > 0.0).all()  # the faster, the faster
+    assert (np.diff(solid["residual_velocity"].values[order]) > 0.0).all()  # a faster core leaves faster
 
 
 def test_tasks_of_many_shards_give_the_same_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits):

@@ -1,4 +1,5 @@
-"""The stop rule of a campaign: intervals of Sobol replicates that hold as often as they say, and runs that it ends."""
+"""The stop rule of a campaign: intervals of Sobol replicates that contain the answer as often as they claim, and runs
+that it ends."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -21,7 +22,7 @@ SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096\n", "")
 STOP = '[stop]\nquantity = "{}"\nhalf_width = "{}"\nmax_count = {}\n\n[output]'
 TRIALS = 150
-# 95 % of 150 trials: 142.5 ± 2.7. Three standard deviations below, and for the rule, which looks more than once, five.
+# 95 % of 150 trials: 142.5 ± 2.7. Three standard deviations below; five for the rule, which looks more than once.
 LEAST, LEAST_STOPPED = 134, 129
 pytestmark = pytest.mark.usefixtures("small_shards")
 
@@ -53,7 +54,7 @@ TRUTHS = {
 
 
 def surface(campaign: Campaign, first: int, count: int) -> np.ndarray:
-    """The sum of the two uniform numbers that a shot's hit point is made of."""
+    """The sum of the two uniform numbers of a shot's hit point."""
     shots, (y, z) = campaign.sampler().shots(first, count), campaign.plate.sampled_cell
     return shots.hit_y / y + shots.hit_z / z + 1.0
 

@@ -34,7 +34,7 @@ TRIANGLES = TrianglePattern(side=8e-3, spacing=(10e-3, 9e-3), staggered=True)
 STRAIGHT, SPINNING = Impact(velocity=825.0), Impact(velocity=825.0, spin=1.7e4)
 PITCHED = Impact(velocity=825.0, obliquity="20 deg", azimuth="90 deg", pitch="2 deg")
 YAWED = Impact(velocity=825.0, yaw="3 deg")
-# Only rounding tells an image from a hit of its own: measured, 64 to 256 hits, double precision: 5e-13 m/s, 2e-13°,
+# An image differs from a computed hit by rounding only: measured, 64 to 256 hits, double precision: 5e-13 m/s, 2e-13°,
 # 1e-11 rad/s, 1e-12 J.
 ROUNDING = {"m s-1": 1e-10, "degree": 1e-10, "rad s-1": 1e-8, "J": 1e-9, "s": 1e-15, "1": 0.0}
 
@@ -69,7 +69,7 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 @pytest.fixture
 def glide(tmp_path: Path) -> MaskPattern:
-    """Holes whose only symmetry is a mirror image in z half a cell on."""
+    """Holes whose only symmetry is a mirror image in z with a shift by half a cell."""
     material = np.ones((64, 64), dtype=np.uint8)
     material[4:20, 8:40] = 0
     material[4:12, 8:24] = 1
@@ -267,7 +267,7 @@ def test_images_tell_no_more_than_one_of_them(text: str, replicates: int, make_r
     many.add(images.isel(hit=slice(600, None)))
     expected, told = one.estimate(), many.estimate()
     assert told.count == 4 * expected.count
-    if not text.startswith("quantile"):  # an interpolation between neighbours, which images are
+    if not text.startswith("quantile"):  # a quantile interpolates between neighbours, which are images
         assert told.value == pytest.approx(expected.value, rel=1e-12)
         assert [told.low, told.high] == pytest.approx([expected.low, expected.high], rel=1e-9)
     else:

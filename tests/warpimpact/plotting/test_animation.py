@@ -1,4 +1,4 @@
-"""The film of a hit: as many frames as it says, the core where the history has it, and a clear word on other names."""
+"""The film of a hit: number of frames, position of the core, and a clear message for other file names."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -56,7 +56,7 @@ def test_frames_show_the_history(folder: Path) -> None:
     history = xarray.load_dataset(folder / "a_hit1.nc")
     made = film.animation(history)
     made._func(film.FRAMES - 1)
-    made._draw_was_started = True  # a film that nobody sees warns
+    made._draw_was_started = True  # matplotlib warns of a film that is never shown
     (core,) = (patch for patch in made._fig.axes[0].patches if isinstance(patch, Polygon))
     outline = np.asarray(core.get_xy()) * 1e-3
     last = history.isel(time=-1)

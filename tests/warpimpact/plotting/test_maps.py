@@ -1,4 +1,4 @@
-"""Maps, rendered: the right colour at the right place, to scale, with axes that say what is shown."""
+"""Rendered maps: the right colour at the right place, to scale, with labelled axes."""
 
 import io
 import warnings

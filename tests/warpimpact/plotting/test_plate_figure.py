@@ -107,7 +107,7 @@ def test_plates_of_the_library_have_the_ligaments_that_they_say(
     assert title == Campaign.from_toml(CAMPAIGNS / f"{name}.toml").title
     assert thickness.split() == ["thickness", "4", "mm"]
     assert smallest.split("ligament")[1].strip() == ligament
-    # Of 31.4 kg/m² of steel what the holes leave, in the digits shown.
+    # The share of 31.4 kg/m² of steel that the holes leave, in the shown digits.
     share = float(area.split()[-1].rstrip("%")) / 100
     assert float(density.split()[-2]) == pytest.approx(31.4 * (1 - share), abs=0.07)
     assert picture == f"{name}_plate.png"

@@ -1,4 +1,4 @@
-"""The report: its choice of hits, what it says and escapes, and how it works in a real browser."""
+"""The report: its choice of hits, its text, its escaping, and its use in a real browser."""
 
 import html
 import json
@@ -29,7 +29,7 @@ ResultMaker = Callable[..., xarray.Dataset]
 
 
 def data_of(path: Path) -> dict:
-    """What the page's script reads."""
+    """The data that the page's script reads."""
     (found,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', path.read_text())
     return json.loads(found)
 
@@ -114,7 +114,7 @@ def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
     assert "default-src 'none'" in own
     assert "&lt;b&gt;wide" in own
     assert "<b>" not in own
-    assert own.count("</script>") == 1  # that of the data; titles hold others
+    assert own.count("</script>") == 1  # that of the data; titles contain others
     assert len(text) < 10e6
 
 

@@ -1,4 +1,4 @@
-"""Signals that wait for what must not be broken off."""
+"""Signals wait for the end of steps that must not be interrupted."""
 
 import signal
 import threading
@@ -10,7 +10,7 @@ from warpimpact.results.interrupts import uninterrupted
 
 @pytest.fixture
 def interrupted_by_sigterm():
-    """SIGTERM as a run takes it."""
+    """SIGTERM as a run handles it."""
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt

@@ -1,4 +1,4 @@
-"""Measures of a Dataset: what counts where, and intervals that hold as often as they say."""
+"""Measures of a Dataset: which shots count, and intervals that contain the answer as often as they claim."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The Dataset contract, and files that are whole or not there."""
+"""The Dataset contract, and files that are complete or absent."""
 
 import dataclasses
 import os
@@ -143,7 +143,7 @@ def test_write_replaces_an_existing_file(make_result, tmp_path):
 
 
 def break_off(error: BaseException):
-    """A writer that stops half-way, as a full disk or an impatient user makes it."""
+    """A writer that stops half-way, as on a full disk or after Ctrl-C."""
 
     def to_netcdf(self, path, **_):
         Path(path).write_bytes(b"half a file")

@@ -70,7 +70,7 @@ PLAIN = STRAIGHT + "[hits]\ncount = 6\n"
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with the files that HEAD and LISTED name; a file beside it is named as people do, by a relative path."""
+    """A folder with the files that HEAD and LISTED name; its path is relative, as users write it."""
     place = tmp_path / "campaigns"
     place.mkdir()
     (place / "profile.csv").write_text("s,r\n0,0\n0.012,0.003\n0.02,0.003\n")

@@ -1,4 +1,4 @@
-"""Masks: the same holes whatever the file, how near they come, and what is no mask."""
+"""Masks: the same holes from every format, their ligaments, and files that are no mask."""
 
 import math
 import struct

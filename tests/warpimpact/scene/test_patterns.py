@@ -317,7 +317,7 @@ def two_slots(*turns: float, **changes: Any) -> SlotPattern:
     ("pattern", "expected"),
     [
         (two_slots(0, 0), {(1, -1), (-1, 1), (-1, -1), "centred"}),
-        (two_slots(0, math.pi), {(1, -1), (-1, 1), (-1, -1), "centred"}),  # half a turn of a slot is none
+        (two_slots(0, math.pi), {(1, -1), (-1, 1), (-1, -1), "centred"}),  # half a turn does not change a slot
         (two_slots(0, 1e-4), {(-1, -1)}),
         (two_slots(0.3, 0.3), {(-1, -1), "centred"}),
         (two_slots(0.3, -0.3), {(-1, -1)}),  # and glides, which are no mirror images

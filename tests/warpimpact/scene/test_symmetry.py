@@ -1,4 +1,4 @@
-"""Symmetries of plate and shot: those that are there, no others, and the part of the cell that they leave over."""
+"""Symmetries of plate and shot: all that exist and no others, and the irreducible part of the cell."""
 
 from itertools import combinations
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Intervals of numbers: their values where they are known, and how often they hold."""
+"""Intervals of numbers: known values, and how often they contain the answer."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The mean of the worst tenth, and intervals of it that hold as often as they say."""
+"""The mean of the worst tenth, and its intervals, which contain the answer as often as they claim."""
 
 import math
 from collections.abc import Callable
