@@ -13,7 +13,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.solver.bending import Sections, check_bending, sections_of
 from warpimpact.solver.resolution import Resolution, decay_rate, resolve
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
-from warpimpact.solver.tile import FINER, Tile, tent_taps, tile_of
+from warpimpact.solver.tile import FINER, FINEST, Tile, tent_taps, tile_of
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core, Numerics, Plate, Scene, Shots
@@ -127,7 +127,8 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
 
 def _grid(plate: Plate, resolution: Resolution) -> Grid:
     nodal = resolution.nodal
-    tile = tile_of(plate, resolution.grid_spacing / (1 if nodal else FINER), sharp=nodal)
+    cell = min(resolution.grid_spacing / FINER, plate.degradation_length / FINEST)
+    tile = tile_of(plate, resolution.grid_spacing if nodal else cell, sharp=nodal)
     # Nodes of the literal scheme are the tile's cells, which fit the period.
     spacing = min(tile.dy, tile.dz) if nodal else resolution.grid_spacing
     size_y, size_z = plate.size or (math.inf, math.inf)

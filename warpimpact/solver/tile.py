@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 FINER = 5
 """Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the cell under its centre."""
+FINEST = 15.0
+"""Fewest cells of the tile per degradation length: the edge of a hole decides more about tilt than the grid does."""
 BLUR = 3
 """Cells of the tile over which its material is averaged, in each direction: a patch then crosses an edge gradually.
 Odd."""
