@@ -11,7 +11,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_command, add_count, add_device, add_output
 from .paths import check_picture, named
-from .progress import show_standing
+from .progress import show_standing, warn
 from .run import failure_code
 
 
@@ -111,5 +111,6 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
                 resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
                 overwrite=arguments.overwrite,
                 progress=progress,
+                tell=warn,
             )
     return paths

@@ -13,6 +13,11 @@ _LONGEST_SILENCE = 600.0
 """Of a log [s]."""
 
 
+def warn(sentence: str) -> None:
+    """Say on the terminal or in the log what a person should know, though the command goes on."""
+    print(f"warpimpact: warning: {sentence}", file=sys.stderr, flush=True)
+
+
 @contextmanager
 def show_standing() -> "Iterator[Callable[[Standing], None]]":
     """Shows how far a run is, with its running estimates."""

@@ -11,7 +11,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
 from .paths import check_place
-from .progress import show_standing
+from .progress import show_standing, warn
 
 if TYPE_CHECKING:
     import xarray
@@ -61,6 +61,7 @@ def _run(arguments: argparse.Namespace) -> int:
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=progress,
+            tell=warn,
         )
     with files.opened(output) as dataset:
         print(summary_text(dataset))

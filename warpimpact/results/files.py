@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -25,13 +25,16 @@ class ResultError(ValueError):
     """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
-def write(dataset: xarray.Dataset, path: Path) -> None:
+def write(dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None) -> None:
     """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
+
+    Args:
+        named: gives the name of what was written, by its contents, in place of `path`.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    with uninterrupted(), aside(path) as file:
+    with uninterrupted(), aside(path, named=named) as file:
         dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=_encoding(dataset))
 
 
@@ -96,9 +99,9 @@ def _encoding(dataset: xarray.Dataset, *, chunk: int | None = None) -> dict[str,
 
 
 @contextmanager
-def aside(path: Path, folder: Path | None = None) -> Iterator[Path]:
+def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
     """A name in a folder of the same disk, if not given that of `path`, to write to; what was written there is on the
-    disk before it gets its own name.
+    disk before it gets its own name, which is `path` or, where there is `named`, what that makes of the file.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
@@ -107,7 +110,7 @@ def aside(path: Path, folder: Path | None = None) -> Iterator[Path]:
     try:
         yield written
         _flush(written, os.O_RDWR)
-        os.replace(written, path)
+        os.replace(written, named(written) if named else path)
         if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
             _flush(path.parent, os.O_RDONLY)
     except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
