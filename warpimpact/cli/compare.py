@@ -93,9 +93,9 @@ def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     """The results of a campaign's plates by their names, computed where they are not there."""
-    from warpimpact.campaign.campaign import CampaignError
     from warpimpact.campaign.plates import read_plates
     from warpimpact.campaign.run import run_to_file
+    from warpimpact.campaign.text import CampaignError
 
     if len(arguments.files) > 1:
         raise CampaignError(f"{arguments.files[0]}: is a campaign, which is compared on its own")

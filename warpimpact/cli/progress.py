@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from .plain import say
+
 if TYPE_CHECKING:
     from warpimpact.campaign.run import Standing
 
@@ -15,7 +17,7 @@ _LONGEST_SILENCE = 600.0
 
 def warn(sentence: str) -> None:
     """Say on the terminal or in the log what a person should know, though the command goes on."""
-    print(f"warpimpact: warning: {sentence}", file=sys.stderr, flush=True)
+    say(f"warning: {sentence}")
 
 
 @contextmanager
