@@ -1,8 +1,6 @@
 """Campaign: one TOML file, validated, as one immutable value."""
 
-import json
 import math
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -29,13 +27,15 @@ from ..scene import (
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_scatter
-from ..scene.units import Number, PositiveLength, quoted
+from ..scene.units import Number, PositiveLength, Title, brief, quoted
 from ..solver.bending import check_bending
 from .stop import Stop
+from .text import CampaignError, parsed, read_text
 
-
-class CampaignError(ValueError):
-    """A campaign that cannot be run: one sentence naming file, field, value and what is allowed."""
+_FARTHEST = 100.0
+"""Of hits from the origin [m]."""
+_MOST_LENGTHS = 1000
+"""Degradation lengths in the radius of a core: its surface has patches of about that length."""
 
 
 class Output(Record):
@@ -46,7 +46,7 @@ class Output(Record):
         solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
     """
 
-    standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1)] = (0.05, 0.13)
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1, max_length=64)] = (0.05, 0.13)
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
 
@@ -54,7 +54,7 @@ class Output(Record):
 class Campaign(Model):
     """What is shot at what, where, how finely it is computed and what is reported."""
 
-    title: str
+    title: Title
     core: AnyCore
     plate: Plate
     impact: Impact
@@ -171,7 +171,19 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _hits_cover_something(self) -> Self:
-        self.hits.covered(self.plate)
+        covered, listed = self.hits.covered(self.plate), self.hits.listed
+        if listed is None:
+            farthest = 0.5 * max(covered)
+        else:
+            farthest = max(float(np.abs(listed[name]).max()) for name in ("hit_y", "hit_z"))
+        # Cells of the plate have 32-bit numbers, counted from the origin.
+        cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
+        allowed = min(_FARTHEST, 2**30 * cell)
+        if farthest > allowed:
+            raise ValueError(
+                f"got hits up to {farthest:.6g} m from the origin, but they are exact up to {allowed:.4g} m; a pattern "
+                "repeats, so take hits near the origin"
+            )
         return self
 
     @model_validator(mode="after")
@@ -200,6 +212,16 @@ class Campaign(Model):
                     raise ValueError(f"got hits.file with a column {name} that {error}") from None
         if ranges != {name: (value, value) for name, value in self.impact}:
             _check_nose_first({name: max(map(abs, ends)) for name, ends in ranges.items()})
+        return self
+
+    @model_validator(mode="after")
+    def _weakens_about_the_core(self) -> Self:
+        length, radius = self.plate.degradation_length, self.core.max_radius
+        if radius > _MOST_LENGTHS * length:
+            raise ValueError(
+                f"got plate.degradation_length = {length:g} m beside a core of radius {radius:g} m, "
+                f"but it must be at least 1/{_MOST_LENGTHS} of that"
+            )
         return self
 
     @model_validator(mode="after")
@@ -242,35 +264,6 @@ def _with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
     return data | {"scatter": scatter} if scatter else data
 
 
-def parsed(text: str, name: str) -> dict[str, Any]:
-    """The tables of a campaign, TOML or JSON, not yet validated.
-
-    Raises:
-        CampaignError: the text, which errors call `name`, is neither.
-    """
-    try:
-        data: dict[str, Any] = json.loads(text) if text.startswith("{") else tomllib.loads(text)
-    except ValueError as error:
-        raise CampaignError(f"{name}: is not valid TOML: {error}") from None
-    return data
-
-
-def read_text(path: Path) -> str:
-    """The text of a campaign file.
-
-    Raises:
-        CampaignError: it is missing or cannot be read.
-    """
-    try:
-        return path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise CampaignError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise CampaignError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError as error:
-        raise CampaignError(f"{path}: is not valid TOML: {error}") from None
-
-
 def _sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problem as a sentence, and how many more there are."""
     problems = error.errors(include_url=False)
@@ -290,7 +283,7 @@ def _place(problem: ErrorDetails, data: Any) -> str:
         data = data.get(part) if isinstance(data, dict) else None
     if problem["type"].startswith("union_tag"):
         place += f".{problem['ctx']['discriminator'].strip(chr(39))}"
-    return place.removeprefix(".")
+    return brief(place.removeprefix("."))
 
 
 def _complaint(problem: ErrorDetails) -> str:
@@ -302,7 +295,7 @@ def _complaint(problem: ErrorDetails) -> str:
         case "value_error":
             return str(context["error"])
         case "union_tag_invalid":
-            return f'got "{context["tag"]}", but it must be one of {context["expected_tags"]}'
+            return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
         case "model_type" | "model_attributes_type":
             return f"got {quoted(problem['input'])}, but it must be a table"
         case "too_long":

@@ -2,14 +2,19 @@
 
 Beside RESULT.nc the folder RESULT.nc.parts holds a manifest, which says what is being computed, and the shards, each
 the result of a fixed range of shots. A file is written under another name, flushed and renamed, so that whatever has
-its name is whole; a process that is killed loses what it was computing and no more. A lock in the folder keeps a
-second run away; the system lets go of it when a process ends, however it ends.
+its name is whole; a process that is killed loses what it was computing and no more. The name of a shard ends with a
+checksum of its bytes, its place and the campaign: a shard that was damaged, moved or taken from another run does not
+have it, and is computed again. A lock in the folder keeps a second run away; the system lets go of it when a process
+ends, however it ends.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+import re
+import shutil
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -110,14 +115,17 @@ class Parts:
     Attributes:
         output: the result file.
         folder: where the shards are.
-        saved: numbers of the shards that are there.
+        saved: the shards that are there, by their numbers.
     """
 
-    def __init__(self, output: Path, content: Mapping[str, Any], total: int) -> None:
-        self.output, self.content, self.total = output, content, total
+    def __init__(
+        self, output: Path, content: Mapping[str, Any], total: int, tell: Callable[[str], object] = warnings.warn
+    ) -> None:
+        self.output, self.content, self.total, self._tell = output, content, total, tell
         self.folder = folder_of(output)
         self.extent: int = content["extent"]
-        self.saved: set[int] = set()
+        self.saved: dict[int, Path] = {}
+        self._fingerprint = fingerprint(content)
 
     @property
     def count(self) -> int:
@@ -151,62 +159,101 @@ class Parts:
         return True
 
     def _read_manifest(self) -> dict[str, Any] | None:
-        """What was begun here; a manifest that is not there means nothing was."""
+        """What was begun here; None if nothing was, which a missing manifest means; empty if that cannot be known."""
         try:
-            begun: dict[str, Any] = json.loads((self.folder / _MANIFEST).read_text(encoding="utf-8"))
+            begun = json.loads((self.folder / _MANIFEST).read_bytes())
+            replaces, known = begun.pop("replaces"), begun.pop("fingerprint")
+            damaged = not isinstance(replaces, bool) or known != fingerprint(begun)
         except FileNotFoundError:
             return None
-        except (OSError, ValueError) as error:
-            raise OutputError(f"{self.folder / _MANIFEST}: cannot be read ({error})") from None
-        return begun
+        except (OSError, ValueError, RecursionError, AttributeError, KeyError, TypeError):
+            return {}
+        return {} if damaged else {"content": begun, "replaces": replaces}
 
     def _take_up(self, begun: dict[str, Any], *, overwrite: bool) -> None:
-        replaces = begun.pop("replaces")
-        changed = difference(begun, json.loads(json.dumps(self.content)))
+        changed = begun and difference(begun["content"], json.loads(json.dumps(self.content)))
         if changed:
             raise OutputError(
                 f"{self.folder}: cannot be resumed: {changed}; put it back, or begin anew with --overwrite"
             )
-        if self.output.exists() and not (replaces or overwrite or self._is_complete()):
+        replaces = overwrite or begun.get("replaces", False)
+        if self.output.exists() and not (replaces or self._is_complete()):
             raise OutputError(f"{self.output}: exists already; name another file or give --overwrite")
         for leftover in self.folder.glob(".*.part"):
-            leftover.unlink()
-        for path in self._shards():
-            index = int(path.stem.split("_")[1]) // self.extent
-            if self._is_whole(index):
-                self.saved.add(index)
-            else:
-                path.unlink()
+            _remove(leftover)
+        if not begun:
+            self._tell(f"{self.folder / _MANIFEST}: is damaged; it is written again")
+            self._write_manifest(replaces=replaces)
+        damaged = [path for path in self._shards() if not self._take(path)]
+        for path in damaged:
+            _remove(path)
+        if damaged:
+            more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+            self._tell(
+                f"{self.folder}: {damaged[0].name}{more}: damaged, or not of this place or campaign; computed again"
+            )
+
+    def _take(self, path: Path) -> bool:
+        """Count a shard as saved if it is what its name says, and no other is there for its place."""
+        first = re.match(r"hits_(\d{10})_", path.name)
+        index = int(first[1]) // self.extent if first else 0
+        if index in self.saved or not self._is_whole(index, path):
+            return False
+        self.saved[index] = path
+        return True
 
     def _is_complete(self) -> bool:
         """Whether the result file is that of this very campaign."""
         try:
             with xarray.open_dataset(self.output, engine="netcdf4") as file:
-                return file.attrs.get(attr.FINGERPRINT) == fingerprint(self.content)
+                return file.attrs.get(attr.FINGERPRINT) == self._fingerprint
         except (OSError, RuntimeError, ValueError):
             return False
 
-    def _is_whole(self, index: int) -> bool:
+    def _is_whole(self, index: int, path: Path) -> bool:
         try:
-            with xarray.open_dataset(self._path(index), engine="netcdf4") as file:
-                return file.sizes["hit"] == min(self.extent, self.total - index * self.extent)
-        except (OSError, RuntimeError, ValueError, KeyError):
+            return path == self._named(index, path)
+        except OSError:  # a folder, for instance
             return False
 
     def _start_anew(self, *, overwrite: bool) -> None:
         try:
             self.discard()
-            with files.aside(self.folder / _MANIFEST) as file:
-                file.write_text(json.dumps({**self.content, "replaces": overwrite}, indent=1), encoding="utf-8")
+            self._write_manifest(replaces=overwrite)
         except OutputError:
             self.discard()
             raise
 
+    def _write_manifest(self, *, replaces: bool) -> None:
+        content = {**self.content, "replaces": replaces, "fingerprint": self._fingerprint}
+        if (self.folder / _MANIFEST).is_dir():
+            _remove(self.folder / _MANIFEST)
+        with files.aside(self.folder / _MANIFEST) as file:
+            file.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
     def _shards(self) -> list[Path]:
         return sorted(self.folder.glob(_SHARDS))
 
+    def _stem(self, index: int) -> str:
+        return f"hits_{index * self.extent:010d}"
+
     def _path(self, index: int) -> Path:
-        return self.folder / f"hits_{index * self.extent:010d}.nc"
+        """The shard of a place.
+
+        Raises:
+            OutputError: it is gone or damaged.
+        """
+        path = self.saved[index]
+        if not self._is_whole(index, path):
+            raise OutputError(f"{path}: this shard is gone or damaged")
+        return path
+
+    def _named(self, index: int, written: Path) -> Path:
+        """The name of a shard with these bytes at this place."""
+        with written.open("rb") as file:
+            bits = hashlib.file_digest(file, "sha256").hexdigest()
+        seal = hashlib.sha256(f"{self._fingerprint} {index} {bits}".encode()).hexdigest()[:16]
+        return self.folder / f"{self._stem(index)}_{seal}.nc"
 
     def save(self, index: int, dataset: xarray.Dataset) -> None:
         """Put a shard on the disk.
@@ -214,15 +261,24 @@ class Parts:
         Raises:
             OutputError: it cannot be written.
         """
-        files.write(dataset, self._path(index))
-        self.saved.add(index)
+        placed: dict[int, Path] = {}
+
+        def named(written: Path) -> Path:
+            return placed.setdefault(index, self._named(index, written))
+
+        files.write(dataset, self.folder / f"{self._stem(index)}.nc", named=named)
+        self.saved |= placed
 
     def kept(self) -> int:
         """Shards on the disk, one included that an interrupt has kept from being counted."""
         return len(self._shards())
 
     def load(self, index: int) -> xarray.Dataset:
-        """A shard that is there."""
+        """A shard that is there.
+
+        Raises:
+            OutputError: it is gone or damaged meanwhile.
+        """
         return files.read(self._path(index))
 
     def finish(self, count: int, attributes: Callable[[xarray.Dataset], Mapping[str, Any]]) -> None:
@@ -232,14 +288,21 @@ class Parts:
             attributes: global attributes from the first shard.
 
         Raises:
-            OutputError: the file cannot be written; the shards are still there.
+            OutputError: the file cannot be written, or a shard is damaged meanwhile; the others are still there.
         """
         paths = [self._path(index) for index in range(count)]
-        files.join(paths, self.output, {**attributes(self.load(0)), attr.FINGERPRINT: fingerprint(self.content)})
+        files.join(paths, self.output, {**attributes(self.load(0)), attr.FINGERPRINT: self._fingerprint})
         self.discard()
 
     def discard(self) -> None:
         """Empty the folder: first of its manifest, without which the rest means nothing."""
-        (self.folder / _MANIFEST).unlink(missing_ok=True)
-        for path in (*self._shards(), *self.folder.glob(".*.part")):
-            path.unlink()
+        for path in (self.folder / _MANIFEST, *self._shards(), *self.folder.glob(".*.part")):
+            _remove(path)
+
+
+def _remove(path: Path) -> None:
+    """Remove a file, or a folder that stands in its place."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from ..scene.units import quoted
-from .campaign import Campaign, CampaignError, parsed, read_text
+from .campaign import Campaign
+from .text import CampaignError, parsed, read_text
 
-_NAME = re.compile(r"\w[\w .+-]*")
+_NAME = re.compile(r"\w[\w .+-]{,79}")
 """Names of plates; the result files get the same names."""
 
 
@@ -53,6 +54,6 @@ def _name(plate: Any, place: str) -> str:
     if not isinstance(name, str) or not _NAME.fullmatch(name):
         raise CampaignError(
             f"{place}: got {quoted(name)}, but a name begins with a letter or a digit and contains only letters, "
-            "digits, blanks and the characters _ . + -"
+            "digits, blanks and the characters _ . + -, 80 at most"
         )
     return name

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -98,6 +99,7 @@ def run_to_file(
     resume: bool = False,
     overwrite: bool = False,
     progress: Follow | None = None,
+    tell: Callable[[str], object] = warnings.warn,
 ) -> None:
     """Compute every hit of a campaign into a file; what is computed is on the disk at once, in `output`.parts.
 
@@ -107,6 +109,7 @@ def run_to_file(
         team: who computes, in place of `device`.
         resume: continue what is in `output`.parts; begin where there is nothing.
         overwrite: replace an existing file, and begin anew in place of a run that has not ended.
+        tell: called with a sentence for what was damaged and is computed again.
 
     Raises:
         OutputError: something cannot be written, must not be overwritten or is no part of this campaign, or another
@@ -115,7 +118,7 @@ def run_to_file(
         Interrupted: by the keyboard; what is saved can be resumed.
     """
     with claimed(output), team or local_team(campaign, device) as members:
-        parts = Parts(output, manifest(campaign, members.made_by), len(campaign.sampler()))
+        parts = Parts(output, manifest(campaign, members.made_by), len(campaign.sampler()), tell)
         if not parts.begin(resume=resume, overwrite=overwrite):
             return
         try:
@@ -143,7 +146,9 @@ class _Store(Protocol):
     """Where shards go: a folder, or memory."""
 
     extent: int
-    saved: set[int]
+
+    @property
+    def saved(self) -> Mapping[int, object]: ...
 
     def save(self, index: int, dataset: xarray.Dataset) -> None: ...
 
@@ -154,15 +159,14 @@ class _Held:
     """Shards in memory."""
 
     def __init__(self, size: int) -> None:
-        self.extent, self.saved = size, set[int]()
-        self._shards: dict[int, xarray.Dataset] = {}
+        self.extent = size
+        self.saved: dict[int, xarray.Dataset] = {}
 
     def save(self, index: int, dataset: xarray.Dataset) -> None:
-        self._shards[index] = dataset
-        self.saved.add(index)
+        self.saved[index] = dataset
 
     def load(self, index: int) -> xarray.Dataset:
-        return self._shards[index]
+        return self.saved[index]
 
 
 @dataclass(frozen=True)

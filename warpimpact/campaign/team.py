@@ -6,7 +6,7 @@ import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -111,11 +111,13 @@ def cluster_team(
         device: that every worker computes on.
 
     Raises:
-        ClusterError: dask is not installed, the scheduler cannot be reached, or shots kill one worker after another.
+        ClusterError: dask is not installed, the scheduler cannot be reached or is lost, or shots kill one worker after
+            another.
         DeviceError: the workers lack the device, or compute other bits than the first one asked.
     """
     try:
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
+        from distributed.comm import CommClosedError
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
     with ExitStack() as stack:
@@ -145,6 +147,11 @@ def cluster_team(
                 made_by=kind,
                 underway=lambda: 0,
             )
+        except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
+            raise ClusterError(
+                f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
+                "continue with --resume"
+            ) from None
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
 

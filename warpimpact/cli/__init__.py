@@ -5,15 +5,18 @@ arguments, messages and progress here; a number is computed in another room. It 
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 
 from warpimpact import __version__
 
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
-from .mistakes import mistakes
+from .mistakes import bug_report, told
+from .plain import Plain, say
 from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
@@ -35,16 +38,27 @@ _COMMANDS = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 2 after a mistake that the user can correct, 3 when more shots failed
-    than the campaign allows, 130 when interrupted."""
+    than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted.
+
+    This is the one boundary for errors: each of them ends here in one sentence, never in a traceback.
+    """
     arguments = _parser().parse_args(argv)
     try:
-        code: int | None = arguments.command(arguments)
+        with redirect_stdout(Plain(sys.stdout)):
+            code: int | None = arguments.command(arguments)
+            sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
-        print(f"warpimpact: {str(interrupt) or 'interrupted'}", file=sys.stderr)
+        say(str(interrupt) or "interrupted")
         return 130
-    except mistakes() as error:
-        print(f"warpimpact: error: {error}", file=sys.stderr)
-        return 2
+    except BrokenPipeError:  # who reads has read enough, as `head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 141
+    except Exception as error:
+        if sentence := told(error):
+            say(f"error: {sentence}")
+            return 2
+        say(f"error: this is a bug, please report it: {bug_report(error)}")
+        return 70
     return code or 0
 
 

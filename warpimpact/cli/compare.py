@@ -12,7 +12,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_command, add_count, add_device, add_output
 from .paths import check_picture, named
-from .progress import show_standing
+from .progress import show_standing, warn
 from .run import failure_code
 
 
@@ -101,9 +101,9 @@ def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
 
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     """Result files of a campaign's plates by name; computes those that do not exist."""
-    from warpimpact.campaign.campaign import CampaignError
     from warpimpact.campaign.plates import read_plates
     from warpimpact.campaign.run import run_to_file
+    from warpimpact.campaign.text import CampaignError
 
     if len(arguments.files) > 1:
         raise CampaignError(
@@ -121,5 +121,6 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
                 resume=arguments.resume or (paths[name].exists() and not arguments.overwrite),
                 overwrite=arguments.overwrite,
                 progress=progress,
+                tell=warn,
             )
     return paths

@@ -1,14 +1,46 @@
 """Errors that the user can correct, and what their messages add."""
 
+import os
+import sys
+import tempfile
+import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 
+def told(error: Exception) -> str | None:
+    """What a person is told of an error that they can put right; None of a bug."""
+    if isinstance(error, mistakes()):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return f"not enough memory: {error}" if str(error) else "not enough memory"
+    if isinstance(error, OSError):  # of the system: a name that is too long, a disk that is full
+        name = f"{os.fsdecode(error.filename)[:200]}: " if isinstance(error.filename, str | bytes) else ""
+        return f"{name}{error.strerror or error}"
+    return None
+
+
+def bug_report(error: Exception) -> str:
+    """Write the details of a bug to a file; returns a phrase that says what it is and where they are."""
+    from warpimpact import __version__
+
+    what = f"{type(error).__name__}: {str(error)[:200]}"
+    details = [f"warpimpact {__version__}, Python {sys.version}, {sys.platform}\n", f"{sys.argv[1:]}\n"]
+    try:
+        with tempfile.NamedTemporaryFile(
+            "w", prefix="warpimpact_bug_", suffix=".txt", delete=False, encoding="utf-8", errors="backslashreplace"
+        ) as file:
+            file.writelines([*details, *traceback.format_exception(error)])
+    except OSError as failure:
+        return f"{what}; no file of details could be written ({failure.strerror})"
+    return f"{what}; details are in {file.name}"
+
+
 def mistakes() -> tuple[type[Exception], ...]:
     """Classes of errors whose message is for the user."""
-    from warpimpact.campaign.campaign import CampaignError
     from warpimpact.campaign.team import ClusterError
+    from warpimpact.campaign.text import CampaignError
     from warpimpact.results.files import OutputError, ResultError
     from warpimpact.solver.device import DeviceError
 
@@ -18,7 +50,7 @@ def mistakes() -> tuple[type[Exception], ...]:
 @contextmanager
 def memory_told(campaign: Path) -> Iterator[None]:
     """Report a lack of memory as an error of the campaign that needs it."""
-    from warpimpact.campaign.campaign import CampaignError
+    from warpimpact.campaign.text import CampaignError
 
     try:
         yield
@@ -29,7 +61,7 @@ def memory_told(campaign: Path) -> Iterator[None]:
 @contextmanager
 def folder_told(more: str = "") -> Iterator[None]:
     """Add the option that may help to an error of the campaign that a result contains; `more` follows it."""
-    from warpimpact.campaign.campaign import CampaignError
+    from warpimpact.campaign.text import CampaignError
 
     try:
         yield

@@ -6,11 +6,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from .plain import say
+
 if TYPE_CHECKING:
     from warpimpact.campaign.run import Standing
 
 _LONGEST_SILENCE = 600.0
 """Longest time between two lines of a log [s]."""
+
+
+def warn(sentence: str) -> None:
+    """Say on the terminal or in the log what a person should know, though the command goes on."""
+    say(f"warning: {sentence}")
 
 
 @contextmanager

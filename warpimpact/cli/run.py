@@ -1,7 +1,6 @@
 """The command run: compute the hit map of a campaign."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,8 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
 from .paths import check_place
-from .progress import show_standing
+from .plain import say
+from .progress import show_standing, warn
 
 if TYPE_CHECKING:
     import xarray
@@ -61,6 +61,7 @@ def _run(arguments: argparse.Namespace) -> int:
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=progress,
+            tell=warn,
         )
     with files.opened(output) as dataset:
         print(summary_text(dataset))
@@ -81,9 +82,8 @@ def failure_code(dataset: "xarray.Dataset", path: Path) -> int:
     allowed = dataset.attrs[attr.FAILED_SHARE]
     if share <= allowed:
         return 0
-    print(
-        f"warpimpact: {share:.3g} of the shots failed, more than output.failed_share = {allowed:g}; "
-        f"warpimpact inspect {path} lists them",
-        file=sys.stderr,
+    say(
+        f"{share:.3g} of the shots failed, more than output.failed_share = {allowed:g}; "
+        f"warpimpact inspect {path} lists them"
     )
     return 3

@@ -1,14 +1,18 @@
 """Figures: from a Dataset or a plate to a matplotlib Figure.
 
 Change axes, colours and layout here; a number that a figure shows is computed in analysis or statistics. It imports
-analysis and the rooms below it, but neither export nor report.
+analysis and the rooms below it, but neither export nor report. Text in figures is never mathtext.
 """
+
+import matplotlib as mpl
 
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
 from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.study import study_figure
+
+mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error
 
 __all__ = [
     "comparison_figure",

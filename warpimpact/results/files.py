@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ from typing import Any
 import netCDF4
 import xarray
 
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.checks import fault
 from warpimpact.results.interrupts import uninterrupted
 
 
@@ -25,13 +27,16 @@ class ResultError(ValueError):
     """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
-def write(dataset: xarray.Dataset, path: Path) -> None:
+def write(dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None) -> None:
     """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
+
+    Args:
+        named: gives the name of what was written, by its contents, in place of `path`.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
-    with uninterrupted(), aside(path) as file:
+    with uninterrupted(), aside(path, named=named) as file:
         dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=_encoding(dataset))
 
 
@@ -96,9 +101,9 @@ def _encoding(dataset: xarray.Dataset, *, chunk: int | None = None) -> dict[str,
 
 
 @contextmanager
-def aside(path: Path, folder: Path | None = None) -> Iterator[Path]:
+def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Path] | None = None) -> Iterator[Path]:
     """A name in a folder of the same disk, if not given that of `path`, to write to; what was written there is on the
-    disk before it gets its own name.
+    disk before it gets its own name, which is `path` or, where there is `named`, what that makes of the file.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
@@ -107,7 +112,7 @@ def aside(path: Path, folder: Path | None = None) -> Iterator[Path]:
     try:
         yield written
         _flush(written, os.O_RDWR)
-        os.replace(written, path)
+        os.replace(written, named(written) if named else path)
         if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
             _flush(path.parent, os.O_RDONLY)
     except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
@@ -167,6 +172,10 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         missing = {*v.COORDINATES, *v.VARIABLES} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
+        if attr.PLATE_PERIOD not in dataset.attrs:
+            raise ResultError(f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"')
+        if not is_history(dataset):
+            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES))
         yield dataset
 
 
@@ -180,7 +189,15 @@ def read_study(path: Path) -> xarray.Dataset:
         missing = {*v.STUDY_COORDINATES, *v.STUDY_VARIABLES} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
+        _check(dataset, path, (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES))
         return dataset.load()
+
+
+def _check(dataset: xarray.Dataset, path: Path, known: Collection[v.Variable]) -> None:
+    if 0 in dataset.sizes.values() and dataset.sizes.get("hit") == 0:
+        raise ResultError(f"{path}: not a result of warpimpact, it has no hits")
+    if found := fault(dataset, known):
+        raise ResultError(f"{path}: not a result of warpimpact, or damaged: {found}")
 
 
 def is_history(dataset: xarray.Dataset) -> bool:
@@ -188,13 +205,34 @@ def is_history(dataset: xarray.Dataset) -> bool:
     return "hit" not in dataset.sizes
 
 
-def _netcdf(path: Path) -> xarray.Dataset:
+_MOST_PACKED = 2000
+"""How many times its size a file may hold: zlib packs a thousand bytes into one at best."""
+
+
+@contextmanager
+def _netcdf(path: Path) -> Iterator[xarray.Dataset]:
+    """An open netCDF file; what the library finds damaged in it, now or when it is read, is told in a sentence."""
+    try:
+        with _opened(path) as dataset:
+            needed, size = dataset.nbytes, path.stat().st_size
+            if needed > 2**20 + _MOST_PACKED * size:
+                raise ResultError(f"{path}: damaged: it has {size} bytes, but declares {needed} of data")
+            yield dataset
+    except RuntimeError as error:
+        if not str(error).startswith("NetCDF"):
+            raise
+        raise ResultError(f"{path}: damaged, it cannot be read ({error})") from error
+
+
+def _opened(path: Path) -> xarray.Dataset:
     """An open netCDF file, with room for some chunks of a variable instead of for tens of megabytes."""
+    if not path.is_file():  # a pipe or a device may have no end
+        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
     _, slots, preemption = kept = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(4 * 8 * CHUNK, slots, preemption)
     try:
         return xarray.open_dataset(path, engine="netcdf4")
-    except (OSError, RuntimeError) as error:
-        raise ResultError(f"{path}: cannot be read as a netCDF file ({error})") from error
+    except Exception as error:  # a file that was altered leads xarray into errors of any class
+        raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
     finally:
         netCDF4.set_chunk_cache(*kept)

@@ -2,6 +2,9 @@
 
 import csv
 import math
+from array import array
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,7 +12,12 @@ import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
 from .model import Array
-from .units import quoted
+from .units import brief, quoted
+
+_LONGEST_PATH = 255
+"""That is quoted whole."""
+_MOST_BYTES, _MOST_ROWS = 2**28, 2**22
+"""Of a table."""
 
 
 def input_file(name: object, info: ValidationInfo) -> Path:
@@ -18,9 +26,32 @@ def input_file(name: object, info: ValidationInfo) -> Path:
     if not isinstance(name, str | Path):
         raise ValueError(f"got {quoted(name)}, which is not a file name")
     path = Path((info.context or {}).get("folder", "")) / name
-    if not path.is_file():
-        raise ValueError(f"got {quoted(name)}, but there is no file {path}")
+    try:
+        found = path.is_file()
+    except (OSError, ValueError) as error:  # a name that is too long, or has a character that none can have
+        raise ValueError(f"got {quoted(name)}, which is no file name ({_reason(error)})") from None
+    if not found:
+        got, place = (brief(str(one), _LONGEST_PATH) for one in (name, path))
+        raise ValueError(f'got "{got}", but there is no file {place}')
     return path.absolute()
+
+
+def _reason(error: Exception) -> str:
+    return (error.strerror if isinstance(error, OSError) else None) or str(error)
+
+
+def check_bytes(path: Path, most: int) -> None:
+    """Refuse a file of more than so many bytes, before any of it is read.
+
+    Raises:
+        ValueError: names the file and its size.
+    """
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise ValueError(f"{path.name} cannot be read: {_reason(error)}") from None
+    if size > most:
+        raise ValueError(f"{path.name} has {size / 2**20:.4g} MiB, but at most {most / 2**20:g} MiB are read")
 
 
 InputFile = Annotated[Path, BeforeValidator(input_file)]
@@ -32,10 +63,10 @@ def read_table(path: Path, columns: tuple[str, ...]) -> Array:
     Raises:
         ValueError: names the file, the line and what is wrong with it.
     """
-    header, reader = _open_table(path)
-    if header != columns:
-        raise ValueError(f'{path.name}, line 1: got "{",".join(header)}", but the header must be {",".join(columns)}')
-    return _rows(path, columns, reader)
+    with _open_table(path) as (header, reader):
+        if header != columns:
+            raise ValueError(f"{path.name}, line 1: {_got(header, columns)}the header must be {','.join(columns)}")
+        return _rows(path, columns, reader)
 
 
 def read_columns(path: Path, required: tuple[str, ...], optional: tuple[str, ...]) -> dict[str, Array]:
@@ -47,38 +78,50 @@ def read_columns(path: Path, required: tuple[str, ...], optional: tuple[str, ...
     Raises:
         ValueError: names the file, the line and what is wrong with it.
     """
-    header, reader = _open_table(path)
-    more = header[len(required) :]
-    if header[: len(required)] != required or not set(more) <= set(optional) or len(set(more)) < len(more):
-        raise ValueError(
-            f'{path.name}, line 1: got "{",".join(header)}", but the header must be {",".join(required)} '
-            f"and then any of {', '.join(optional)}"
-        )
-    return dict(zip(header, _rows(path, header, reader).T, strict=True))
+    with _open_table(path) as (header, reader):
+        more = header[len(required) :]
+        if header[: len(required)] != required or not set(more) <= set(optional) or len(set(more)) < len(more):
+            raise ValueError(
+                f"{path.name}, line 1: {_got(header, (*required, *optional))}the header must be {','.join(required)} "
+                f"and then any of {', '.join(optional)}"
+            )
+        return dict(zip(header, _rows(path, header, reader).T, strict=True))
 
 
-def _open_table(path: Path) -> tuple[tuple[str, ...], Any]:
+def _got(header: tuple[str, ...], known: tuple[str, ...]) -> str:
+    """The header as a message quotes it; a file that has none of the known columns is another, and quoted nowhere."""
+    return f'got "{brief(",".join(header))}", but ' if set(header) & set(known) else ""
+
+
+@contextmanager
+def _open_table(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Header of a CSV file, and the reader of what follows."""
+    check_bytes(path, _MOST_BYTES)
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path.name} cannot be read as text: {error}") from None
-    reader = csv.reader(lines, skipinitialspace=True)
-    return tuple(name.strip() for name in next(reader, [])), reader
+        with path.open(encoding="utf-8-sig", newline="") as lines:
+            reader = csv.reader(lines, skipinitialspace=True)
+            yield tuple(name.strip() for name in next(reader, [])), reader
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"{path.name} cannot be read as a table: {error}") from None
 
 
 def _rows(path: Path, columns: tuple[str, ...], reader: Any) -> Array:
-    rows = [_numbers(row, columns, f"{path.name}, line {reader.line_num}") for row in reader if row]
+    rows = array("d")
+    for row in reader:
+        if row:
+            rows.extend(_numbers(row, columns, f"{path.name}, line {reader.line_num}"))
+        if len(rows) > _MOST_ROWS * len(columns):
+            raise ValueError(f"{path.name} has more than {_MOST_ROWS} rows")
     if not rows:
         raise ValueError(f"{path.name} has no rows below its header")
-    table = np.array(rows)
+    table = np.array(rows).reshape(-1, len(columns))
     table.setflags(write=False)
     return table
 
 
 def _numbers(row: list[str], columns: tuple[str, ...], place: str) -> list[float]:
     if len(row) != len(columns):
-        raise ValueError(f'{place}: got "{",".join(row)}", but a row has {len(columns)} finite numbers')
+        raise ValueError(f'{place}: got "{brief(",".join(row))}", but a row has {len(columns)} finite numbers')
     return [_finite(text, f"{place}: {name}") for text, name in zip(row, columns, strict=True)]
 
 
@@ -88,5 +131,5 @@ def _finite(text: str, place: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise ValueError(f'{place}: got "{text}", but it must be a finite number')
+        raise ValueError(f'{place}: got "{brief(text)}", but it must be a finite number')
     return number

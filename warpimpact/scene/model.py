@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from .units import MOST_QUOTED, quoted
+
 Array = NDArray[np.float64]
 
 
@@ -23,9 +25,9 @@ class Model(BaseModel):
         allowed = cls._keys()
         unknown = [key for key in values if key not in allowed] if isinstance(values, dict) else []
         if unknown:
-            meant = get_close_matches(unknown[0], allowed, n=1)
+            meant = get_close_matches(str(unknown[0])[:MOST_QUOTED], allowed, n=1)
             hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(allowed)}"
-            raise ValueError(f'got the unknown key "{unknown[0]}"; {hint}')
+            raise ValueError(f"got the unknown key {quoted(unknown[0])}; {hint}")
         return values
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:

@@ -21,7 +21,7 @@ class Record(Model):
         bending: whether the largest bending moment and stress of each core are reported.
     """
 
-    standoffs: tuple[PositiveLength, ...] = ()
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(max_length=64)] = ()
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
     bending: Annotated[bool, Field(strict=True)] = False
 

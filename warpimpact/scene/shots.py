@@ -72,7 +72,7 @@ class Hits(Model):
 
     sampling: Literal["sobol", "grid", "random", "list"] = "sobol"
     count: Annotated[int, Field(strict=True, ge=1, le=2**30)] | None = None
-    seed: Annotated[int, Field(strict=True, ge=0)] = 0
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
     file: InputFile | None = None
     area: Literal["cell", "plate"] = "cell"
     irreducible: Annotated[bool, Field(strict=True)] = False

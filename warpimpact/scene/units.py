@@ -6,11 +6,16 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 from numbers import Real
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
+MOST_QUOTED = 80
+"""Characters of input that a message quotes at most, and those of a number with its unit."""
+_TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
+"""Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", re.DOTALL)
 
 
@@ -41,6 +46,8 @@ class _Quantity:
         return number
 
     def _from_text(self, text: str) -> float:
+        if len(text) > MOST_QUOTED:
+            raise self._error(text, f"which has more than {MOST_QUOTED} characters")
         match = _NUMBER_AND_UNIT.fullmatch(text)
         if match is None:
             raise self._error(text, f"which is not {self.name}")
@@ -53,7 +60,7 @@ class _Quantity:
         try:
             return _factor(unit, self.unit)
         except LookupError:
-            raise self._error(text, f'whose unit "{unit}" is unknown') from None
+            raise self._error(text, f'whose unit "{brief(unit)}" is unknown') from None
         except ValueError:
             raise self._error(text, f"which is not {self.name}") from None
 
@@ -83,6 +90,8 @@ def _factor(unit: str, si_unit: str) -> float:
     """Factor from `unit` to `si_unit`; LookupError for an unknown unit, ValueError for another kind."""
     import pint
 
+    if _TOWER.search(unit):
+        raise LookupError(unit)
     try:
         parsed = _registry().parse_units(unit)
     except Exception as error:  # pint's parser lets tokenizer, syntax, type and value errors through
@@ -93,9 +102,30 @@ def _factor(unit: str, si_unit: str) -> float:
         raise ValueError(unit) from None
 
 
+def brief(text: str, most: int = MOST_QUOTED) -> str:
+    """A text, its end left out where it is longer than messages quote."""
+    return text if len(text) <= most else f"{text[: MOST_QUOTED - 1]}…"
+
+
 def quoted(value: object) -> str:
-    """A value as the person wrote it: TOML and JSON agree on everything that gets here, save dates."""
-    return json.dumps(value, ensure_ascii=False, default=str)
+    """A value as the person wrote it, cut to what messages quote: TOML and JSON agree on all that gets here, save
+    dates."""
+    return brief(json.dumps(_part(value), ensure_ascii=False, default=str))
+
+
+def _part(value: object, depth: int = 3) -> object:
+    """As much of a value as can matter where `MOST_QUOTED` characters are quoted."""
+    if isinstance(value, str):
+        return value[:MOST_QUOTED]
+    if isinstance(value, int) and not isinstance(value, bool) and abs(value) >= 10**MOST_QUOTED:
+        return "a number of more than 80 digits"
+    if isinstance(value, dict | list | tuple) and not depth:
+        return "…"
+    if isinstance(value, dict):
+        return {_part(str(key)): _part(one, depth - 1) for key, one in islice(value.items(), MOST_QUOTED)}
+    if isinstance(value, list | tuple):
+        return [_part(one, depth - 1) for one in value[:MOST_QUOTED]]
+    return value
 
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
@@ -109,6 +139,14 @@ def quantity(kind: Any) -> Callable[[object], float]:
     return reader
 
 
+def _is_printable(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError(f"got {quoted(text)}, but it must be one line without control characters")
+    return text
+
+
+Title = Annotated[str, Field(max_length=200), AfterValidator(_is_printable)]
+"""One line that figures and terminals show."""
 Number = Annotated[float, _quantity("a number", "", "0.05")]
 Length = Annotated[float, _quantity("a length", "m", "4 mm")]
 Mass = Annotated[float, _quantity("a mass", "kg", "4 g")]

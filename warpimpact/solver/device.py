@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 import tempfile
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
+import psutil
 import warp as wp
 
 
@@ -48,6 +51,23 @@ def _start_warp() -> None:
             for line in aside:
                 if b"find or load the NVIDIA CUDA driver" not in line:
                     os.write(2, line)
+
+
+def free_memory() -> int:
+    """Memory that this process may still take [bytes]: of the machine, its control group and its own limits."""
+    process = psutil.Process()
+    free = [int(psutil.virtual_memory().available)]
+    with suppress(OSError, ValueError):  # a control group without a limit says "max"
+        group = Path("/sys/fs/cgroup")
+        free.append(int((group / "memory.max").read_text()) - int((group / "memory.current").read_text()))
+    with suppress(ImportError, AttributeError):  # systems without such limits
+        import resource
+
+        taken = process.memory_info()
+        for limit, used in ((resource.RLIMIT_AS, taken.vms), (resource.RLIMIT_DATA, taken.rss)):
+            most = resource.getrlimit(limit)[0]
+            free += [most - used] if most != resource.RLIM_INFINITY else []
+    return max(0, min(free))
 
 
 def cores() -> int:

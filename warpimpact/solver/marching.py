@@ -10,7 +10,6 @@ from queue import SimpleQueue
 from typing import Any, TypeVar
 
 import numpy as np
-import psutil
 import warp as wp
 from numpy.typing import NDArray
 
@@ -19,7 +18,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
-from warpimpact.solver.device import cores, load
+from warpimpact.solver.device import cores, free_memory, load
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.resolution import Fidelity
 
@@ -194,7 +193,7 @@ class March:
 
     def _slots(self, cells_y: int, cells_z: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow."""
-        free = psutil.virtual_memory().available if self.device.is_cpu else self.device.free_memory
+        free = free_memory() if self.device.is_cpu else self.device.free_memory
         wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
         return min(wanted, affordable, (2**31 - 1) // (cells_y * cells_z))

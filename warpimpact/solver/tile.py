@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import psutil
 from numpy.typing import NDArray
 from scipy.ndimage import correlate1d, distance_transform_edt
 from scipy.optimize import brentq
 
 from warpimpact.scene import Pattern, Plate
+from warpimpact.solver.device import free_memory
 
 Array = NDArray[np.float64]
 
@@ -93,11 +93,12 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
     step = 1 if sharp else 2
     count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
     dy, dz = period_y / count_y, period_z / count_z
-    needed, free = 3 * 8 * count_y * count_z, psutil.virtual_memory().available
+    needed, free = 3 * 8 * count_y * count_z, free_memory()
     if needed > free:
         raise MemoryError(
-            f"numerics.grid_spacing: got {spacing:g} m, but the plate's period of {period_y:g} m x {period_z:g} m "
-            f"needs {needed / 2**30:.3g} GiB at that spacing, and {free / 2**30:.3g} GiB are free"
+            "numerics.grid_spacing or plate.degradation_length, which determines it, is too small: the period of the "
+            f"plate, {period_y:g} m x {period_z:g} m, needs {needed / 2**30:.3g} GiB in cells of {spacing:.3g} m, and "
+            f"{free / 2**30:.3g} GiB are free"
         )
     samples = 1 if sharp else SUBSAMPLES
     within = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5

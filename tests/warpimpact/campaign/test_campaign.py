@@ -307,3 +307,25 @@ def test_a_campaign_needs_no_file() -> None:
     assert Campaign.model_validate_json(campaign.text) == campaign
     with_tolerance = campaign.model_copy(update={"numerics": Numerics(tolerance={"tilt": "1 deg"})})
     assert Campaign.model_validate_json(with_tolerance.text) == with_tolerance
+
+
+@pytest.mark.parametrize(
+    ("hit", "more", "allowed"),
+    [
+        ("1e6,0", "", "100 m"),
+        ("0,-101", "", "100 m"),
+        ("0,60", 'grid_spacing = "200 nm"', "42.95 m"),
+        ("99,-99", "", None),
+    ],
+)
+def test_hits_too_far_to_be_exact_are_refused(tmp_path: Path, hit: str, more: str, allowed: str | None) -> None:
+    """Cells of 0.02 mm have 32-bit numbers up to 43 km from the origin; a million metres were off by 55 m/s."""
+    (tmp_path / "hits.csv").write_text(f"hit_y,hit_z\n0,0\n{hit}\n", encoding="utf-8")
+    text = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+    head, tail = text.split("[hits]")[0], text.split("[numerics]")[1]
+    text = f'{head}[hits]\nsampling = "list"\nfile = "hits.csv"\n\n[numerics]\n{more}{tail}'
+    if allowed is None:
+        assert len(Campaign.from_text(text, name="a", folder=tmp_path).sampler()) == 2
+    else:
+        with pytest.raises(CampaignError, match=f"but they are exact up to {allowed}; a pattern repeats"):
+            Campaign.from_text(text, name="a", folder=tmp_path)

@@ -3,13 +3,14 @@
 import os
 import signal
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import pytest
 
 from warpimpact import Campaign
 from warpimpact.campaign.run import Standing, run_to_file
-from warpimpact.campaign.team import _compute_alike, cluster_team
+from warpimpact.campaign.team import ClusterError, _compute_alike, cluster_team
 from warpimpact.cli import main
 from warpimpact.solver.device import DeviceError
 
@@ -93,3 +94,33 @@ def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
         _compute_alike(campaign, campaign.sampler().shots(0, 1), None, "cpu", None, kind)
+
+
+@pytest.mark.parametrize("lost", ["closed", "cancelled"])
+def test_a_lost_scheduler_is_told_with_the_way_to_resume(
+    lost: str, campaign: Campaign, cluster: object, tmp_path: Path
+) -> None:
+    """A client whose scheduler is killed raises one of these where it waits."""
+    error = {"closed": distributed.comm.CommClosedError("in <TCP>"), "cancelled": CancelledError()}[lost]
+
+    def lose_it(_: Standing) -> None:
+        raise error
+
+    output = tmp_path / "a.nc"
+    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
+    with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
+        run_to_file(campaign, output, team=team, progress=lose_it)
+
+
+def test_workers_of_this_machine_listen_on_the_loopback(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    class Seen(distributed.LocalCluster):
+        def __init__(self, **options: object) -> None:
+            super().__init__(**options)
+            seen.append(self.scheduler_address)
+
+    monkeypatch.setattr(distributed, "LocalCluster", Seen)
+    with cluster_team(campaign, workers=1, device="cpu"):
+        pass
+    assert seen[0].startswith("tcp://127.0.0.1:")

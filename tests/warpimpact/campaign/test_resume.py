@@ -19,6 +19,7 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.campaign import parts
+from warpimpact.campaign.parts import folder_of
 from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
 from warpimpact.results import files
@@ -265,13 +266,132 @@ def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -
     assert parts.difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
 
 
-def test_a_damaged_shard_is_computed_again(
-    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
+def _shards(output: Path) -> list[Path]:
+    return sorted(folder_of(output).glob("hits_*.nc"))
+
+
+def _swap_two(shards: list[Path]) -> None:
+    first, second = (path.read_bytes() for path in shards[:2])
+    shards[0].write_bytes(second)
+    shards[1].write_bytes(first)
+
+
+def _swap_names(shards: list[Path]) -> None:
+    """Each takes the other's place, and keeps its own checksum."""
+    (one, *own), (two, *other) = (path.name.rpartition("_") for path in shards[:2])
+    shards[0].rename(shards[0].with_name("".join((two, *own))))
+    shards[1].rename(shards[1].with_name("".join((one, *other))))
+
+
+def _flip_bits(shards: list[Path]) -> None:
+    data = bytearray(shards[0].read_bytes())
+    for place in range(0, len(data), 997):
+        data[place] ^= 1 << place % 8
+    shards[0].write_bytes(data)
+
+
+def _cut(shards: list[Path]) -> None:
+    shards[0].write_bytes(shards[0].read_bytes()[:1000])
+
+
+def _folder_instead(shards: list[Path]) -> None:
+    shards[0].unlink()
+    shards[0].mkdir()
+    (shards[0] / "something").touch()
+
+
+def _no_number(shards: list[Path]) -> None:
+    shards[0].rename(shards[0].with_name("hits_of_mine.nc"))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("harm", [_swap_two, _swap_names, _flip_bits, _cut, _folder_instead, _no_number])
+def test_a_shard_that_lies_is_computed_again_and_told(
+    harm: Callable[[list[Path]], None],
+    broken_off: Path,
+    campaign: Campaign,
+    undisturbed: Path,
+    assert_same_bits: SameBits,
 ) -> None:
-    shard = min(broken_off.with_name("a.nc.parts").glob("hits_*.nc"))
-    shard.write_bytes(shard.read_bytes()[:1000])
-    run_to_file(campaign, broken_off, device="cpu", resume=True)
+    harm(_shards(broken_off))
+    told: list[str] = []
+    run_to_file(campaign, broken_off, device="cpu", resume=True, tell=told.append)
+    assert len(told) == 1
+    assert "damaged, or not of this place or campaign; computed again" in told[0]
     assert_same_bits(broken_off, undisturbed)
+    assert not folder_of(broken_off).exists()
+
+
+def test_a_shard_of_another_campaign_is_computed_again(
+    broken_off: Path, campaign: Campaign, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+) -> None:
+    slower = campaign.model_copy(update={"impact": campaign.impact.model_copy(update={"velocity": 500.0})})
+    other = tmp_path / "other.nc"
+    with pytest.raises(Interrupted):
+        run_to_file(slower, other, device="cpu", progress=stopped_after(2, KeyboardInterrupt()))
+    mine, foreign = _shards(broken_off)[0], _shards(other)[0]
+    mine.unlink()
+    shutil.copy(foreign, mine.with_name(foreign.name))
+    with pytest.warns(UserWarning, match="computed again"):
+        run_to_file(campaign, broken_off, device="cpu", resume=True)
+    assert_same_bits(broken_off, undisturbed)
+
+
+def _folder_as_manifest(manifest: Path) -> None:
+    manifest.unlink()
+    manifest.mkdir()
+
+
+def _flipped_manifest(manifest: Path) -> None:
+    text = manifest.read_text(encoding="utf-8")
+    assert "0.8" in text
+    manifest.write_text(text.replace("0.8", "0.9"), encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda manifest: manifest.write_text("[]"),
+        lambda manifest: manifest.write_text("{}"),
+        lambda manifest: manifest.write_text("7"),
+        lambda manifest: manifest.write_text("[" * 100_000),
+        lambda manifest: manifest.write_bytes(b"\xff\x00junk"),
+        _folder_as_manifest,
+        _flipped_manifest,
+    ],
+    ids=["list", "empty", "number", "deep", "junk", "folder", "flipped"],
+)
+def test_a_damaged_manifest_is_written_again_and_told(
+    harm: Callable[[Path], object],
+    broken_off: Path,
+    campaign: Campaign,
+    undisturbed: Path,
+    assert_same_bits: SameBits,
+) -> None:
+    harm(folder_of(broken_off) / "manifest.json")
+    with pytest.raises(OutputError, match="holds a run that has not ended"):
+        run_to_file(campaign, broken_off, device="cpu")
+    standings: list[Standing] = []
+    with pytest.warns(UserWarning, match=r"manifest.json: is damaged; it is written again"):
+        run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
+    assert standings[0].resumed >= 256  # a shard tells itself which campaign it is of
+    assert_same_bits(broken_off, undisturbed)
+
+
+def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
+    campaign: Campaign, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+) -> None:
+    output = tmp_path / "a.nc"
+
+    def harm(standing: Standing) -> None:
+        if standing.done == standing.total and output.with_name("a.nc.parts").exists():
+            _cut(_shards(output))
+
+    with pytest.raises(OutputError, match=r"this shard is gone or damaged; 16 of 16 shards .* continue with --resume"):
+        run_to_file(campaign, output, device="cpu", progress=harm)
+    with pytest.warns(UserWarning, match="computed again"):
+        run_to_file(campaign, output, device="cpu", resume=True)
+    assert_same_bits(output, undisturbed)
 
 
 def test_shards_are_results_that_xarray_opens_together(broken_off: Path, undisturbed: Path) -> None:

@@ -70,6 +70,16 @@ class MaskPattern(Pattern):
 
         Outlines cut the corners of cells. A hole that is longer than two periods counts as several holes.
         """
+        if size not in self._ligaments:
+            self._ligaments[size] = self._ligament(size)
+        return self._ligaments[size]
+
+    @cached_property
+    def _ligaments(self) -> dict[tuple[float, float] | None, float]:
+        """Those known already: the ligament of many holes takes seconds, and every shard tells it."""
+        return {}
+
+    def _ligament(self, size: tuple[float, float] | None) -> float:
         import shapely
 
         period = np.array(self.period)

@@ -8,14 +8,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
+from ..files import check_bytes
 from ..model import Array
-from ..units import PositiveLength, quantity
+from ..units import PositiveLength, brief, quantity
+from .drawings import check_drawing
 from .pattern import BoolArray
 
 _MOST_CELLS = 4096  # along one side; 16 million in all
 _CHORDS = 64  # of a curve of a drawing
-_NOT_UNDERSTOOD = {"text", "image", "foreignObject", "clip-path", "mask"}
+_MOST_BYTES = 2**28
+_MOST_CROSSING = 500
+"""Corners of an outline that crosses itself."""
+_MOST_HOLES = 10_000
+"""Whose distances from each other are found within seconds."""
 
 
 def read_mask(path: Path, cell_size: float) -> BoolArray:
@@ -28,6 +35,7 @@ def read_mask(path: Path, cell_size: float) -> BoolArray:
     Raises:
         ValueError: names the file and what is wrong with it.
     """
+    check_bytes(path, _MOST_BYTES)
     match path.suffix.lower():
         case ".png":
             return _material(path, _read_png(path))
@@ -43,6 +51,9 @@ def _material(path: Path, cells: NDArray[Any]) -> BoolArray:
     if not (len(levels) == 2 and levels[0] == 0 < levels[1]):
         raise ValueError(f"{path.name} is not a mask: a mask has two values, 0 is hole and one above is material")
     material: BoolArray = cells != 0
+    holes = label(~material)[1]
+    if holes > _MOST_HOLES:
+        raise ValueError(f"{path.name} has {holes} holes, but a mask has at most {_MOST_HOLES}")
     return material
 
 
@@ -55,18 +66,20 @@ def _read_png(path: Path) -> NDArray[Any]:
     from PIL import Image
 
     try:
-        with Image.open(path) as image:
-            if image.mode not in ("1", "L", "P", "RGB"):
-                raise ValueError(f"{path.name} is not a mask: give a grey or 1-bit image, not {image.mode}")
-            return np.asarray(image.convert("L"))[::-1].T
-    except OSError as error:
-        raise ValueError(f"{path.name} is a damaged PNG image: {error}") from None
+        with Image.open(path, formats=("PNG",)) as image:
+            mode = image.mode
+            cells = np.asarray(image.convert("L"))[::-1].T
+    except Exception as error:  # Pillow lets errors of many classes through
+        raise ValueError(f"{path.name} is a damaged PNG image: {brief(str(error))}") from None
+    if mode not in ("1", "L", "P", "RGB"):
+        raise ValueError(f"{path.name} is not a mask: give a grey or 1-bit image, not {mode}")
+    return cells
 
 
 def _read_npy(path: Path) -> NDArray[Any]:
     try:
         array = np.lib.format.open_memmap(path, mode="r")
-    except (ValueError, OSError):
+    except Exception:  # a header is a literal of Python, which may be anything
         raise ValueError(f"{path.name} is not an array of numbers in .npy format") from None
     if array.ndim != 2 or array.dtype.kind not in "biuf":
         raise ValueError(f"{path.name} is not a mask: a mask is a two-dimensional array of numbers")
@@ -78,6 +91,7 @@ def _read_svg(path: Path, cell_size: float) -> BoolArray:
     """Where the middle of a cell lies in a filled shape of a drawing; where shapes of one path overlap is none."""
     import shapely
 
+    check_drawing(path)
     extent = np.array([_svg_extent(path, side) for side in ("width", "height")])
     counts = np.round(extent / cell_size).astype(int)
     if not np.allclose(counts * cell_size, extent, rtol=1e-6):
@@ -86,23 +100,20 @@ def _read_svg(path: Path, cell_size: float) -> BoolArray:
             f"which cells of cell_size = {1e3 * cell_size:g} mm do not fill evenly"
         )
     _check_size(path, tuple(counts))
-    shapes = _svg_shapes(path, extent)
+    try:
+        shapes = _svg_shapes(path, extent)
+    except _NoShape:
+        raise
+    except Exception as error:  # of drawings that are no drawings, svgelements lets errors of any class through
+        raise ValueError(f"{path.name} has shapes that are not understood: {brief(str(error))}") from None
     shapely.prepare(shapes)
     y, z = ((np.arange(count) + 0.5) * cell_size for count in counts)
     return np.array([shapely.contains_xy(shapes, at, z) for at in y])
 
 
 def _svg_extent(path: Path, side: str) -> float:
-    """Width or height of a drawing [m]; also checks that the drawing has nothing that is not understood."""
-    try:
-        root = xml.parse(path).getroot()
-    except (xml.ParseError, UnicodeDecodeError) as error:
-        raise ValueError(f"{path.name} is not an SVG drawing: {error}") from None
-    if _tag(root) != "svg":
-        raise ValueError(f'{path.name} is not an SVG drawing: it begins with "{_tag(root)}"')
-    for element in root.iter():
-        for name in _NOT_UNDERSTOOD & {_tag(element), *element.attrib}:
-            raise ValueError(f"{path.name} has {name}, which is not understood; give filled paths and plain shapes")
+    """Width or height of a drawing [m]."""
+    root = xml.parse(path).getroot()
     if side not in root.attrib:
         raise ValueError(f'{path.name} has no {side}; a drawing has both width and height, such as "16mm"')
     try:
@@ -111,8 +122,8 @@ def _svg_extent(path: Path, side: str) -> float:
         raise ValueError(f"{path.name}: {side}: {error}") from None
 
 
-def _tag(element: xml.Element) -> str:
-    return str(element.tag).rpartition("}")[2]
+class _NoShape(ValueError):
+    """A drawing without holes."""
 
 
 def _svg_shapes(path: Path, extent: Array) -> Any:
@@ -125,12 +136,26 @@ def _svg_shapes(path: Path, extent: Array) -> Any:
     for shape in drawing.elements():
         if isinstance(shape, svgelements.Shape) and shape.fill is not None and shape.fill.value is not None:
             rings = [_flattened(part) for part in abs(svgelements.Path(shape)).as_subpaths()]
-            polygons = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(ring) > 2]
+            polygons = [_polygon(ring) for ring in rings if len(ring) > 2]
             nothing: Any = shapely.Polygon()
             filled.append(reduce(shapely.symmetric_difference, polygons, nothing))
     if not filled:
-        raise ValueError(f"{path.name} has no filled shape, but filled shapes are the holes")
+        raise _NoShape(f"{path.name} has no filled shape, but filled shapes are the holes")
     return shapely.transform(shapely.union_all(filled), lambda points: points * (scale, -scale) + (0.0, extent[1]))
+
+
+def _polygon(ring: Array) -> Any:
+    """What a ring encloses; one that crosses itself may do so as often as the square of its corners."""
+    import shapely
+
+    if not np.isfinite(ring).all():
+        raise ValueError("a corner is not a finite number")
+    polygon = shapely.Polygon(ring)
+    if shapely.is_valid(polygon):
+        return polygon
+    if len(ring) > _MOST_CROSSING:
+        raise ValueError(f"an outline of {len(ring)} corners crosses itself")
+    return shapely.make_valid(polygon)
 
 
 def _flattened(subpath: Any) -> Array:

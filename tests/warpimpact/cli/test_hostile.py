@@ -1,0 +1,287 @@
+"""Hostile input: one sentence and exit code 2, whatever is in a file; no traceback, no hang, nothing unbounded."""
+
+import io
+import random
+import re
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import CampaignError
+from warpimpact.cli import main
+from warpimpact.cli.plain import Plain, say
+from warpimpact.results import files
+from warpimpact.results.files import ResultError
+from warpimpact.scene.units import Length, quantity, quoted
+from warpimpact.solver.tile import tile_of
+
+BASE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+BEFORE_PATTERN, AFTER_PATTERN = BASE.split("[plate.pattern]")[0], "[impact]" + BASE.split("[impact]")[1]
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="16mm" height="8mm" viewBox="0 0 16 8">{}</svg>'
+
+
+def listed(name: str) -> str:
+    """The campaign with a list of hits."""
+    before, after = BASE.split("[hits]")[0], BASE.split("[numerics]")[1]
+    return f'{before}[hits]\nsampling = "list"\nfile = "{name}"\n\n[numerics]{after}'
+
+
+def masked(name: str) -> str:
+    """The campaign with a mask."""
+    return f'{BEFORE_PATTERN}[plate.pattern]\nshape = "mask"\nfile = "{name}"\ncell_size = "0.1 mm"\n\n{AFTER_PATTERN}'
+
+
+def npy(header: str) -> bytes:
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + bytes(100)
+
+
+def noise() -> bytes:
+    stream = io.BytesIO()
+    cells = np.random.default_rng(1).random((512, 512)) > 0.5
+    Image.fromarray((cells * 255).astype(np.uint8)).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def zigzag() -> str:
+    draw = random.Random(1)
+    return " ".join(f"L{16 * draw.random():.3f} {8 * draw.random():.3f}" for _ in range(4900))
+
+
+NESTED = "".join(f'<g id="a{i}"><use href="#a{i - 1}"/><use href="#a{i - 1}"/></g>' for i in range(1, 40))
+CAMPAIGNS = {
+    "nested arrays": ("a = " + "[" * 100_000 + "]" * 100_000, "nested more than 16 deep"),
+    "nested JSON": ('{"a":' + "[" * 100_000 + "]" * 100_000 + "}", "nested more than 16 deep"),
+    "nested 20 deep": (BASE + "\n[interaction]\na = " + "[" * 20 + "]" * 20, "nested more than 16 deep"),
+    "a key of dots": (".".join("a" * 100_000) + " = 1\n" + BASE, "dots in a key"),
+    "a table of dots": ("[" + ".".join("a" * 100_000) + "]\n" + BASE, "dots in a key"),
+    "a long array": ("x = [" + "1," * 2_000_000 + "]\n" + BASE, "at most 1048576 characters"),
+    "a tower of powers": (BASE.replace('"4 mm"', '"4 m**9**9**9"', 1), 'whose unit "m**9**9**9" is unknown'),
+    "another tower": (BASE.replace('"4 mm"', '"4 m*(9**9)**9**9"', 1), "is unknown"),
+    "a long unit": (BASE.replace('"4 mm"', '"4 ' + "m" * 100_000 + '"', 1), "which has more than 80 characters"),
+    "a long file name": (listed("z" * 300), "which is no file name"),
+    "a long path": (listed("z" * 5000), "which is no file name"),
+    "a device": (listed("/dev/zero"), "but there is no file /dev/zero"),
+    "a terminal's commands": (BASE.replace('title = "', 'title = "\\u001b[31m', 1), "without control characters"),
+    "a long title": (BASE.replace('title = "', 'title = "' + "t" * 5000, 1), "at most 200 characters"),
+    "a long number": (BASE.replace("seed = 1", "seed = 0x" + "f" * 5000), "hits.seed: got"),
+    "a long key": (BASE + "\n[interaction]\n" + "k" * 100_000 + " = 1\n", "got the unknown key"),
+    "a tiny length": (
+        re.sub("degradation_length *= .*", 'degradation_length = "1 nm"', BASE),
+        "must be at least 1/1000",
+    ),
+}
+FILES: dict[str, tuple[str, str | bytes, str]] = {
+    "a long field": ("a.csv", "hit_y,hit_z\n" + "1" * 200_000 + ",1\n", "field larger than field limit"),
+    "another file as hits": ("a.csv", "secret:x:0:0\nsecret\n", "line 1: the header must be hit_y,hit_z"),
+    "a row of another": ("a.csv", "hit_y,hit_z\n" + "y" * 5000 + ",1\n", "but it must be a finite number"),
+    "no data behind the header": (
+        "a.npy",
+        npy("{'descr': '<f8', 'fortran_order': False, 'shape': (4000, 4000), }\n"),
+        "is not an array of numbers",
+    ),
+    "a nested header": ("a.npy", npy("(" * 9000 + ")" * 9000 + "\n"), "is not an array of numbers"),
+    "a huge shape": (
+        "a.npy",
+        npy(f"{{'descr': '<f8', 'fortran_order': False, 'shape': ({10**30}, 4), }}\n"),
+        "is not an array of numbers",
+    ),
+    "noise": ("a.png", noise(), "holes, but a mask has at most"),
+    "a cut image": ("a.png", noise()[:1000], "is a damaged PNG image"),
+    "nested use": ("a.svg", SVG.format(f'<g id="a0"><rect width="1" height="1"/></g>{NESTED}'), "use of another use"),
+    "self-use": ("a.svg", SVG.format('<g id="a"><use href="#a"/></g>'), "use of another use"),
+    "deep groups": ("a.svg", SVG.format("<g>" * 5000 + "</g>" * 5000), "more than 32 deep"),
+    "an infinite scale": (
+        "a.svg",
+        SVG.format('<g transform="scale(1e400)"><rect width="1" height="1"/></g>'),
+        "has shapes that are not understood",
+    ),
+    "a junk path": ("a.svg", SVG.format('<path d="M 0 0 L foo bar 1e999 C z A 1 2 3"/>'), "a.svg"),
+    "an unknown encoding": ("a.svg", f'<?xml version="1.0" encoding="klingon"?>{SVG}', "unknown encoding"),
+    "many segments": ("a.svg", SVG.format(f'<path d="M0 0{" h1 v1" * 150_000}"/>'), "numbers in its paths"),
+    "a zigzag": ("a.svg", SVG.format(f'<path d="M0 0 {zigzag()} z"/>'), "crosses itself"),
+    "entities": ("a.svg", f'<!DOCTYPE svg [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]>{SVG}', "declares entities"),
+}
+
+
+def _sentence(campaign: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """What is said of a campaign that must be refused in one sentence."""
+    assert main(["run", str(campaign), "-o", str(campaign.with_name("never.nc")), "--device", "cpu"]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("warpimpact: error: ")
+    assert said.count("\n") == 1
+    assert len(said) < 700
+    assert said[:-1].isprintable()
+    return said
+
+
+@pytest.mark.parametrize("case", CAMPAIGNS)
+def test_a_hostile_campaign_is_refused_in_a_sentence(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, expected = CAMPAIGNS[case]
+    path = tmp_path / "a.toml"
+    path.write_text(text, encoding="utf-8")
+    assert expected in _sentence(path, capsys)
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_a_hostile_file_beside_a_campaign_is_refused_in_a_sentence(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name, content, expected = FILES[case]
+    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    path = tmp_path / "a.toml"
+    path.write_text(listed(name) if name.endswith("csv") else masked(name), encoding="utf-8")
+    said = _sentence(path, capsys)
+    assert expected in said
+    assert "secret" not in said
+    assert "y" * 81 not in said
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "x" * 5000, "y" * 300, "."])
+def test_what_is_no_campaign_file_is_refused_in_a_sentence(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plate", name]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "x" * 5000, "."])
+def test_what_is_no_result_is_refused_in_a_sentence(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["inspect", name]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_an_output_with_too_long_a_name_is_refused_in_a_sentence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(BASE, encoding="utf-8")
+    assert main(["run", str(path), "-o", str(tmp_path / f"{'z' * 300}.nc")]) == 2
+    assert "File name too long" in capsys.readouterr().err
+
+
+def test_a_bug_is_told_with_a_file_of_details(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
+    def broken(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("a\x1b[31m")
+
+    monkeypatch.setattr(Campaign, "from_toml", broken)
+    assert main(["plate", "a.toml", "-o", str(tmp_path / "a.png")]) == 70
+    said = capsys.readouterr().err
+    assert said.startswith("warpimpact: error: this is a bug, please report it: ZeroDivisionError: a\\x1b[31m; details")
+    assert said.count("\n") == 1
+    (report,) = tmp_path.glob("warpimpact_bug_*.txt")
+    assert str(report) in said
+    assert "in broken" in report.read_text(encoding="utf-8")
+
+
+def test_control_characters_are_never_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    print("a\x1b]0;title\x07\x9b31m\u202eb\n", end="", file=Plain(sys.stdout))
+    say("c\x1b[2J\nd" + "e" * 5000)
+    shown = capsys.readouterr()
+    assert shown.out == "a\\x1b]0;title\\x07\\x9b31m\\u202eb\n"
+    assert shown.err.startswith("warpimpact: c\\x1b[2J\\nd")
+    assert len(shown.err) < 2100
+
+
+def test_messages_quote_at_most_80_characters() -> None:
+    for value in ("x" * 10**6, ["x"] * 10**6, {"x" * 1000: 1}, 10**5000, [[[[[[[1]]]]]]]):
+        assert len(quoted(value)) <= 80
+    assert quoted(825.5) == "825.5"
+
+
+def test_a_result_shows_no_control_characters(
+    make_result: Callable[..., xarray.Dataset], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.nc"
+    files.write(make_result(20).assign_attrs(title="$\\frac\x1b[31m$"), path)
+    assert main(["inspect", str(path)]) == 0
+    assert capsys.readouterr().out.startswith("$\\frac\\x1b[31m$\n")
+
+
+def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> None:
+    path = tmp_path / "a.nc"
+    files.write(make_result(100).assign_attrs(title=r"costs 5 $ or $\notacommand{"), path)
+    assert main(["plot", str(path), "-o", str(tmp_path)]) == 0
+
+
+def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpimpact.solver.tile.free_memory", lambda: 2**20)
+    plate = Campaign.from_text(BASE, name="a", folder=Path()).plate
+    with pytest.raises(MemoryError, match=r"numerics.grid_spacing or plate.degradation_length, .* is too small"):
+        tile_of(plate, 1e-6)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda d: d.assign_attrs(core="[1"),
+        lambda d: d.assign_attrs(plate_period="wide"),
+        lambda d: d.assign_attrs(seed="x"),
+        lambda d: d.assign_attrs(sampling="sobol"),
+        lambda d: d.assign_attrs(title=7),
+        lambda d: d.assign(status=d["status"].astype(str)),
+        lambda d: d.assign(tilt=("standoff", np.zeros(2)), deflection=("standoff", np.zeros(2))),
+        lambda d: d.isel(hit=slice(0)),
+        lambda d: d.assign(tilt=d["tilt"].assign_attrs(units="furlong")),
+    ],
+)
+def test_a_result_that_was_altered_is_refused_in_a_sentence(
+    change: Callable[[xarray.Dataset], xarray.Dataset],
+    make_result: Callable[..., xarray.Dataset],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "a.nc"
+    change(make_result(20)).to_netcdf(path)
+    assert main(["inspect", str(path)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"warpimpact: error: {path}: not a result of warpimpact")
+    assert said.count("\n") == 1
+
+
+SMALL = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+
+
+@SMALL
+@given(st.integers(0, len(BASE) - 1), st.integers(0, 200), st.text(max_size=20))
+def test_a_campaign_file_with_anything_in_it_is_read_or_refused(at: int, taken: int, put: str) -> None:
+    with suppress(CampaignError):
+        Campaign.from_text(BASE[:at] + put + BASE[at + taken :], name="a.toml", folder=Path())
+
+
+@SMALL
+@given(st.text("0123456789.eE+-*^/() mskgdPaN²⁹\x00°", max_size=90))
+def test_any_quantity_is_read_or_refused(text: str) -> None:
+    with suppress(ValueError):
+        assert np.isfinite(quantity(Length)(text))
+
+
+@SMALL
+@given(st.integers(0, 10**9), st.integers(1, 40), st.booleans())
+def test_a_result_file_with_flipped_bits_is_read_or_refused(
+    make_result: Callable[..., xarray.Dataset],
+    tmp_path_factory: pytest.TempPathFactory,
+    seed: int,
+    flips: int,
+    cut: bool,
+) -> None:
+    path = tmp_path_factory.mktemp("flipped") / "a.nc"
+    files.write(make_result(20), path)
+    data, draw = bytearray(path.read_bytes()), random.Random(seed)
+    for _ in range(flips):
+        data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
+    path.write_bytes(data[: draw.randrange(len(data))] if cut else data)
+    with suppress(ResultError):
+        files.read(path)
