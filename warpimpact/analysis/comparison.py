@@ -21,8 +21,9 @@ from typing import Any
 import numpy as np
 import xarray
 
-from warpimpact.analysis.effectiveness import ANGLE, SHOWN_UNITS, Evidence, Measure, gather, interval_text
-from warpimpact.analysis.effectiveness import number_text as number
+from warpimpact.analysis.effectiveness import ANGLE, SHOWN_UNITS, Evidence, Measure, gather
+from warpimpact.analysis.numbers import interval_text
+from warpimpact.analysis.numbers import number_text as number
 from warpimpact.analysis.summary import sampling_note
 from warpimpact.campaign.parts import first_difference
 from warpimpact.results import attributes as attr
@@ -264,5 +265,5 @@ def _in_words(pair: Difference, measure: Measure) -> str:
         interval = f"({interval_text(pair.low, pair.high)})"
         return f"{pair.one} and {pair.other} cannot be told apart: difference {number(pair.value)} {interval}"
     names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
-    ends = sorted((abs(pair.low), abs(pair.high)))
-    return f"{names[0]} better than {names[1]} by {number(abs(pair.value))} ({interval_text(*ends)})"
+    low, high = sorted((abs(pair.low), abs(pair.high)))
+    return f"{names[0]} better than {names[1]} by {number(abs(pair.value))} ({interval_text(low, high)})"

@@ -17,6 +17,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.effects import Effect, effects
+from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import solid_reference
 from warpimpact.results.measures import dealing
@@ -199,16 +200,6 @@ def plate_text(dataset: xarray.Dataset) -> str:
 
 def _second(measure: Measure) -> str:
     return f"at hit {measure.hit}" if measure.hit is not None else interval_text(measure.low, measure.high)
-
-
-def number_text(number: float) -> str:
-    """With four digits; a dash for what does not exist."""
-    return "-" if math.isnan(number) else f"{number:#.4g}"
-
-
-def interval_text(low: float, high: float) -> str:
-    """Of a confidence interval; a dash where there is none."""
-    return "-" if math.isnan(low) else f"{number_text(low)} to {number_text(high)}"
 
 
 def _against_text(measure: Measure) -> str:

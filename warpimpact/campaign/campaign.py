@@ -127,7 +127,7 @@ class Campaign(Model):
     @property
     def replicates(self) -> int:
         """Independent scramblings that its shots are dealt out to in turn."""
-        return self.hits.replicates or (16 if self.stop is not None and self.hits.sampling == "sobol" else 1)
+        return self.hits.scramblings
 
     @property
     def symmetries(self) -> tuple[Symmetry, ...]:

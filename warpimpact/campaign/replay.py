@@ -86,7 +86,12 @@ def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
         raise ResultError("the result does not carry its campaign")
     count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
     text = result.attrs[attr.CAMPAIGN]
-    return Campaign.from_text(text, name="the campaign in the result", folder=folder, count=count)
+    campaign = Campaign.from_text(text, name="the campaign in the result", folder=folder, count=count)
+    dealt = int(result.attrs.get(attr.REPLICATES, 1))
+    if campaign.replicates == dealt:
+        return campaign
+    # A result computed under another default of the replicates keeps its own hits.
+    return campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"replicates": dealt})})
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:

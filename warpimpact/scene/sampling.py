@@ -115,7 +115,7 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
 
     With hits.irreducible a shot's images follow it. A campaign of any size takes them from a `Sampler` bit by bit.
     """
-    sampler = Sampler(impact, hits, plate, scatter, hits.replicates or 1)
+    sampler = Sampler(impact, hits, plate, scatter, hits.scramblings)
     return sampler.shots(0, len(sampler))
 
 

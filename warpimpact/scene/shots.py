@@ -17,6 +17,10 @@ from .units import Angle, AngularVelocity, PositiveSpeed
 
 _RIGHT_ANGLE = np.pi / 2
 
+_REPLICATES = 16
+"""Unless told otherwise, whatever the count: a larger one keeps the earlier shots. Student's interval over 16 means is
+9 % wider than over very many."""
+
 Obliquity = Annotated[Angle, Field(ge=0, lt=_RIGHT_ANGLE)]
 Tilt = Annotated[Angle, Field(gt=-_RIGHT_ANGLE, lt=_RIGHT_ANGLE)]
 
@@ -64,7 +68,7 @@ class Hits(Model):
             override those quantities.
         repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
         replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
-            two. Their spread tells how certain a mean is; None is 16 for a campaign with a stop rule, else 1.
+            two. Their spread tells how certain a mean is; `scramblings` says what None is.
         area: what the sampling covers: one unit cell, or a plate smaller than it, or all of a finite "plate".
         irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
             each hit there with its images, as many in all as `count` holds, or one hit's.
@@ -101,6 +105,11 @@ class Hits(Model):
             return None
         required = ("hit_y", "hit_z")
         return read_columns(self.file, required, tuple(f.name for f in fields(Shots) if f.name not in required))
+
+    @property
+    def scramblings(self) -> int:
+        """The replicates in force: 16 of a sobol sampling that gives none; 1 of any other sampling."""
+        return self.replicates or (_REPLICATES if self.sampling == "sobol" else 1)
 
     def covered(self, plate: Plate) -> tuple[float, float]:
         """Extent along y and z [m] of what the hits are spread over, about the origin.

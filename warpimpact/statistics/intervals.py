@@ -90,7 +90,7 @@ class Dealt:
         of the American Statistical Association 47 (1952) 635). Their own quantiles would be biased.
         """
         replicates = [sample for sample in self._replicates if sample.count]
-        if len(replicates) < 2:
+        if len(replicates) < 2 or all(sample.count <= self._images for sample in replicates):  # independent shots
             return None
         quantile = self._kind == "quantile"
         answers = [float((one.values <= value).mean()) if quantile else one.mean for one in replicates]
@@ -98,6 +98,8 @@ class Dealt:
         # Replicates that all say the same of something that happens or not (never, mostly) tell nothing.
         if half == 0.0 and self._kind != "mean":
             return None
+        if self._kind == "share":
+            return max(0.0, value - half), min(1.0, value + half)
         if not quantile:
             return value - half, value + half
         ends = (self._share - half, self._share + half)

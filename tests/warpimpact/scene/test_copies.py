@@ -29,7 +29,7 @@ from warpimpact.results import files
 from warpimpact.scene import Hits, NoPattern, Tolerance
 from warpimpact.scene.model import Model
 
-CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 MM = 1e-3
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 ROUND = CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))

@@ -24,7 +24,7 @@ from warpimpact import (
     simulate,
 )
 
-SLOTTED_PLATE = Path(__file__).parents[2] / "campaigns" / "slotted_plate.toml"
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9)
 
