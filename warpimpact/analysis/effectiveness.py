@@ -67,11 +67,13 @@ class Evidence:
     Attributes:
         kind: that of the numbers, "mean" or "share" as in `intervals.Dealt`.
         numbers: what each shot says, NaN where it does not count, shape [hits]; None of a worst point.
+        solid: the same of the first shots at the solid plate; None where there is none.
     """
 
     measure: Measure
     kind: str
     numbers: Array | None
+    solid: Array | None
 
 
 class _Statistic(NamedTuple):
@@ -133,7 +135,7 @@ def _averaged(
     if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
         estimate = _without_interval(estimate.value)
     against = Ratio.of(estimate, numbers, solid, dealt)
-    return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers)
+    return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers, solid)
 
 
 def _worst_point(effect: Effect, values: Array, solid: Array | None) -> Evidence:
@@ -143,7 +145,7 @@ def _worst_point(effect: Effect, values: Array, solid: Array | None) -> Evidence
     estimate = _without_interval(math.nan if hit is None else float(values[hit]))
     largest = None if solid is None else np.atleast_1d(np.fmax.reduce(solid))
     against = Ratio.of(estimate, values, largest, {})
-    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None)
+    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None, None)
 
 
 def _without_interval(value: float) -> Estimate:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from warpimpact.statistics.intervals import Estimate
 
@@ -30,3 +30,8 @@ def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:
     """
     value = format(estimate.value, number)
     return value if math.isnan(estimate.half_width) else f"{value} ± {format(estimate.half_width, half_width)}"
+
+
+def of_each(names: Sequence[str], values: Sequence[str]) -> str:
+    """Such as "a 1 m, b 2 m"."""
+    return ", ".join(f"{name} {value}" for name, value in zip(names, values, strict=True))

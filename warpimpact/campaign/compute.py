@@ -76,6 +76,7 @@ def compute(
             attr.AREAL_DENSITY: campaign.plate.areal_density,
             attr.CORE: campaign.core.model_dump_json(),
             attr.IMPACT: _impact(campaign),
+            attr.MATERIAL: _material(campaign),
             attr.NUMERICS: _numerics(campaign, shots),
             attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             attr.FAILED_SHARE: campaign.output.failed_share,
@@ -124,6 +125,12 @@ def _impact(campaign: Campaign) -> str:
     return json.dumps(
         dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
     )
+
+
+def _material(campaign: Campaign) -> str:
+    """What the plate resists with, as JSON: of its material, and of the law of its stress."""
+    of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "margin", "pattern"})
+    return json.dumps(of_plate | campaign.interaction.model_dump())
 
 
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.comparison import compare, comparison_text
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.summary import UNITS, estimated, means_of

@@ -31,6 +31,7 @@ COMPUTED_HITS = "computed_hits"
 # Core, plate and output
 CORE = "core"
 IMPACT = "impact"
+MATERIAL = "material"
 STANDOFF_POINT = "standoff_point"
 OPEN_AREA = "open_area"
 AREAL_DENSITY = "areal_density"
