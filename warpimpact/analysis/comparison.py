@@ -42,6 +42,7 @@ from warpimpact.statistics.intervals import Array, Estimate, estimate_of
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""
+_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
 _MATERIAL_UNITS = {"resistance": " Pa", "degradation_interval": " s", "degradation_length": " m", "density": " kg/m³"}
@@ -236,7 +237,15 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     if not {attr.CORE, attr.IMPACT} <= told.keys():
         raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
-    return {"core": json.loads(told[attr.CORE]), "impact": json.loads(told[attr.IMPACT]), "output": output}
+    return {"core": json.loads(told[attr.CORE]), "impact": _in_degrees(json.loads(told[attr.IMPACT])), "output": output}
+
+
+def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
+    """An impact with the angles that it gives as numbers as a person reads them."""
+    return {
+        name: f"{math.degrees(value)!r} deg" if name in _ANGLES and isinstance(value, float) else value
+        for name, value in impact.items()
+    }
 
 
 def _other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:

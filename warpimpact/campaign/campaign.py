@@ -29,7 +29,7 @@ from ..scene import (
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_scatter
-from ..scene.units import Number, PositiveLength, quoted
+from ..scene.units import Number, PositiveLength, quantity, quoted
 from ..solver.bending import check_bending
 from .stop import Stop
 
@@ -231,14 +231,15 @@ def _override_count(data: dict[str, Any], count: int) -> None:
 def _with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
     """Distributions moved from the places of their values to `scatter`, their medians in the places."""
     data, scatter = dict(data), {}
-    for field, (table, _) in QUANTITIES.items():
+    for field, (table, kind) in QUANTITIES.items():
         value = data[table].get(field) if isinstance(data.get(table), dict) else None
         if isinstance(value, dict):
             try:
                 scatter[field] = getattr(Scatter.model_validate({field: value}), field)
             except ValidationError as error:
                 raise CampaignError(f"{name}: {table}.{_sentence(error, {field: value})}") from None
-            data[table] = data[table] | {field: float(scatter[field].quantile(np.array(0.5)))}
+            median = float(scatter[field].quantile(np.array(0.5)))
+            data[table] = data[table] | {field: quantity(kind).as_read(median)}
     return data | {"scatter": scatter} if scatter else data
 
 

@@ -66,6 +66,7 @@ def compute(
             attr.TITLE: campaign.title,
             attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
             attr.CAMPAIGN: campaign.text,
+            attr.CAMPAIGN_ANGLES: "degree",
             **attr.versions(),
             attr.DEVICE: f"{chosen.alias} ({chosen.name})",
             attr.SAMPLING: campaign.hits.sampling,

@@ -9,6 +9,8 @@ REFERENCES = "references"
 
 # The campaign and what made a result of it
 CAMPAIGN = "campaign"
+CAMPAIGN_ANGLES = "campaign_angles"
+"""Unit of the angles that the campaign gives as numbers; not there where they are radians (version 0.1.0)."""
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
 DEVICE = "device"

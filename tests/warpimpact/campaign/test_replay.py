@@ -29,7 +29,7 @@ HOLES = Plate(
     degradation=0.8,
     pattern=CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3)),
 )
-STRAIGHT, SLANTED = Impact(velocity=825.0), Impact(velocity=600.0, obliquity=0.3, azimuth=0.7, yaw=0.1, spin=1e4)
+STRAIGHT, SLANTED = Impact(velocity=825.0), Impact(velocity=600.0, obliquity=17, azimuth=40, yaw=6, spin=1e4)
 DRAFT = Numerics(fidelity="draft")
 
 
@@ -54,7 +54,7 @@ def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
         (SLANTED, Numerics(fidelity="draft", precision="double"), HOLES, Status.PERFORATED),
         (SLANTED, Numerics(scheme="nodal", grid_spacing=5e-5), HOLES, Status.PERFORATED),
         (STRAIGHT, DRAFT, HOLES.model_copy(update={"resistance": 1e11}), Status.ARRESTED),
-        (Impact(velocity=300.0, obliquity=1.3), DRAFT, HOLES, Status.RICOCHETED),
+        (Impact(velocity=300.0, obliquity=75), DRAFT, HOLES, Status.RICOCHETED),
     ],
     ids=["straight", "slanted", "double", "nodal", "arrested", "grazing"],
 )

@@ -132,6 +132,19 @@ def test_an_impossible_impact_is_refused(field: str, value: object) -> None:
 
 
 @pytest.mark.parametrize(
+    ("field", "value", "allowed"),
+    [
+        ("obliquity", "90 deg", "at least 0 and less than 90 deg"),
+        ("obliquity", 90, "at least 0 and less than 90 deg"),
+        ("yaw", "-1.6 rad", "greater than -90 and less than 90 deg"),
+    ],
+)
+def test_an_angle_is_answered_in_degrees(field: str, value: object, allowed: str) -> None:
+    with pytest.raises(ValidationError, match=f"Input should be {allowed}"):
+        Impact(**{"velocity": 825, field: value})
+
+
+@pytest.mark.parametrize(
     ("hits", "scramblings"),
     [
         ({"count": 3}, 16),

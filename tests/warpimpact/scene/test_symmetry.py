@@ -191,7 +191,7 @@ def test_a_grid_is_the_grid_of_the_whole_cell() -> None:
 
 
 def test_without_a_symmetry_the_hits_are_the_plain_ones() -> None:
-    skew, rimmed = Impact(velocity=825, pitch=0.1, yaw=0.1), plate(SLOTS, size=[40 * MM, 40 * MM])
+    skew, rimmed = Impact(velocity=825, pitch=5, yaw=5), plate(SLOTS, size=[40 * MM, 40 * MM])
     plain = make_shots(skew, HITS.model_copy(update={"irreducible": False}), rimmed)
     assert symmetries_used(skew, HITS, rimmed) == (IDENTITY,)
     asked = make_shots(skew, HITS, rimmed)

@@ -39,7 +39,7 @@ class LatticePattern(Pattern):
         staggered: shifts every odd row of cells along y by b/2 along z.
         holes: where the holes of a cell lie, and perhaps a turn of each beyond `rotation`; one, on the origin, if not
             given.
-        rotation: turn of every hole from +y towards +z [rad].
+        rotation: turn of every hole from +y towards +z, given in degrees or with its unit [rad].
     """
 
     spacing: tuple[PositiveLength, PositiveLength]
