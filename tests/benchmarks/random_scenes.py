@@ -106,7 +106,7 @@ def draw(seed: int, index: int) -> Case:
     strongest = 0.33 * energy / (thickness * math.pi * core.max_radius**2)
     resistance = min(rng.uniform(1e9, 4e9), max(strongest, 1e9))
     oblique, yawed = rng.random(2) < 0.5
-    angles = np.radians(rng.uniform(0.0, [30.0, 360.0, 3.0, 360.0]))
+    angles = rng.uniform(0.0, [30.0, 360.0, 3.0, 360.0])
     plate = Plate(
         thickness=thickness,
         resistance=resistance,
@@ -119,8 +119,8 @@ def draw(seed: int, index: int) -> Case:
         velocity=velocity,
         obliquity=angles[0] if oblique else 0.0,
         azimuth=angles[1] if oblique else 0.0,
-        pitch=angles[2] * math.sin(angles[3]) if yawed else 0.0,
-        yaw=angles[2] * math.cos(angles[3]) if yawed else 0.0,
+        pitch=angles[2] * math.sin(math.radians(angles[3])) if yawed else 0.0,
+        yaw=angles[2] * math.cos(math.radians(angles[3])) if yawed else 0.0,
     )
     way = ("oblique" if oblique else "normal") + (" yawed" if yawed else "")
     scene = Scene(core=core, target=Target(plate=plate), record=Record(standoffs=(STANDOFF,)))
@@ -286,7 +286,7 @@ def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
 
 def to_tolerance(bench: Bench, case: Case, truth: Answer, velocity: float, tilt: float) -> Row:
     """Hits refined to a tolerance [m/s] and [degree]."""
-    numerics = Numerics(tolerance=Tolerance(residual_velocity=velocity, tilt=math.radians(tilt)))
+    numerics = Numerics(tolerance=Tolerance(residual_velocity=velocity, tilt=tilt))
     shots = case.shots(bench.hits)
     begin = time.process_time()
     outcomes, estimates = simulate_to_tolerance(case.scene, shots, numerics=numerics, device="cpu", threads=1)

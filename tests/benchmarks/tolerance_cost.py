@@ -40,7 +40,7 @@ def seconds(function: Callable[[], Any]) -> float:
 def main() -> None:
     asked = arguments()
     campaign = Campaign.from_toml(asked.campaign)
-    tolerance = Tolerance(residual_velocity=asked.velocity, tilt=float(np.radians(asked.tilt)))
+    tolerance = Tolerance(residual_velocity=asked.velocity, tilt=asked.tilt)
     shots = make_shots(campaign.impact, Hits(count=asked.hits, seed=campaign.hits.seed), campaign.plate)
 
     def to_tolerance() -> Any:

@@ -29,11 +29,12 @@ SHANKED = {"shape": "ogive", "diameter": 6.17e-3, "crh": 3, "length": 27e-3, "ma
 PLATE = {"thickness": 4e-3, "resistance": 2.6e9, "shear_coefficient": 0.05, "degradation": 0.8, "pattern": SLOTS}
 YAW = {"distribution": "normal", "mean": "0 deg", "std": "1 deg"}
 RESISTANCE = {"distribution": "normal", "mean": 2.6e9, "std": 1e8}
+ONE_NET = {"replicates": 1}
 BASE: dict[str, Any] = {
     "core": PAPER_CORE,
     "plate": PLATE,
     "impact": {"velocity": 825.0},
-    "hits": {"count": 24, "seed": 3},
+    "hits": ONE_NET | {"count": 24, "seed": 3},
     "numerics": STANDARD,
     "output": {"solid_reference": False},
 }
@@ -41,10 +42,10 @@ CAMPAIGNS: dict[str, dict[str, Any]] = {
     "slots": {},
     "slots, draft": {"numerics": {"fidelity": "draft", "patches_axial": 14}},
     "slots, double": {"numerics": {"fidelity": "draft", "patches_axial": 14, "precision": "double"}},
-    "slots, nodal": {"numerics": {"scheme": "nodal", "grid_spacing": 5e-5}, "hits": {"count": 6}},
-    "slots, to a tolerance": {"numerics": {"tolerance": {"tilt": "2 deg"}}, "hits": {"count": 8}},
+    "slots, nodal": {"numerics": {"scheme": "nodal", "grid_spacing": 5e-5}, "hits": ONE_NET | {"count": 6}},
+    "slots, to a tolerance": {"numerics": {"tolerance": {"tilt": "2 deg"}}, "hits": ONE_NET | {"count": 8}},
     "slots, with bending and the nose": {"output": {"bending": True, "standoff_point": "nose"}},
-    "slots, irreducible": {"hits": {"count": 32, "irreducible": True}},
+    "slots, irreducible": {"hits": ONE_NET | {"count": 32, "irreducible": True}},
     "shank through round holes, oblique and yawed": {
         "core": SHANKED,
         "plate": PLATE | {"pattern": CIRCLES, "thickness": 6e-3},
@@ -52,12 +53,12 @@ CAMPAIGNS: dict[str, dict[str, Any]] = {
     },
     "arrest in a hard plate that does not weaken": {
         "plate": PLATE | {"pattern": {"shape": "none"}, "degradation": 1.0, "resistance": 2e10, "thickness": 8e-3},
-        "hits": {"count": 2},
+        "hits": ONE_NET | {"count": 2},
     },
     "Poncelet's stress, a rim": {
         "plate": PLATE | {"size": [12e-3, 20e-3]},
         "interaction": {"static": 1.0, "quadratic": 0.5},
-        "hits": {"count": 24, "area": "plate"},
+        "hits": ONE_NET | {"count": 24, "area": "plate"},
     },
     "scatter": {"impact": {"velocity": 825.0, "yaw": YAW}, "plate": PLATE | {"resistance": RESISTANCE}},
 }

@@ -2,8 +2,10 @@
 
 Shot k hits every plate at the same place of its unit cell under the same conditions. What the shots have in common
 then drops out of the differences (common random numbers), which are means of differences shot by shot and have their
-intervals (statistics/intervals.py). Plates that were hit by other shots are compared as independent
-(statistics/comparisons.py).
+intervals (statistics/intervals.py). Where one plate has more hits, the first ones are paired and the others count too;
+plates that were hit by other shots are compared as independent (statistics/comparisons.py). No hit is left out.
+
+Plates of different weight are compared by their ratios to the solid plate of the same areal density.
 
 The intervals of all pairs of plates hold together, for each measure on its own: each has its share of the error
 (Bonferroni). Two plates are told apart where the interval of their difference leaves out 0.
@@ -14,26 +16,36 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
 
-from warpimpact.analysis.effectiveness import ANGLE, SHOWN_UNITS, Evidence, Measure, gather, interval_text
-from warpimpact.analysis.effectiveness import number_text as number
+from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, gather
+from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.summary import sampling_note
 from warpimpact.campaign.parts import first_difference
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import dealing
-from warpimpact.statistics.comparisons import confidence_of_each, difference_of_independent
-from warpimpact.statistics.intervals import estimate_of
+from warpimpact.statistics.comparisons import (
+    Ratio,
+    confidence_of_each,
+    difference_numbers,
+    difference_of_independent,
+    ratio_numbers,
+)
+from warpimpact.statistics.intervals import Array, Estimate, estimate_of
 
 _SAME_PLACE = 1e-9
 """Rounding of a place in units of the cell."""
+_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
+_SAME_WEIGHT = 1.01
+"""Plates whose areal densities differ by less than this factor weigh the same."""
+_MATERIAL_UNITS = {"resistance": " Pa", "degradation_interval": " s", "degradation_length": " m", "density": " kg/m³"}
 
 
 @dataclass(frozen=True)
@@ -41,6 +53,7 @@ class Contestant:
     """A plate and how well it protects; areal density [kg/m²], open area as a share."""
 
     name: str
+    hits: int
     areal_density: float
     open_area: float
     measures: tuple[Measure, ...]
@@ -64,22 +77,38 @@ class Difference:
 
 
 @dataclass(frozen=True)
+class Pair:
+    """How the hits of two plates were used.
+
+    Attributes:
+        paired: so many first hits of each are the same shots, and compared shot by shot.
+        independent: why the plates were compared as independent; empty where they were hit by the same shots.
+    """
+
+    one: str
+    other: str
+    paired: int
+    independent: str
+
+
+@dataclass(frozen=True)
 class Comparison:
     """Plates side by side.
 
     Attributes:
         plates: in the order in which they were given; all have the same measures.
         differences: of every pair of plates in every measure that has intervals.
-        hits: that were compared, of each plate.
-        independent: why the plates were compared as independent; empty where they were hit by the same shots.
+        pairs: how the hits of every pair were used.
+        at_equal_weight: names of the measures in which the plates, of different weight, were compared by their ratios
+            to the solid plate; None where their weights are the same.
         confidence: at which the intervals of a measure's differences hold together.
         notes: what else there is to say, a sentence each.
     """
 
     plates: tuple[Contestant, ...]
     differences: tuple[Difference, ...]
-    hits: int
-    independent: str
+    pairs: tuple[Pair, ...]
+    at_equal_weight: frozenset[str] | None
     confidence: float
     notes: tuple[str, ...]
 
@@ -102,7 +131,7 @@ def compare(
     standoff: float | None = None,
     confidence: float = 0.95,
 ) -> Comparison:
-    """Compare the plates of some hit maps; where one has fewer hits, the first ones of the others.
+    """Compare the plates of some hit maps, by all their hits.
 
     Args:
         datasets: two or more, of the same core under the same impact; of open files one number per hit is in memory.
@@ -115,49 +144,84 @@ def compare(
     """
     for dataset, name in zip(datasets[1:], names[1:], strict=True):
         _check_same_question(datasets[0], names[0], dataset, name)
-    hits = min(dataset.sizes["hit"] for dataset in datasets)
-    datasets = [dataset.isel(hit=slice(hits)) for dataset in datasets]
-    independent = next((why for other in datasets[1:] if (why := _other_shots(datasets[0], other))), "")
     pairs = list(combinations(range(len(datasets)), 2))
+    used = [_used(datasets[i], names[i], datasets[j], names[j]) for i, j in pairs]
+    densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
+    differ_in_weight, by_ratio = max(densities) > _SAME_WEIGHT * min(densities), set()
     each = confidence_of_each(confidence, len(pairs))
     measures: list[list[Measure]] = [[] for _ in datasets]
     differences = []
     for evidences in zip(*(gather(dataset, angle=angle, standoff=standoff) for dataset in datasets), strict=True):
         for told, evidence in zip(measures, evidences, strict=True):
             told.append(evidence.measure)
-        for i, j in pairs:
-            if evidences[i].numbers is not None:
-                dealt = [dealing(datasets[k]) | {"confidence": each} for k in (i, j)]
-                interval = _apart(evidences[i], evidences[j], dealt) if independent else None
-                value, low, high = interval or _paired(evidences[i], evidences[j], dealt[0])
-                differences.append(Difference(evidences[i].measure.name, names[i], names[j], value, low, high))
+        if any(evidence.numbers is None for evidence in evidences):
+            continue
+        name = evidences[0].measure.name
+        if differ_in_weight and not any(math.isnan(evidence.measure.ratio) for evidence in evidences):
+            by_ratio.add(name)
+        for (i, j), pair in zip(pairs, used, strict=True):
+            dealt = [dealing(datasets[k]) | {"confidence": each} for k in (i, j)]
+            sides = [_side(evidences[k], of, by_ratio=name in by_ratio) for k, of in zip((i, j), dealt, strict=True)]
+            interval = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
+            differences.append(Difference(name, names[i], names[j], *interval))
     plates = tuple(
-        Contestant(name, dataset.attrs[attr.AREAL_DENSITY], dataset.attrs[attr.OPEN_AREA], tuple(told))
+        Contestant(
+            name, dataset.sizes["hit"], dataset.attrs[attr.AREAL_DENSITY], dataset.attrs[attr.OPEN_AREA], tuple(told)
+        )
         for name, dataset, told in zip(names, datasets, measures, strict=True)
     )
-    return Comparison(plates, tuple(differences), hits, independent, confidence, tuple(_notes(datasets)))
+    at_equal_weight = frozenset(by_ratio) if differ_in_weight else None
+    return Comparison(
+        plates, tuple(differences), tuple(used), at_equal_weight, confidence, tuple(_notes(datasets, names))
+    )
 
 
-def _paired(one: Evidence, other: Evidence, dealt: dict[str, Any]) -> tuple[float, float, float]:
-    """Mean difference of the same shots and its interval."""
-    assert one.numbers is not None
-    assert other.numbers is not None
-    kind = "difference" if one.kind == "share" else one.kind
-    estimate = estimate_of(kind, one.numbers - other.numbers, **dealt)
-    if math.isnan(one.measure.low + other.measure.low):
+def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> Pair:
+    """How the hits of two results are used."""
+    common = min(one.sizes["hit"], other.sizes["hit"])
+    why = _other_shots(one.isel(hit=slice(common)), other.isel(hit=slice(common)))
+    return Pair(name, other_name, 0 if why else common, why)
+
+
+class _Side(NamedTuple):
+    """What of a plate is compared: whether it is a share or made of one, whether it is a ratio to the solid plate,
+    numbers whose mean it is, and its estimate."""
+
+    is_share: bool
+    by_ratio: bool
+    numbers: Array
+    estimate: Estimate
+
+
+def _side(evidence: Evidence, dealt: dict[str, Any], *, by_ratio: bool) -> _Side:
+    assert evidence.numbers is not None
+    estimate = estimate_of(evidence.kind, evidence.numbers, **dealt)
+    if math.isnan(evidence.measure.low):  # as of a worst tenth of few hits
+        estimate = replace(estimate, low=math.nan, high=math.nan)
+    if not by_ratio:
+        return _Side(evidence.kind == "share", False, evidence.numbers, estimate)
+    assert evidence.solid is not None
+    ratio = Ratio.of(estimate, evidence.numbers, evidence.solid, dealt)
+    numbers = ratio_numbers(evidence.numbers, evidence.solid, ratio.value)
+    return _Side(
+        evidence.kind == "share", True, numbers, replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
+    )
+
+
+def _difference(one: _Side, other: _Side, dealt: dict[str, Any], *, paired: bool) -> tuple[float, float, float]:
+    """Difference of two plates and its interval; NaN where there is none."""
+    a, b = one.estimate, other.estimate
+    independent = a.value - b.value, *difference_of_independent(a, b)
+    if not paired:
+        return independent
+    numbers = difference_numbers(one.numbers, other.numbers)
+    matched = one.is_share and not one.by_ratio and len(one.numbers) == len(other.numbers)
+    estimate = estimate_of("difference" if matched else "mean", numbers, **dealt)
+    if math.isnan(a.low + b.low):
         return estimate.value, math.nan, math.nan
+    if one.is_share and estimate.half_width == 0.0 and a.half_width + b.half_width > 0.0:
+        return independent  # shares that agree in every shot are no more certain than the shares
     return estimate.value, estimate.low, estimate.high
-
-
-def _apart(one: Evidence, other: Evidence, dealt: Sequence[dict[str, Any]]) -> tuple[float, float, float]:
-    """Difference of two independent estimates and its interval."""
-    assert one.numbers is not None
-    assert other.numbers is not None
-    difference = one.measure.value - other.measure.value
-    if math.isnan(one.measure.low + other.measure.low):
-        return difference, math.nan, math.nan
-    a, b = estimate_of(one.kind, one.numbers, **dealt[0]), estimate_of(other.kind, other.numbers, **dealt[1])
-    return difference, *difference_of_independent(a, b)
 
 
 def _check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
@@ -173,7 +237,15 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     if not {attr.CORE, attr.IMPACT} <= told.keys():
         raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
-    return {"core": json.loads(told[attr.CORE]), "impact": json.loads(told[attr.IMPACT]), "output": output}
+    return {"core": json.loads(told[attr.CORE]), "impact": _in_degrees(json.loads(told[attr.IMPACT])), "output": output}
+
+
+def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
+    """An impact with the angles that it gives as numbers as a person reads them."""
+    return {
+        name: f"{math.degrees(value)!r} deg" if name in _ANGLES and isinstance(value, float) else value
+        for name, value in impact.items()
+    }
 
 
 def _other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
@@ -190,79 +262,33 @@ def _other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
     return ""
 
 
-def _notes(datasets: Sequence[xarray.Dataset]) -> Iterator[str]:
+def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
     densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
-    if max(densities) > 1.01 * min(densities):
-        yield "The plates differ in weight; the ratio to the solid plate of the same areal density allows for it."
+    if max(densities) > _SAME_WEIGHT * min(densities):
+        weights = of_each(names, [f"{density:.4g} kg/m²" for density in densities])
+        yield (
+            f"The plates differ in weight ({weights}). They are ranked by the ratio to the solid plate of the same "
+            "areal density; a measure without that ratio says so."
+        )
+    if differences := "; ".join(_materials(datasets, names)):
+        yield f"The plates differ in material, which no ranking allows for: {differences}."
     texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]
     asked = [json.loads(text) for text in texts]
-    differences = (first_difference(one, other) for one, other in pairwise(asked))
-    if (found := next(filter(None, differences), None)) is not None:
+    differing = (first_difference(one, other) for one, other in pairwise(asked))
+    if (found := next(filter(None, differing), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
-    if note := sampling_note(datasets[0]):
-        yield note
+    yield from dict.fromkeys(note for dataset in datasets if (note := sampling_note(dataset)))
 
 
-def comparison_text(comparison: Comparison) -> str:
-    """Who is best at what, then every measure as a ranking with differences in words."""
-    measures = comparison.plates[0].measures
-    compared = [measure for measure in measures if measure.hit is None]
-    blocks = [_conditions(comparison), _best(comparison, compared)]
-    blocks += [_ranking(comparison, measure) for measure in compared]
-    return "\n\n".join("\n".join(block) for block in blocks)
-
-
-def _conditions(comparison: Comparison) -> list[str]:
-    how = "the same shots at every plate, compared shot by shot"
-    if comparison.independent:
-        how = f"compared as independent, because {comparison.independent}"
-    together = f"Differences of a measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
-    chance = "Intervals tell of the hits that were drawn, not of what the model leaves out."
-    return [f"{comparison.hits} hits of each plate: {how}.", together, chance, *comparison.notes]
-
-
-def _best(comparison: Comparison, measures: Sequence[Measure]) -> list[str]:
-    width = max(len(measure.label) for measure in measures)
-    lines = [f"{'best at':<{width}}   plate"]
-    for measure in measures:
-        first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
-        if len(first) == len(comparison.plates):
-            lines.append(f"{measure.label:<{width}}   cannot be told apart")
-        else:
-            lines.append(f"{measure.label:<{width}}   {_listed(first)}")
-    return lines
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Such as "a, b and c"."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
-def _ranking(comparison: Comparison, measure: Measure) -> list[str]:
-    place = comparison.plates[0].measures.index(measure)
-    ranks, better = comparison.ranks(measure.name), "higher" if measure.higher_is_better else "lower"
-    width = max(5, *(len(plate.name) for plate in comparison.plates))
-    lines = [
-        f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better",
-        f"rank  {'plate':<{width}}{'kg/m²':>8}{'value':>10}   {'95 % interval':<20}ratio to the solid plate",
-    ]
-    sign = -1.0 if measure.higher_is_better else 1.0
-    for plate in sorted(comparison.plates, key=lambda plate: (ranks[plate.name], sign * plate.measures[place].value)):
-        told = plate.measures[place]
-        interval = "" if math.isnan(told.ratio_low) else f"  {interval_text(told.ratio_low, told.ratio_high)}"
-        lines.append(
-            f"{ranks[plate.name]:>4}  {plate.name:<{width}}{plate.areal_density:>8.2f}{number(told.value):>10}   "
-            f"{interval_text(told.low, told.high):<20}{number(told.ratio)}{interval}"
-        )
-    lines += [_in_words(pair, measure) for pair in comparison.differences if pair.measure == measure.name]
-    return lines
-
-
-def _in_words(pair: Difference, measure: Measure) -> str:
-    """Such as "a better than b by 0.1 (0.05 to 0.15)"."""
-    if not pair.told_apart:
-        interval = f"({interval_text(pair.low, pair.high)})"
-        return f"{pair.one} and {pair.other} cannot be told apart: difference {number(pair.value)} {interval}"
-    names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
-    ends = sorted((abs(pair.low), abs(pair.high)))
-    return f"{names[0]} better than {names[1]} by {number(abs(pair.value))} ({interval_text(*ends)})"
+def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
+    """Quantities in which the materials differ, with that of every plate that tells it."""
+    told = {
+        name: json.loads(d.attrs[attr.MATERIAL])
+        for name, d in zip(names, datasets, strict=True)
+        if attr.MATERIAL in d.attrs
+    }
+    for quantity in dict.fromkeys(key for material in told.values() for key in material):
+        values = {name: material.get(quantity) for name, material in told.items()}
+        if len(set(values.values())) > 1:
+            units = _MATERIAL_UNITS.get(quantity, "")
+            yield f"{quantity} ({of_each(list(values), [f'{value:.6g}{units}' for value in values.values()])})"

@@ -17,6 +17,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.effects import Effect, effects
+from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import solid_reference
 from warpimpact.results.measures import dealing
@@ -66,11 +67,13 @@ class Evidence:
     Attributes:
         kind: that of the numbers, "mean" or "share" as in `intervals.Dealt`.
         numbers: what each shot says, NaN where it does not count, shape [hits]; None of a worst point.
+        solid: the same of the first shots at the solid plate; None where there is none.
     """
 
     measure: Measure
     kind: str
     numbers: Array | None
+    solid: Array | None
 
 
 class _Statistic(NamedTuple):
@@ -132,7 +135,7 @@ def _averaged(
     if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
         estimate = _without_interval(estimate.value)
     against = Ratio.of(estimate, numbers, solid, dealt)
-    return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers)
+    return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers, solid)
 
 
 def _worst_point(effect: Effect, values: Array, solid: Array | None) -> Evidence:
@@ -142,7 +145,7 @@ def _worst_point(effect: Effect, values: Array, solid: Array | None) -> Evidence
     estimate = _without_interval(math.nan if hit is None else float(values[hit]))
     largest = None if solid is None else np.atleast_1d(np.fmax.reduce(solid))
     against = Ratio.of(estimate, values, largest, {})
-    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None)
+    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None, None)
 
 
 def _without_interval(value: float) -> Estimate:
@@ -199,16 +202,6 @@ def plate_text(dataset: xarray.Dataset) -> str:
 
 def _second(measure: Measure) -> str:
     return f"at hit {measure.hit}" if measure.hit is not None else interval_text(measure.low, measure.high)
-
-
-def number_text(number: float) -> str:
-    """With four digits; a dash for what does not exist."""
-    return "-" if math.isnan(number) else f"{number:#.4g}"
-
-
-def interval_text(low: float, high: float) -> str:
-    """Of a confidence interval; a dash where there is none."""
-    return "-" if math.isnan(low) else f"{number_text(low)} to {number_text(high)}"
 
 
 def _against_text(measure: Measure) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.effectiveness import effectiveness_text
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
     UNITS,
@@ -73,7 +74,7 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
     """Means and quantiles of the cores that passed the plate, with intervals."""
-    yield f"{'passed the plate':<41}{'':>10}   95 % interval"
+    yield f"{'passed the plate':<43}{'':>10}   95 % interval"
     shown = [name for name in v.shown_by("inspect") if name in dataset]
     for mean in means_of(shown, dataset[v.STANDOFF].values.tolist()):
         name = mean.text.removeprefix("mean(").removesuffix(")")
@@ -87,14 +88,14 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _row(measure: Measure, estimate: Estimate) -> str:
-    name, what = "", f"{measure.share:.0%} below"
+    name, what = "", f"{measure.share * 100.0:g} % quantile"
     unit, factor = _SHOWN.get(measure.units, (UNITS[measure.units].strip(), 1.0))
     if measure.kind == "mean":
         at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
         name, what = f"{measure.variable.replace('_', ' ')}{at}, {unit}", "mean"
-    value, low, high = (factor * number for number in (estimate.value, estimate.low, estimate.high))
-    row = f"{name:<29}{what:<12}{value:>10.2f}   {low:.2f} to {high:.2f}"
-    return f"{row:<77}spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row
+    interval = interval_text(factor * estimate.low, factor * estimate.high, "{:.2f}".format)
+    row = f"{name:<29}{what:<14}{factor * estimate.value:>10.2f}   {interval}"
+    return f"{row:<79}spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row
 
 
 def failures(dataset: xarray.Dataset) -> Iterator[str]:

@@ -225,7 +225,7 @@ class _Bench:
         plain = campaign.scene.record.model_copy(update={"bending": False})  # the literal scheme computes no bending
         self.scene = campaign.scene.model_copy(update={"record": plain})
         self.progress, self.work, self.total = progress, 0.0, 0.0
-        spread = Hits(count=hits, seed=campaign.hits.seed)
+        spread = Hits(count=hits, seed=campaign.hits.seed, replicates=1)
         self.shots = make_shots(campaign.impact, spread, campaign.plate, campaign.scatter)
 
     def numerics(self, fidelity: Fidelity) -> Numerics:

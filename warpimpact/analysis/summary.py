@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
@@ -23,16 +24,20 @@ SLICE = 2**18
 
 @dataclass(frozen=True)
 class Spread:
-    """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none."""
+    """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none.
+
+    ``interval`` holds the mean at 95 %, and is NaN where the hits tell of none.
+    """
 
     count: int
     mean: float
     standard_deviation: float
+    interval: tuple[float, float] = (math.nan, math.nan)
 
     @classmethod
     def of(cls, estimate: Estimate) -> Spread:
         """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
-        return cls(estimate.count, estimate.value, estimate.spread)
+        return cls(estimate.count, estimate.value, estimate.spread, (estimate.low, estimate.high))
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,7 @@ def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
 
 
 _SAMPLINGS = {
-    "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates gives valid ones.",
+    "sobol": "Intervals are those of independent shots, as a rule too wide; hits.replicates = 16 gives valid ones.",
     "grid": "Intervals are those of independent shots, which the hits of a grid are not.",
     "list": "Intervals are those of independent shots, which the hits of a list may not be.",
 }
@@ -127,6 +132,7 @@ def summary_text(dataset: xarray.Dataset) -> str:
     result = summary(dataset)
     hits = dataset.sizes["hit"]
     rows = [_count_row(meaning, count, hits) for meaning, count in result.counts.items() if count]
+    rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<18}  spread")
     rows += [
         _spread_row("residual velocity", result.residual_velocity, "m/s"),
         _spread_row("deflection", result.deflection, "°"),
@@ -148,7 +154,7 @@ def stop_lines(dataset: xarray.Dataset) -> list[str]:
     reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told[attr.STOP_REASON]]
     return [
         f"{told[attr.STOP_QUANTITY]} = {told[attr.ESTIMATE]:.6g}{unit}, {told[attr.CONFIDENCE]:.4g} interval "
-        f"{low:.6g} to {high:.6g}{unit}; {reason}"
+        f"{interval_text(low, high, '{:.6g}'.format)}{unit}; {reason}"
     ]
 
 
@@ -167,4 +173,5 @@ def _count_row(meaning: str, count: int, hits: int) -> str:
 def _spread_row(name: str, spread: Spread, unit: str) -> str:
     if spread.count == 0:
         return f"{name:<20}{'-':>8}   no core behind the plate"
-    return f"{name:<20}{spread.mean:>8.1f} ± {spread.standard_deviation:.1f} {unit}"
+    interval = interval_text(*spread.interval, "{:.2f}".format)
+    return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}"

@@ -27,7 +27,7 @@ from ..scene import (
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_scatter
-from ..scene.units import Number, PositiveLength, Title, brief, quoted
+from ..scene.units import Number, PositiveLength, Title, brief, quantity, quoted
 from ..solver.bending import check_bending
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
@@ -127,7 +127,7 @@ class Campaign(Model):
     @property
     def replicates(self) -> int:
         """Independent scramblings that its shots are dealt out to in turn."""
-        return self.hits.replicates or (16 if self.stop is not None and self.hits.sampling == "sobol" else 1)
+        return self.hits.scramblings
 
     @property
     def symmetries(self) -> tuple[Symmetry, ...]:
@@ -253,14 +253,15 @@ def _override_count(data: dict[str, Any], count: int) -> None:
 def _with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
     """Distributions moved from the places of their values to `scatter`, their medians in the places."""
     data, scatter = dict(data), {}
-    for field, (table, _) in QUANTITIES.items():
+    for field, (table, kind) in QUANTITIES.items():
         value = data[table].get(field) if isinstance(data.get(table), dict) else None
         if isinstance(value, dict):
             try:
                 scatter[field] = getattr(Scatter.model_validate({field: value}), field)
             except ValidationError as error:
                 raise CampaignError(f"{name}: {table}.{_sentence(error, {field: value})}") from None
-            data[table] = data[table] | {field: float(scatter[field].quantile(np.array(0.5)))}
+            median = float(scatter[field].quantile(np.array(0.5)))
+            data[table] = data[table] | {field: quantity(kind).as_read(median)}
     return data | {"scatter": scatter} if scatter else data
 
 

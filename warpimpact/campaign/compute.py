@@ -70,6 +70,7 @@ def compute(
             attr.TITLE: campaign.title,
             attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
             attr.CAMPAIGN: campaign.text,
+            attr.CAMPAIGN_ANGLES: "degree",
             **attr.versions(),
             attr.DEVICE: f"{chosen.alias} ({chosen.name})",
             attr.SAMPLING: campaign.hits.sampling,
@@ -80,6 +81,7 @@ def compute(
             attr.AREAL_DENSITY: campaign.plate.areal_density,
             attr.CORE: campaign.core.model_dump_json(),
             attr.IMPACT: _impact(campaign),
+            attr.MATERIAL: _material(campaign),
             attr.NUMERICS: _numerics(campaign, numerics, shots),
             attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             attr.FAILED_SHARE: campaign.output.failed_share,
@@ -173,6 +175,12 @@ def _impact(campaign: Campaign) -> str:
     return json.dumps(
         dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
     )
+
+
+def _material(campaign: Campaign) -> str:
+    """What the plate resists with, as JSON: of its material, and of the law of its stress."""
+    of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "margin", "pattern"})
+    return json.dumps(of_plate | campaign.interaction.model_dump())
 
 
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:

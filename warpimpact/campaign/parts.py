@@ -43,7 +43,8 @@ def extent(count: int) -> int:
 def manifest(campaign: Campaign, made_by: Mapping[str, str]) -> dict[str, Any]:
     """What decides every bit of a result: the campaign with the contents of its files, versions and kind of device."""
     contents = json.loads(json.dumps(campaign.model_dump(), default=_digest))
-    return {"campaign": contents, "extent": extent(len(campaign.sampler())), **made_by}
+    dealt = {"replicates": campaign.replicates, "extent": extent(len(campaign.sampler()))}
+    return {"campaign": contents, **dealt, **made_by}
 
 
 def _digest(path: Path) -> str:

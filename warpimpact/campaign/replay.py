@@ -10,6 +10,7 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import promise_in
+from warpimpact.campaign.former import in_present_terms
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, to_dataset
@@ -62,8 +63,10 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     )
     stored = result.isel(hit=hit)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
+        former = campaign.hits.file is not None and attr.CAMPAIGN_ANGLES not in result.attrs
+        why = "; angles in a hit list are degrees now, and were radians when the result was computed" if former else ""
         raise ResultError(
-            f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
+            f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one{why}"
         )
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
         attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
@@ -87,8 +90,15 @@ def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
     if attr.CAMPAIGN not in result.attrs:
         raise ResultError("the result does not contain its campaign")
     count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
-    text = result.attrs[attr.CAMPAIGN]
-    return Campaign.from_text(text, name="the campaign in the result", folder=folder, count=count)
+    text, name = result.attrs[attr.CAMPAIGN], "the campaign in the result"
+    if attr.CAMPAIGN_ANGLES not in result.attrs:
+        text = in_present_terms(text, name)
+    campaign = Campaign.from_text(text, name=name, folder=folder, count=count)
+    dealt = int(result.attrs.get(attr.REPLICATES, 1))
+    if campaign.replicates == dealt:
+        return campaign
+    # A result computed under another default of the replicates keeps its own hits.
+    return campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"replicates": dealt})})
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:

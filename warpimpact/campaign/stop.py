@@ -2,11 +2,11 @@
 
 from typing import Annotated
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, ValidatorFunctionWrapHandler, field_serializer, field_validator
 
 from ..results.measures import Measure
 from ..scene.model import Model
-from ..scene.units import Number, quoted
+from ..scene.units import Number, Radians, in_radians, quoted
 
 
 class Stop(Model):
@@ -14,7 +14,7 @@ class Stop(Model):
 
     Attributes:
         quantity: see `Measure.parse`.
-        half_width: largest half width of the interval, SI.
+        half_width: largest half width of the interval, SI; that of an angle is given in degrees or with its unit.
         confidence: of the interval.
         max_count: number of shots after which the run ends in any case.
     """
@@ -30,15 +30,19 @@ class Stop(Model):
         Measure.parse(text)
         return text
 
-    @field_validator("half_width", mode="before")
+    @field_validator("half_width", mode="wrap")
     @classmethod
-    def _in_si(cls, value: object, info: ValidationInfo) -> float:
+    def _in_si(cls, value: object, _: ValidatorFunctionWrapHandler, info: ValidationInfo) -> float:
         if "quantity" not in info.data:
             raise ValueError(f"got {quoted(value)}, but it needs a valid stop.quantity")
         number = Measure.parse(info.data["quantity"]).in_units(value)
         if number <= 0.0:
             raise ValueError(f"got {quoted(value)}, but it must be greater than 0")
         return number
+
+    @field_serializer("half_width", when_used="json")
+    def _as_read(self, value: float) -> float | str:
+        return in_radians(value) if isinstance(value, Radians) else value
 
     @property
     def measure(self) -> Measure:

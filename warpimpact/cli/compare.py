@@ -57,7 +57,8 @@ def add_compare(commands: Commands) -> None:
 
 
 def _compare(arguments: argparse.Namespace) -> int:
-    from warpimpact.analysis.comparison import compare, comparison_text
+    from warpimpact.analysis.comparison import compare
+    from warpimpact.analysis.comparison_text import comparison_text
     from warpimpact.plotting import comparison_figure
     from warpimpact.results import files
 

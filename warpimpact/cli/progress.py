@@ -10,6 +10,8 @@ from .plain import say
 
 if TYPE_CHECKING:
     from warpimpact.campaign.run import Standing
+    from warpimpact.results.measures import Measure
+    from warpimpact.statistics.intervals import Estimate
 
 _LONGEST_SILENCE = 600.0
 """Longest time between two lines of a log [s]."""
@@ -60,10 +62,16 @@ def _log_standing() -> "Callable[[Standing], None]":
 
 def _running(standing: "Standing") -> str:
     """Running estimates and failed shots as one short line."""
+    from warpimpact.analysis.numbers import interval_text, plus_minus
     from warpimpact.analysis.summary import UNITS
 
+    def told(measure: "Measure", estimate: "Estimate") -> str:
+        if measure.is_binary:  # not in the middle of its interval
+            return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, '{:.4g}'.format)})"
+        return plus_minus(estimate, ".5g", ".2g") + UNITS[measure.units]
+
     parts = [
-        f"{measure.text} {estimate.value:.5g} ± {estimate.half_width:.2g}{UNITS[measure.units]}"
+        f"{measure.text} {told(measure, estimate)}"
         for measure, estimate in standing.estimates.items()
         if estimate.count > 1
     ]

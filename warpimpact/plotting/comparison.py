@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from warpimpact.analysis.comparison_text import hits_used
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
 
 if TYPE_CHECKING:
@@ -52,10 +53,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
     handles, labels = panels[0, 0].get_legend_handles_labels()
     legend = dict(zip(labels, handles, strict=True))  # each entry once
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
-    how = "compared as independent" if comparison.independent else "the same for every plate"
-    figure.suptitle(
-        f"{comparison.hits} hits, {how}; 95 % intervals; hollow marker: cannot be told apart", fontsize="medium"
-    )
+    used = "\n".join(hits_used(comparison))
+    figure.suptitle(f"{used}\n95 % intervals; hollow marker: cannot be told apart", fontsize="medium")
     return figure
 
 
@@ -100,8 +99,10 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Mea
             _draw_interval(axes, line + offset, pair, (marker, colour), hollow=hollow)
     axes.axvline(0.0, color=_GREY, linewidth=1.0)
     _furnish(axes, [f"{one} − {other}" for one, other in lines])
+    by_ratio = measures[0].name in (comparison.at_equal_weight or ())
+    difference = "difference of the ratios to the solid plates" if by_ratio else "difference"
     better = "right" if measures[0].higher_is_better else "left"
-    axes.set_title(f"difference; {better} of 0 the first plate is better", fontsize="medium", loc="left")
+    axes.set_title(f"{difference}; {better} of 0 the first plate is better", fontsize="medium", loc="left")
 
 
 def _draw_interval(

@@ -17,7 +17,8 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
-from warpimpact.analysis.effectiveness import SHOWN_UNITS, interval_text, number_text
+from warpimpact.analysis.effectiveness import SHOWN_UNITS
+from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.analysis.study_text import study_text
 from warpimpact.campaign.replay import replay
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread

@@ -12,8 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.comparison import compare, comparison_text
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
@@ -131,7 +133,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
         if estimate.count:
             at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
             unit = UNITS[measure.units]
-            interval = f"{estimate.low:.2f} to {estimate.high:.2f}{unit}"
+            interval = interval_text(estimate.low, estimate.high, "{:.2f}".format)
             yield Row(f"mean {words(measure.variable)}{at}", f"{estimate.value:.2f}{unit}", interval)
 
 

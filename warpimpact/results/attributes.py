@@ -9,6 +9,8 @@ REFERENCES = "references"
 
 # The campaign, and how it was computed
 CAMPAIGN = "campaign"
+CAMPAIGN_ANGLES = "campaign_angles"
+"""Unit of the angles that the campaign gives as numbers; not there where they are radians (version 0.1.0)."""
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
 DEVICE = "device"
@@ -36,6 +38,7 @@ COMPUTED_HITS = "computed_hits"
 # Core, plate and output
 CORE = "core"
 IMPACT = "impact"
+MATERIAL = "material"
 STANDOFF_POINT = "standoff_point"
 OPEN_AREA = "open_area"
 AREAL_DENSITY = "areal_density"

@@ -21,7 +21,7 @@ class Tolerance(_AsGiven):
 
     Attributes:
         residual_velocity: [m/s].
-        tilt: at every stand-off [rad].
+        tilt: at every stand-off, given in degrees or with its unit [rad].
     """
 
     residual_velocity: PositiveSpeed = float("inf")

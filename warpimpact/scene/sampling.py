@@ -114,7 +114,7 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
 
     With hits.irreducible a shot's images follow it. A `Sampler` gives the shots of a large campaign in parts.
     """
-    sampler = Sampler(impact, hits, plate, scatter, hits.replicates or 1)
+    sampler = Sampler(impact, hits, plate, scatter, hits.scramblings)
     return sampler.shots(0, len(sampler))
 
 

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
 import numpy as np
-from pydantic import Field, TypeAdapter, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    Field,
+    FieldSerializationInfo,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    field_serializer,
+    field_validator,
+    model_validator,
+)
 
 from .model import Array, Model
 from .shots import Obliquity, Shots, Tilt
@@ -19,6 +31,8 @@ from .units import (
     PositiveLength,
     PositiveMass,
     PositiveSpeed,
+    Radians,
+    in_radians,
     quantity,
 )
 
@@ -59,12 +73,14 @@ def check_range(name: str, low: float, high: float) -> None:
     Raises:
         ValueError: says what was reached and what is allowed.
     """
+    read = quantity(QUANTITIES[name].type)
     for value in (low, high):
         try:
-            TypeAdapter(QUANTITIES[name].type).validate_python(float(value))
+            TypeAdapter(QUANTITIES[name].type).validate_python(read.as_read(float(value)))
         except ValidationError as error:
             allowed = error.errors()[0]["msg"].replace("Input should", "it must")
-            raise ValueError(f"reaches {value:.6g}, but {allowed}") from None
+            reached = f"{math.degrees(value):.6g} deg" if read.unit == "rad" else f"{value:.6g}"
+            raise ValueError(f"reaches {reached}, but {allowed}") from None
 
 
 _Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -72,7 +88,7 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Distribution(Model, ABC):
-    """A distribution of one quantity, its parameters in SI and radians."""
+    """A distribution of one quantity; its fields hold SI and radians."""
 
     distribution: str
 
@@ -255,10 +271,23 @@ class Scatter(Model):
                 raise ValueError(f"got a {value.distribution} distribution that {error}") from None
         return value
 
+    @field_serializer("*", mode="wrap")
+    def _as_read(self, value: Any, write: SerializerFunctionWrapHandler, info: FieldSerializationInfo) -> Any:
+        """Angles as they are read again."""
+        written = write(value)
+        if not isinstance(written, dict) or quantity(QUANTITIES[info.field_name].type).unit != "rad":
+            return written
+        mark = in_radians if info.mode == "json" else Radians
+        return {name: part if name in _PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
+
     @property
     def given(self) -> dict[str, Distribution]:
         """The distributions that are given, by name."""
         return {name: value for name, value in self if value is not None}
+
+
+def _marked(value: Any, mark: Callable[[float], Any]) -> Any:
+    return [mark(one) for one in value] if isinstance(value, list | tuple) else mark(value)
 
 
 def _read(read: Any, name: str, value: Any) -> Any:

@@ -8,7 +8,8 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from .files import InputFile, read_columns
 from .model import Array, Model
@@ -17,12 +18,32 @@ from .units import Angle, AngularVelocity, PositiveSpeed
 
 _RIGHT_ANGLE = np.pi / 2
 
-Obliquity = Annotated[Angle, Field(ge=0, lt=_RIGHT_ANGLE)]
-Tilt = Annotated[Angle, Field(gt=-_RIGHT_ANGLE, lt=_RIGHT_ANGLE)]
+_REPLICATES = 16
+"""Unless told otherwise, whatever the count: a larger one keeps the earlier shots. Student's interval over 16 means is
+9 % wider than over very many."""
+
+
+def _is_obliquity(angle: float) -> float:
+    if not 0.0 <= angle < _RIGHT_ANGLE:
+        raise PydanticCustomError("obliquity", "Input should be at least 0 and less than 90 deg")
+    return angle
+
+
+def _is_tilt(angle: float) -> float:
+    if not abs(angle) < _RIGHT_ANGLE:
+        raise PydanticCustomError("tilt", "Input should be greater than -90 and less than 90 deg")
+    return angle
+
+
+Obliquity = Annotated[Angle, AfterValidator(_is_obliquity)]
+Tilt = Annotated[Angle, AfterValidator(_is_tilt)]
+_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 
 
 class Impact(Model):
     """Velocity and attitude at impact, of all shots or, where they scatter, at the median.
+
+    An angle is given in degrees, or as a string with its unit; the fields hold radians.
 
     Attributes:
         velocity: [m/s].
@@ -60,11 +81,11 @@ class Hits(Model):
             "list" (those of `file`).
         count: how many; a grid takes the most that a rectangle of nearly square cells gives.
         seed: of all that is drawn.
-        file: CSV file of a list, with the header hit_y,hit_z in metres; more columns, named as in `Shots` and in SI,
-            override those quantities.
+        file: CSV file of a list, with the header hit_y,hit_z in metres; more columns, named as in `Shots`, override
+            those quantities: angles in degrees, all else in SI.
         repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
         replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
-            two. Their spread tells how certain a mean is; None is 16 for a campaign with a stop rule, else 1.
+            two. Their spread tells how certain a mean is; `scramblings` says what None is.
         area: what the sampling covers: one unit cell, or a plate smaller than it, or all of a finite "plate".
         irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
             each hit there with its images, as many in all as `count` holds, or one hit's.
@@ -96,11 +117,17 @@ class Hits(Model):
 
     @cached_property
     def listed(self) -> dict[str, Array] | None:
-        """Columns of the file by their names, SI, each of shape [hits]; None where there is no file."""
+        """Columns of the file by their names, SI and radians, each of shape [hits]; None where there is no file."""
         if self.file is None:
             return None
         required = ("hit_y", "hit_z")
-        return read_columns(self.file, required, tuple(f.name for f in fields(Shots) if f.name not in required))
+        columns = read_columns(self.file, required, tuple(f.name for f in fields(Shots) if f.name not in required))
+        return {name: np.radians(column) if name in _ANGLES else column for name, column in columns.items()}
+
+    @property
+    def scramblings(self) -> int:
+        """The replicates in force: 16 of a sobol sampling that gives none; 1 of any other sampling."""
+        return self.replicates or (_REPLICATES if self.sampling == "sobol" else 1)
 
     def covered(self, plate: Plate) -> tuple[float, float]:
         """Extent along y and z [m] of what the hits are spread over, about the origin.

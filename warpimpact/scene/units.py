@@ -1,22 +1,25 @@
-"""Quantities: a number is SI, a string carries its unit; inside there are only SI floats."""
+"""Quantities: a number is SI, an angle's degrees, a string carries its unit; inside there are only SI and radians."""
 
 import json
 import math
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
 from numbers import Real
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer
 
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
 """Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", re.DOTALL)
+
+
+class Radians(float):
+    """An angle that was read. A number that a person gives for an angle is degrees; this one stays as it is."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +41,17 @@ class _Quantity:
         if isinstance(value, str):
             number = self._from_text(value)
         elif isinstance(value, Real) and not isinstance(value, bool):
-            number = _float(value)
+            in_degrees = self.unit == "rad" and not isinstance(value, Radians)
+            number = math.radians(_float(value)) if in_degrees else _float(value)
         else:
             raise self._error(value, f"which is not {self.name}")
         if not math.isfinite(number):
             raise self._error(value, "which is not finite")
-        return number
+        return self.as_read(number)
+
+    def as_read(self, number: float) -> float:
+        """A number in SI as a value that is read as it is."""
+        return Radians(number) if self.unit == "rad" else number
 
     def _from_text(self, text: str) -> float:
         if len(text) > MOST_QUOTED:
@@ -65,7 +73,8 @@ class _Quantity:
             raise self._error(text, f"which is not {self.name}") from None
 
     def _error(self, value: object, complaint: str) -> ValueError:
-        in_unit = f" in {self.unit}" if self.unit else ""
+        unit = "deg" if self.unit == "rad" else self.unit
+        in_unit = f" in {unit}" if unit else ""
         return ValueError(
             f'got {quoted(value)}, {complaint}; give a number{in_unit} or a string such as "{self.example}"'
         )
@@ -132,7 +141,12 @@ def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
     return BeforeValidator(_Quantity(name, unit, example))
 
 
-def quantity(kind: Any) -> Callable[[object], float]:
+def in_radians(value: float) -> str:
+    """An angle [rad] as a string that gives every bit of it again."""
+    return f"{float(value)!r} rad"
+
+
+def quantity(kind: Any) -> _Quantity:
     """The reader of one of the types below, or of one that is made of it; its ValueError says what is allowed."""
     validators = (mark.func for mark in kind.__metadata__ if isinstance(mark, BeforeValidator))
     (reader,) = (function for function in validators if isinstance(function, _Quantity))
@@ -155,7 +169,13 @@ Stress = Annotated[float, _quantity("a stress", "Pa", "2600 MPa")]
 Moment = Annotated[float, _quantity("a moment", "N m", "50 N m")]
 Density = Annotated[float, _quantity("a density", "kg/m^3", "7850 kg/m^3")]
 Speed = Annotated[float, _quantity("a speed", "m/s", "825 m/s")]
-Angle = Annotated[float, _quantity("an angle", "rad", "20 deg")]
+Angle = Annotated[
+    float,
+    _quantity("an angle", "rad", "20 deg"),
+    AfterValidator(Radians),
+    PlainSerializer(in_radians, return_type=str, when_used="json"),
+]
+"""A number is degrees; the field holds radians, and JSON says so."""
 AngularVelocity = Annotated[float, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
 Energy = Annotated[float, _quantity("an energy", "J", "10 J")]
 Inertia = Annotated[float, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]

@@ -38,9 +38,9 @@ class Named(NamedTuple):
 
 
 PROMISES = {
-    "draft": Named(Tolerance(residual_velocity=5.0, tilt=math.radians(5.0)), 0),
-    "standard": Named(Tolerance(residual_velocity=1.0, tilt=math.radians(1.0)), 2),
-    "reference": Named(Tolerance(residual_velocity=0.2, tilt=math.radians(0.2)), 4),
+    "draft": Named(Tolerance(residual_velocity=5.0, tilt="5 deg"), 0),
+    "standard": Named(Tolerance(residual_velocity=1.0, tilt="1 deg"), 2),
+    "reference": Named(Tolerance(residual_velocity=0.2, tilt="0.2 deg"), 4),
 }
 
 

@@ -21,6 +21,39 @@ def difference_of_independent(one: Estimate, other: Estimate) -> tuple[float, fl
     return difference - below, difference + above
 
 
+def difference_numbers(one: Array, other: Array) -> Array:
+    """Numbers whose mean tells the difference of two means, of which the first shots are common to both.
+
+    Let the first have m shots beyond the n common ones. The difference is the mean of a − b over n, plus c times what
+    the m say beyond the n, mean(a over m) − mean(a over n). No c gives a bias; c = β·m/(n + m) gives the least
+    variance, where β is the slope of a − b against a. So the more the common shots have in common, the less the others
+    count (double sampling with regression: W. G. Cochran, Sampling Techniques, 3rd edition, 1977, section 12.6).
+
+    Args:
+        one, other: NaN where a shot does not count, shape [shots] each; number k of both belongs to shot k.
+
+    Returns:
+        As many numbers as the longer one has, NaN where a shot does not count.
+    """
+    if len(one) < len(other):
+        return -difference_numbers(other, one)
+    both, numbers = len(other), np.full(len(one), np.nan)
+    apart = one[:both] - other
+    common, more = np.isfinite(apart), np.isfinite(one[both:])
+    if not more.any() or not common.any():
+        numbers[:both] = apart
+        return numbers
+    a, n, m = one[:both][common], int(common.sum()), int(more.sum())
+    slope = 0.0 if np.ptp(a) == 0.0 else float(np.clip(np.cov(apart[common], a, ddof=0)[0, 1] / a.var(), 0.0, 1.0))
+    c, extra = slope * m / (n + m), one[both:][more]
+    within = apart[common] - c * a
+    difference = within.mean() + c * extra.mean()
+    # Each part about its own mean: the variance of the whole is then that of the two means.
+    numbers[:both][common] = difference + (n + m) / n * (within - within.mean())
+    numbers[both:][more] = difference + (n + m) / m * c * (extra - extra.mean())
+    return numbers
+
+
 def confidence_of_each(together: float, count: int) -> float:
     """Confidence of each of `count` intervals, so that all of them hold with the confidence `together` (Bonferroni)."""
     return 1.0 - (1.0 - together) / max(1, count)
@@ -51,13 +84,13 @@ class Ratio(NamedTuple):
             return cls(mean)
         ratio, low, high = (number / mean for number in (estimate.value, estimate.low, estimate.high))
         if np.ptp(known) > 0.0 and not math.isnan(low):
-            linear = estimate_of("mean", _linearised(numbers, reference, ratio), **dealt)
+            linear = estimate_of("mean", ratio_numbers(numbers, reference, ratio), **dealt)
             low, high = linear.low, linear.high
         return cls(mean, ratio, low, high)
 
 
-def _linearised(numbers: Array, reference: Array, ratio: float) -> Array:
-    """Numbers per shot whose mean is the ratio of two means, with its error to first order (the delta method).
+def ratio_numbers(numbers: Array, reference: Array, ratio: float) -> Array:
+    """Numbers of the shots whose mean is the ratio of two means, with its error to first order (the delta method).
 
     Number k of the reference belongs to shot k. If the reference has fewer numbers, each of them has a larger weight.
     """

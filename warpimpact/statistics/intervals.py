@@ -92,7 +92,7 @@ class Dealt:
         Journal of the American Statistical Association 47 (1952) 635). Quantiles of single replicates would be biased.
         """
         replicates = [sample for sample in self._replicates if sample.count]
-        if len(replicates) < 2:
+        if len(replicates) < 2 or all(sample.count <= self._images for sample in replicates):  # independent shots
             return None
         quantile = self._kind == "quantile"
         answers = [float((one.values <= value).mean()) if quantile else one.mean for one in replicates]
@@ -100,6 +100,8 @@ class Dealt:
         # Equal shares in all replicates (mostly 0) say nothing about the uncertainty.
         if half == 0.0 and self._kind != "mean":
             return None
+        if self._kind == "share":
+            return max(0.0, value - half), min(1.0, value + half)
         if not quantile:
             return value - half, value + half
         ends = (self._share - half, self._share + half)

@@ -91,3 +91,12 @@ def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
     shown = capsys.readouterr().out
     assert "300 of 300 shots failed" in shown
     assert sum(" unfinished " in line for line in shown.splitlines()) == 300
+
+
+def test_quantiles_are_named_and_no_interval_is_nan(make_result) -> None:
+    text = inspect_text(make_result(20))
+    assert "5 % quantile" in text
+    assert "95 % quantile" in text
+    assert "below" not in text
+    assert "at most " in text  # of 20 hits none is sure to lie below the 5 % quantile
+    assert "nan" not in text

@@ -1,5 +1,6 @@
 """A replayed hit ends with the bits of the stored one, and its history is consistent with that end."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ HOLES = Plate(
     degradation=0.8,
     pattern=CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3)),
 )
-STRAIGHT, SLANTED = Impact(velocity=825.0), Impact(velocity=600.0, obliquity=0.3, azimuth=0.7, yaw=0.1, spin=1e4)
+STRAIGHT, SLANTED = Impact(velocity=825.0), Impact(velocity=600.0, obliquity=17, azimuth=40, yaw=6, spin=1e4)
 DRAFT = Numerics(fidelity="draft")
 
 
@@ -53,7 +54,7 @@ def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
         (SLANTED, Numerics(fidelity="draft", precision="double"), HOLES, Status.PERFORATED),
         (SLANTED, Numerics(scheme="nodal", grid_spacing=5e-5), HOLES, Status.PERFORATED),
         (STRAIGHT, DRAFT, HOLES.model_copy(update={"resistance": 1e11}), Status.ARRESTED),
-        (Impact(velocity=300.0, obliquity=1.3), DRAFT, HOLES, Status.RICOCHETED),
+        (Impact(velocity=300.0, obliquity=75), DRAFT, HOLES, Status.RICOCHETED),
     ],
     ids=["straight", "slanted", "double", "nodal", "arrested", "grazing"],
 )
@@ -204,3 +205,15 @@ def test_command_writes_history_and_figures(
         assert main(again) == 2
         assert sentence in capsys.readouterr().err
     assert not (tmp_path / "a_hit9.nc").exists()
+
+
+def test_a_result_of_another_default_of_the_replicates_keeps_its_hits() -> None:
+    """The text of a campaign says nothing of them, the result does."""
+    former = campaign(hits=Hits(count=32, replicates=1))
+    result = run(former, device="cpu")
+    text = json.loads(former.text)
+    del text["hits"]["replicates"]
+    result.attrs["campaign"] = json.dumps(text)
+    assert replay(result, 20, folder=NOWHERE).attrs["agreement"] == "bit-identical"
+    del result.attrs["replicates"]  # as of the first version
+    assert replay(result, 20, folder=NOWHERE).attrs["agreement"] == "bit-identical"

@@ -16,6 +16,7 @@ from warpimpact.campaign.run import Interrupted, Standing, _Held, _Watch, run, r
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
+from warpimpact.statistics.intervals import estimate_of
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -166,3 +167,20 @@ def test_a_rule_that_is_never_met_ends_at_its_largest_count(tmp_path: Path) -> N
     assert dataset.sizes["hit"] == 600
     assert dataset.attrs["stop_reason"] == "max_count"
     assert "max_count ended it" in summary_text(dataset)
+
+
+@pytest.mark.parametrize("text", TRUTHS)
+def test_intervals_of_a_campaign_that_says_nothing_of_replicates_hold(text: str, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(SLOTTED_PLATE.replace("count = 4096", "count = 1024"), encoding="utf-8")
+    scene = Campaign.from_toml(tmp_path / "a.toml")
+    held = 0
+    for seed in range(TRIALS):
+        reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
+        tally = Tally(Measure.parse(text), replicates=reseeded.replicates)
+        tally.add(shard_of(surface(reseeded, 0, 1024)))
+        estimate = tally.estimate()
+        held += estimate.low <= TRUTHS[text] <= estimate.high
+        independent = estimate_of("mean", surface(reseeded, 0, 1024))
+        if text.startswith("mean"):
+            assert estimate.half_width < 0.5 * independent.half_width
+    assert held >= LEAST

@@ -110,7 +110,7 @@ def test_unfolded_equals_computed(
 
 def test_a_scene_without_symmetry_is_computed_whole(computed: list[int]) -> None:
     rimmed = campaign().plate.model_copy(update={"size": (40e-3, 40e-3)})
-    result = run(campaign(plate=rimmed, impact=Impact(velocity=825.0, pitch=0.1, yaw=0.1), count=4), device="cpu")
+    result = run(campaign(plate=rimmed, impact=Impact(velocity=825.0, pitch=5, yaw=5), count=4), device="cpu")
     assert computed == [4]
     assert result.attrs["symmetries"] == "(y, z)"
     assert result.attrs["computed_hits"] == 4
@@ -199,7 +199,7 @@ def test_the_command_tells_what_was_computed(
         assert main(["replay", "a.nc", "--hit", "63", "--overwrite"]) == 0
         assert "The end is bit-identical to the stored outcome.\n" in capsys.readouterr().out
     rim = '[plate]\nsize = ["40 mm", "40 mm"]'
-    Path("a.toml").write_text(text.replace('"825 m/s"', '"825 m/s"\npitch = 0.1\nyaw = 0.1').replace("[plate]", rim))
+    Path("a.toml").write_text(text.replace('"825 m/s"', '"825 m/s"\npitch = 5\nyaw = 5').replace("[plate]", rim))
     assert main(["run", "a.toml", "--count", "4", "--device", "cpu", "--overwrite"]) == 0
     assert "all 4 hits computed: plate and shot have no symmetry in common" in capsys.readouterr().out
 

@@ -31,7 +31,7 @@ def history_of(resistance: float = 2.6e9, standoff_point: str = "centre_of_mass"
             pattern=CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3)),
             size=(40e-3, 60e-3),
         ),
-        impact=Impact(velocity=600.0, obliquity=0.3, azimuth=0.7),
+        impact=Impact(velocity=600.0, obliquity=17, azimuth=40),
         hits=Hits(count=2),
         numerics=Numerics(fidelity="draft"),
         output={"standoffs": (0.05, 0.13), "standoff_point": standoff_point},
@@ -144,7 +144,7 @@ def test_course_shows_what_the_history_holds(history: xarray.Dataset) -> None:
     np.testing.assert_allclose(np.transpose(shown["change of velocity [m/s]"]), change)
     np.testing.assert_allclose(shown["rotational energy [J]"][0], history["rotational_energy"])
     yaw, _ = shown["angle of the axis [°]"]
-    assert yaw[0] == pytest.approx(np.degrees(np.arctan(np.tan(0.3) * np.cos(0.7))), abs=0.1)
+    assert yaw[0] == pytest.approx(np.degrees(np.arctan(np.tan(np.radians(17)) * np.cos(np.radians(40)))), abs=0.1)
 
 
 def test_plate_is_shown_at_every_snapshot_with_holes_left_out(history: xarray.Dataset) -> None:

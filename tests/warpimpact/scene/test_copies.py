@@ -22,10 +22,12 @@ from warpimpact import (
     run,
 )
 from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.former import in_present_terms
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run_to_file
 from warpimpact.results import files
+from warpimpact.results.files import ResultError
 from warpimpact.scene import Hits, NoPattern, Tolerance
 from warpimpact.scene.model import Model
 
@@ -136,7 +138,7 @@ def test_a_pattern_keeps_no_rim_of_another_plate() -> None:
 
 
 def test_what_was_not_given_is_not_given_in_a_copy() -> None:
-    numerics = Numerics(tolerance=Tolerance(tilt=0.01)).model_copy(update={"precision": "double"})
+    numerics = Numerics(tolerance=Tolerance(tilt="0.01 rad")).model_copy(update={"precision": "double"})
     assert numerics.model_dump() == {"tolerance": {"tilt": 0.01}, "precision": "double"}
 
 
@@ -216,3 +218,84 @@ def test_a_campaign_changed_to_what_cannot_be_is_refused(folder: Path) -> None:
     (folder / "hits.csv").unlink()
     with pytest.raises(CampaignError, match=r"text: hits.file: got .*hits.csv\", but there is no file"):
         Campaign.from_text(changed.text, name="text", folder=folder)
+
+
+ANGLES = """\
+title = "angles"
+core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g" }
+numerics = { tolerance = { tilt = 1 } }
+stop = { quantity = "mean(tilt@130mm)", half_width = 2, max_count = 64 }
+hits = { seed = 1 }
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+[plate.pattern]
+shape = "square"
+side = "2 mm"
+spacing = ["8 mm", "8 mm"]
+rotation = 20
+holes = [[0, 0, 10], ["3 mm", "3 mm", "0.2 rad"]]
+[impact]
+velocity = 825
+obliquity = 30
+azimuth = "0.5 rad"
+pitch = { distribution = "normal", mean = 1, std = 0.5 }
+yaw = { distribution = "discrete", values = [0, 2], weights = [1, 3] }
+"""
+
+
+def test_numbers_of_angles_are_degrees_and_their_text_gives_them_again() -> None:
+    campaign = Campaign.from_text(ANGLES, name="angles", folder=Path())
+    assert campaign.impact.obliquity == pytest.approx(np.radians(30))
+    assert campaign.impact.azimuth == 0.5
+    assert campaign.plate.pattern.rotation == pytest.approx(np.radians(20))
+    assert [hole.rotation for hole in campaign.plate.pattern.holes] == pytest.approx([np.radians(10), 0.2])
+    assert campaign.numerics.tolerance.tilt == pytest.approx(np.radians(1))
+    assert campaign.stop.half_width == pytest.approx(np.radians(2))
+    assert campaign.scatter.pitch.std == pytest.approx(np.radians(0.5))
+    assert campaign.scatter.yaw.values == pytest.approx((0.0, np.radians(2)))
+    assert campaign.scatter.yaw.weights == (1, 3)
+    assert (campaign.impact.pitch, campaign.impact.yaw) == pytest.approx((np.radians(1), np.radians(2)))  # the medians
+    changed = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"thickness": 3e-3})})
+    again = Campaign.from_text(changed.text, name="text", folder=Path())
+    assert again == changed
+    assert again.plate.pattern == campaign.plate.pattern
+    assert again.stop == campaign.stop
+    for model in (campaign.impact, campaign.plate.pattern, campaign.scatter, campaign.stop, campaign.numerics):
+        assert model.model_copy() == model
+        assert type(model).model_validate(model.model_dump()) == model
+
+
+def test_a_result_of_the_first_version_keeps_its_radians(folder: Path) -> None:
+    """It took numbers of angles for radians, and did not say so."""
+    text = HEAD + "[impact]\nvelocity = 825\nobliquity = 0.3\n[hits]\ncount = 2\n"
+    campaign = Campaign.from_text(text.replace("0.3", '"0.3 rad"'), name="text", folder=folder)
+    result = run(campaign, device="cpu")
+    del result.attrs["campaign_angles"]
+    result.attrs["campaign"] = text
+    assert replay(result, 1, folder=folder).attrs["agreement"] == "bit-identical"
+    result.attrs["campaign_angles"] = "degree"
+    with pytest.raises(ResultError, match="whose shot is no longer what the campaign"):
+        replay(result, 1, folder=folder)
+
+
+def test_every_angle_of_a_former_text_is_marked() -> None:
+    text = ANGLES.replace("obliquity = 30", "obliquity = 0.3").replace("mean = 1, std = 0.5", "mean = 0.1, std = 0.05")
+    text = text.replace("values = [0, 2]", "values = [0, 0.2]")
+    campaign = Campaign.from_text(in_present_terms(text, "text"), name="text", folder=Path())
+    assert (campaign.impact.obliquity, campaign.impact.azimuth) == (0.3, 0.5)
+    assert (campaign.impact.pitch, campaign.scatter.pitch.std) == (0.1, 0.05)
+    assert (campaign.scatter.yaw.values, campaign.scatter.yaw.weights) == ((0.0, 0.2), (1, 3))
+    assert campaign.plate.pattern.rotation == 20
+    assert campaign.plate.pattern.holes[0].rotation == 10
+    assert campaign.numerics.tolerance.tilt == 1
+    assert campaign.stop.half_width == 2
+
+
+def test_angles_of_a_hit_list_are_degrees(folder: Path) -> None:
+    (folder / "hits.csv").write_text("hit_y,hit_z,obliquity\n0,0,90\n")
+    with pytest.raises(CampaignError, match="column obliquity that reaches 90 deg, but it must be at least 0 and less"):
+        read(folder, LISTED)
+    oblique = PLAIN.replace("[impact]\n", '[impact]\nobliquity = "90 deg"\n')
+    with pytest.raises(CampaignError, match=r'impact.obliquity: got "90 deg", but it must be at least 0 and less than'):
+        read(folder, oblique)

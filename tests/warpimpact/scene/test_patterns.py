@@ -171,7 +171,7 @@ def test_areas_are_exact(pattern: LatticePattern, area: float) -> None:
         (CirclePattern(diameter="9 mm", spacing=[12.5 * MM * math.sqrt(0.75), 12.5 * MM], staggered=True), 3.5 * MM),
         # Across the corner of the cell.
         (CirclePattern(diameter=4 * MM, spacing=(4 * MM, 6 * MM), staggered=True), 1 * MM),
-        (SquarePattern(side=4 * MM, rotation=math.pi / 4, spacing=(7 * MM, 9 * MM)), (7 - 4 * math.sqrt(2)) * MM),
+        (SquarePattern(side=4 * MM, rotation=45, spacing=(7 * MM, 9 * MM)), (7 - 4 * math.sqrt(2)) * MM),
         # Corner to corner, both rounded: each is a square of 3 mm and half a millimetre around it.
         (
             SquarePattern(side=4 * MM, corner_radius=0.5 * MM, spacing=(6 * MM, 11 * MM), staggered=True),
@@ -253,7 +253,10 @@ def lattices(draw: st.DrawFn) -> LatticePattern:
     """Any shape, turned, twice in a cell: each within a circle of 6 mm, and these 0.5 mm apart or more."""
     shape = draw(SHAPES)
     offset = draw(st.floats(-4 * MM, 4 * MM))
-    holes = [[offset, 0.0, draw(TURNS)], [offset + 8 * MM, draw(st.floats(-9 * MM, 9 * MM)), draw(TURNS)]]
+    holes = [
+        [offset, 0.0, math.degrees(draw(TURNS))],
+        [offset + 8 * MM, draw(st.floats(-9 * MM, 9 * MM)), math.degrees(draw(TURNS))],
+    ]
     spacing = (16 * MM, draw(st.floats(6.5 * MM, 9 * MM)))
     return type(shape).model_validate(shape.model_dump() | {"spacing": spacing, "holes": holes})
 
@@ -273,7 +276,7 @@ def test_a_ligament_is_the_least_distance_between_points_of_two_outlines(pattern
 @settings(deadline=None, max_examples=25)
 @given(shape=SHAPES, turn=TURNS)
 def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) -> None:
-    turned = type(shape).model_validate(shape.model_dump() | {"rotation": turn})
+    turned = type(shape).model_validate(shape.model_dump() | {"rotation": math.degrees(turn)})
     y, z = np.random.default_rng(4).uniform(-3 * MM, 3 * MM, (2, 2000))
     cosine, sine = math.cos(turn), math.sin(turn)
     clear = ~shape.has_edge(y, z, 1e-9)  # elsewhere rounding decides
@@ -305,7 +308,7 @@ def test_symmetry_is_what_the_holes_say(pattern: LatticePattern, along: tuple[in
     if pattern.is_symmetric(*along, centred=centred):
         assert np.mean(image != pattern.is_hole(y, z)) < 1e-3
     elif same:
-        assert not pattern.model_copy(update={"rotation": 0.1}).is_symmetric(*along, centred=centred)
+        assert not pattern.model_copy(update={"rotation": 5}).is_symmetric(*along, centred=centred)
 
 
 def two_slots(*turns: float, **changes: Any) -> SlotPattern:
@@ -317,11 +320,11 @@ def two_slots(*turns: float, **changes: Any) -> SlotPattern:
     ("pattern", "expected"),
     [
         (two_slots(0, 0), {(1, -1), (-1, 1), (-1, -1), "centred"}),
-        (two_slots(0, math.pi), {(1, -1), (-1, 1), (-1, -1), "centred"}),  # half a turn does not change a slot
-        (two_slots(0, 1e-4), {(-1, -1)}),
-        (two_slots(0.3, 0.3), {(-1, -1), "centred"}),
-        (two_slots(0.3, -0.3), {(-1, -1)}),  # and glides, which are no mirror images
-        (two_slots(0.3, -0.3, holes=[[0, 0, 0.3], [8 * MM, 0, -0.3]]), {(-1, -1)}),
+        (two_slots(0, 180), {(1, -1), (-1, 1), (-1, -1), "centred"}),  # half a turn does not change a slot
+        (two_slots(0, 0.01), {(-1, -1)}),
+        (two_slots(17, 17), {(-1, -1), "centred"}),
+        (two_slots(17, -17), {(-1, -1)}),  # and glides, which are no mirror images
+        (two_slots(17, -17, holes=[[0, 0, 17], [8 * MM, 0, -17]]), {(-1, -1)}),
         (two_slots(0, 0, holes=[[0, 0], [8 * MM - 1e-6, 1e-6]]), set()),
         (UP_AND_DOWN, {(-1, 1)}),
     ],

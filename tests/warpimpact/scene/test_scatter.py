@@ -103,7 +103,7 @@ def test_columns_of_a_list_override(tmp_path: Path) -> None:
     hits = Hits(sampling="list", file=tmp_path / "hits.csv", seed=2, repeats=2)
     shots = Sampler(Impact(velocity=820, yaw=0.3), hits, PLATE, SCATTER).shots(0, 4)
     assert shots.velocity.tolist() == [700.0, 710.0] * 2
-    assert shots.yaw.tolist() == [0.1, 0.2] * 2
+    assert shots.yaw.tolist() == pytest.approx(np.radians([0.1, 0.2] * 2), rel=1e-15)  # a list has degrees
     assert len(np.unique(shots.obliquity)) == 4
 
 

@@ -64,7 +64,7 @@ def test_what_cannot_be_is_refused(changes: dict[str, Any], complaint: str) -> N
 def test_simulate_gives_what_a_campaign_of_the_same_scene_gives() -> None:
     assert warpimpact.simulate is simulate
     standoffs, numerics = (0.05, 0.13), Numerics(fidelity="draft")
-    impact, hits = Impact(velocity=825.0, obliquity=0.2), Hits(count=4)
+    impact, hits = Impact(velocity=825.0, obliquity=12), Hits(count=4)
     campaign = Campaign(title="", core=CORE, plate=PLATE, impact=impact, hits=hits, numerics=numerics)
     scene = Scene(core=CORE, target=PLATE, record=Record(standoffs=standoffs))
     outcomes = simulate(scene, make_shots(impact, hits, PLATE), numerics=numerics, device="cpu")

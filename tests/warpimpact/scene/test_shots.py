@@ -2,12 +2,13 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from warpimpact.scene import CirclePattern, Hits, Impact, Plate, make_shots
+from warpimpact.scene import CirclePattern, Hits, Impact, Plate, Sampler, make_shots
 
 PERIOD = (16e-3, 8e-3)
 CELL = Plate(thickness="4 mm", resistance=1e9, pattern=CirclePattern(diameter="5 mm", spacing=PERIOD))
@@ -37,7 +38,7 @@ def test_hits_fill_the_cell_around_the_origin(sampling: str) -> None:
 
 
 def test_sobol_points_are_a_net() -> None:
-    points = _points(sampling="sobol", count=1024, seed=7) / PERIOD
+    points = _points(sampling="sobol", count=1024, seed=7, replicates=1) / PERIOD
     strips = np.histogram2d(*points.T, bins=32, range=[[-0.5, 0.5]] * 2)[0]
     assert (strips == 1).all()  # a (0, 10, 2)-net: one point in each of 32 × 32 cells
 
@@ -128,3 +129,37 @@ def test_shots_cover_the_cell_or_a_smaller_plate() -> None:
 def test_an_impossible_impact_is_refused(field: str, value: object) -> None:
     with pytest.raises(ValidationError, match=f"{field}\n  Input should be"):
         Impact(**{"velocity": 825, field: value})
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "allowed"),
+    [
+        ("obliquity", "90 deg", "at least 0 and less than 90 deg"),
+        ("obliquity", 90, "at least 0 and less than 90 deg"),
+        ("yaw", "-1.6 rad", "greater than -90 and less than 90 deg"),
+    ],
+)
+def test_an_angle_is_answered_in_degrees(field: str, value: object, allowed: str) -> None:
+    with pytest.raises(ValidationError, match=f"Input should be {allowed}"):
+        Impact(**{"velocity": 825, field: value})
+
+
+@pytest.mark.parametrize(
+    ("hits", "scramblings"),
+    [
+        ({"count": 3}, 16),
+        ({"count": 4096, "replicates": 1}, 1),
+        ({"count": 4096, "replicates": 8}, 8),
+        ({"count": 4096, "sampling": "random"}, 1),
+        ({"count": 4096, "sampling": "grid"}, 1),
+    ],
+)
+def test_a_sobol_sampling_has_replicates_unless_told_otherwise(hits: dict[str, Any], scramblings: int) -> None:
+    assert Hits(**hits).scramblings == scramblings
+
+
+def test_shots_made_in_python_are_those_of_a_campaign() -> None:
+    impact, hits = Impact(velocity=825), Hits(count=64, seed=2)
+    np.testing.assert_array_equal(
+        make_shots(impact, hits, SOLID).hit_y, Sampler(impact, hits, SOLID, None, 16).shots(0, 64).hit_y
+    )

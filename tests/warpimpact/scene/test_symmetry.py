@@ -174,7 +174,7 @@ def test_hits_come_in_whole_orbits(sampling: str) -> None:
 
 
 def test_sobol_hits_fill_the_cell_evenly() -> None:
-    shots = make_shots(STRAIGHT, HITS, plate(SLOTS))
+    shots = make_shots(STRAIGHT, HITS.model_copy(update={"replicates": 1}), plate(SLOTS))
     boxes = np.histogram2d(shots.hit_y, shots.hit_z, bins=16, range=[[-8 * MM, 8 * MM]] * 2)[0]
     assert (boxes == 4).all()
 
@@ -191,7 +191,7 @@ def test_a_grid_is_the_grid_of_the_whole_cell() -> None:
 
 
 def test_without_a_symmetry_the_hits_are_the_plain_ones() -> None:
-    skew, rimmed = Impact(velocity=825, pitch=0.1, yaw=0.1), plate(SLOTS, size=[40 * MM, 40 * MM])
+    skew, rimmed = Impact(velocity=825, pitch=5, yaw=5), plate(SLOTS, size=[40 * MM, 40 * MM])
     plain = make_shots(skew, HITS.model_copy(update={"irreducible": False}), rimmed)
     assert symmetries_used(skew, HITS, rimmed) == (IDENTITY,)
     asked = make_shots(skew, HITS, rimmed)

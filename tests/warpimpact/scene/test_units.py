@@ -23,6 +23,8 @@ from warpimpact.scene import units
         (units.Density, "7.85e0 g/cm^3", 7850.0),
         (units.Speed, "825 m/s", 825.0),
         (units.Angle, "180 deg", math.pi),
+        (units.Angle, 180, math.pi),
+        (units.Angle, "0.1 rad", 0.1),
         (units.AngularVelocity, "60 rpm", 2 * math.pi),
         (units.Inertia, "1.5 g cm^2", 1.5e-7),
         (units.Number, "5 %", 0.05),
@@ -58,6 +60,14 @@ def test_what_is_no_length_is_refused(given: object, complaint: str) -> None:
     assert str(caught.value.errors()[0]["ctx"]["error"]) == f"{complaint}; {advice}"
 
 
-def test_an_angle_needs_its_unit() -> None:
-    with pytest.raises(ValidationError, match="has no unit"):
+def test_an_angle_needs_its_unit_where_it_is_text() -> None:
+    with pytest.raises(ValidationError, match='"20", which has no unit; give a number in deg or a string such as'):
         TypeAdapter(units.Angle).validate_python("20")
+
+
+def test_an_angle_that_was_read_is_not_read_again() -> None:
+    angle = TypeAdapter(units.Angle)
+    once = angle.validate_python(20)
+    assert angle.validate_python(once) == once == pytest.approx(math.radians(20))
+    assert angle.validate_json(angle.dump_json(once)) == once
+    assert angle.validate_python(angle.dump_python(once)) == once

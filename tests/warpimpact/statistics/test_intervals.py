@@ -35,3 +35,20 @@ def test_differences_of_rare_shares_are_not_certain() -> None:
         drawn = numbers.choice([-1.0, 0.0, 1.0], p=[0.01, 0.96, 0.03], size=200)
         held += (told := estimate_of("difference", drawn)).low <= 0.02 <= told.high
     assert held >= LEAST
+
+
+def test_the_share_of_replicates_stays_between_0_and_1() -> None:
+    values = np.zeros(64)
+    values[:3] = 1.0  # three of sixteen replicates
+    estimate = estimate_of("share", values, replicates=16)
+    assert estimate.low == 0.0
+    assert estimate.high > estimate.value
+    assert estimate_of("share", 1.0 - values, replicates=16).high == 1.0
+
+
+@pytest.mark.parametrize("kind", ["mean", "share", "quantile"])
+def test_replicates_of_one_shot_each_are_independent_shots(kind: str) -> None:
+    values = np.random.default_rng(1).integers(0, 2, 10).astype(float)
+    assert estimate_of(kind, values, replicates=16) == estimate_of(kind, values)
+    images = np.repeat(values, 4)
+    assert estimate_of(kind, images, replicates=16, images=4) == estimate_of(kind, images, images=4)

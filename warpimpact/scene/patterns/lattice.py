@@ -40,7 +40,7 @@ class LatticePattern(Pattern):
         staggered: shifts every odd row of cells along y by b/2 along z.
         holes: places of the holes in a cell, each with an optional rotation in addition to `rotation`; by default one
             hole on the origin.
-        rotation: rotation of every hole from +y towards +z [rad].
+        rotation: rotation of every hole from +y towards +z, given in degrees or with its unit [rad].
     """
 
     spacing: tuple[PositiveLength, PositiveLength]
