@@ -24,6 +24,7 @@ from warpimpact.results.dataset import failed, images
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Shots
+from warpimpact.solver.promise import Promise
 from warpimpact.statistics.intervals import Estimate
 from warpimpact.statistics.stopping import looks
 
@@ -42,6 +43,7 @@ class Standing:
         resumed: shots that an earlier run had done.
         failed: shots whose computation failed.
         estimates: running estimates of the main quantities, over the shots from the first on without a gap.
+        promise: the finding of the pilot; None if the campaign fixes the resolution.
     """
 
     done: int
@@ -49,6 +51,7 @@ class Standing:
     resumed: int
     failed: int
     estimates: dict[Measure, Estimate]
+    promise: Promise | None = None
 
 
 Follow = Callable[[Standing], None]
@@ -187,7 +190,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     for index in sorted(store.saved):
         watch.add(index, store.load(index))
     watch.resumed = watch.done
-    promise = promise_in(store.load(min(store.saved))) if store.saved else team.pilot()
+    watch.promise = promise = promise_in(store.load(min(store.saved))) if store.saved else team.pilot()
     tasks = _tasks(store, len(sampler), team.task)
     waiting: dict[Future[xarray.Dataset], range] = {}
     try:
@@ -272,6 +275,7 @@ class _Watch:
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
         self.end: _End | None = None
+        self.promise: Promise | None = None
 
     def add(self, index: int, shard: xarray.Dataset) -> None:
         """Take in a shard that the store has; one that comes before its turn is loaded when that is."""
@@ -320,7 +324,7 @@ class _Watch:
         tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
         estimates = {tally.measure: tally.estimate() for tally in tallies if tally.measure.kind != "quantile"}
         done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
-        return Standing(done, self._total, self.resumed, self.failed, estimates)
+        return Standing(done, self._total, self.resumed, self.failed, estimates, self.promise)
 
 
 def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:

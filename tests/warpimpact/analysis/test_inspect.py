@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpimpact import Campaign
+from warpimpact import Campaign, run
 from warpimpact.analysis.inspect import failures, inspect_text
 from warpimpact.campaign.run import run_to_file
 from warpimpact.cli import main
@@ -100,3 +100,23 @@ def test_quantiles_are_named_and_no_interval_is_nan(make_result) -> None:
     assert "below" not in text
     assert "at most " in text  # of 20 hits none is sure to lie below the 5 % quantile
     assert "nan" not in text
+
+
+def test_the_accuracy_is_told(result: Path) -> None:
+    lines = inspect_text(files.read(result)).splitlines()
+    (accuracy,) = (line for line in lines if line.startswith("accuracy"))
+    assert "draft keeps its promise (5 m/s and 5 deg for 90 % of the hits); estimated errors: " in accuracy
+
+
+def test_hits_that_miss_their_tolerance_are_counted_and_the_worst_are_named() -> None:
+    numerics = '[numerics]\ntolerance = { residual_velocity = "1e-6 m/s" }\n'
+    text = DRAFT.partition("[numerics]")[0].replace("count = 512", "count = 16") + numerics
+    dataset = run(Campaign.from_text(text, name="t", folder=Path()), device="cpu")
+    lines = inspect_text(dataset).splitlines()
+    place = lines.index("16 of 16 hits did not reach the tolerance at the finest level")
+    errors = dataset["residual_velocity_error"].values
+    worst = int(errors.argmax())
+    assert lines[place + 1].startswith(f"  hit {worst}: estimated errors {errors[worst]:.2g} m/s and ")
+    assert lines[place + 5].startswith("  hit ")
+    assert not lines[place + 6].startswith("  hit ")
+    assert "accuracy    promises nothing, as numerics.tolerance is given" in lines

@@ -1,13 +1,17 @@
 """Progress: plain lines in a log, a bar on a terminal, both with estimates and failed shots."""
 
 import io
+import math
 import sys
+from dataclasses import replace
 
 import pytest
 
 from warpimpact.campaign.run import Standing
 from warpimpact.cli.progress import show_standing
 from warpimpact.results.measures import Estimate, Measure
+from warpimpact.solver.promise import Promise
+from warpimpact.solver.resolution import LADDER
 
 
 def standing(done: int, *, failed: int = 0, resumed: int = 100) -> Standing:
@@ -66,3 +70,15 @@ def test_a_terminal_gets_a_bar_that_counts_what_was_resumed_as_done(monkeypatch:
     assert "hit/s" in last
     assert "mean(residual_velocity) 731.25 ± 0.75 m/s" in last
     assert "3 failed" in last
+
+
+def test_a_line_tells_the_accuracy_that_the_pilot_found(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+    for kept, end in (
+        (True, "for 90 % of the hits, 0 failed"),
+        (False, "for 90 % of the hits, not as promised, 0 failed"),
+    ):
+        promise = Promise(LADDER[2], kept, 0.42, math.radians(0.7))
+        with show_standing() as show:
+            clock[0] += 1.0
+            show(replace(standing(400), promise=promise))
+        assert capsys.readouterr().err.splitlines()[0].endswith(f"accuracy 0.42 m/s and 0.7 deg {end}")
