@@ -13,7 +13,7 @@ from warpimpact import __version__
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
-from .mistakes import mistakes
+from .mistakes import implausible_told, mistakes
 from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
@@ -38,7 +38,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     than the campaign allows, 130 when interrupted."""
     arguments = _parser().parse_args(argv)
     try:
-        code: int | None = arguments.command(arguments)
+        with implausible_told():
+            code: int | None = arguments.command(arguments)
     except KeyboardInterrupt as interrupt:
         print(f"warpimpact: {str(interrupt) or 'interrupted'}", file=sys.stderr)
         return 130
