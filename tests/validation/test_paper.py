@@ -7,7 +7,9 @@ import pytest
 import xarray
 
 from warpimpact import Campaign, run
-from warpimpact.analysis.paper import PUBLISHED, computed_row, validation_table
+from warpimpact.analysis.paper import PUBLISHED, check_scene, computed_row, validation_table
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.cli import main
 
 
 @pytest.fixture(scope="module")
@@ -30,3 +32,40 @@ def test_the_table_shows_every_source_and_the_difference(paper_shots: xarray.Dat
             assert f"  {source:26}{row.residual_velocity:9.1f}" in table
     difference = computed_row(paper_shots, 0).residual_velocity - 746
     assert f"{difference:+9.1f}" in table
+
+
+CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
+PAPER = (CAMPAIGNS / "paper_shots.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("change", "difference"),
+    [
+        (('thickness = "4 mm"', 'thickness = "6 mm"'), "plate.thickness is 0.006 here and 0.004 there"),
+        (("825 m/s", "820 m/s"), "impact.velocity is 820.0 here and 825.0 there"),
+        (('mass = "4 g"', 'mass = "5 g"'), "core.mass is 0.005 here and 0.004 there"),
+        (('width = "4 mm"', 'width = "5 mm"'), "plate.pattern.width is 0.005 here and 0.004 there"),
+        (
+            ('sampling = "list"\nfile = "paper_shots.csv"', "count = 2"),
+            'hits.sampling is "sobol" here and "list" there',
+        ),
+        (('"130 mm"]', '"140 mm"]'), "output.standoffs is [0.05, 0.14] here and [0.05, 0.13] there"),
+    ],
+)
+def test_only_the_papers_scene_is_set_beside_the_paper(change: tuple[str, str], difference: str) -> None:
+    assert change[0] in PAPER
+    other = Campaign.from_text(PAPER.replace(*change), name="other", folder=CAMPAIGNS)
+    with pytest.raises(CampaignError) as caught:
+        check_scene(other, "other.toml")
+    assert str(caught.value).startswith("other.toml: is not the paper's scene")
+    assert difference in str(caught.value)
+
+
+def test_what_the_paper_does_not_publish_may_differ() -> None:
+    text = PAPER.replace('"7.1 mm"', '"8 mm"').replace("staggered = false", "staggered = true").replace("1 us", "2 us")
+    check_scene(Campaign.from_text(text, name="lattice", folder=CAMPAIGNS), "lattice")
+
+
+def test_another_campaign_computes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", str(CAMPAIGNS / "slotted_plate.toml")]) == 2
+    assert "slotted_plate.toml: is not the paper's scene" in capsys.readouterr().err

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import xarray
 
+from warpimpact.campaign.campaign import Campaign, CampaignError
+from warpimpact.campaign.parts import first_difference
 from warpimpact.results import variables as v
 
 
@@ -39,6 +43,41 @@ NOTE = """\
 Spacing and hit points are not published: those used here were found by search (campaigns/paper_shots.toml).
 Slots lie along z here, so the paper's pitch is the angle in the x-y plane. Angles are counted positive at 130 mm.
 Angles are in degrees, 50 and 130 mm behind the plate; velocities in m/s."""
+
+
+def paper_campaign() -> Path:
+    """The file of the paper's two shots."""
+    return Path(str(files("warpimpact.campaigns") / "paper_shots.toml"))
+
+
+def check_scene(campaign: Campaign, name: str) -> None:
+    """Refuse a campaign whose shots are not those of the paper; what it does not publish may be anything: the lattice
+    of the slots, the hit points, the stand-off point and the numerics.
+
+    Raises:
+        CampaignError: names the campaign by `name`, and the first difference.
+    """
+    published = _scene(Campaign.from_toml(paper_campaign()))
+    if (found := first_difference(_scene(campaign), published)) is not None:
+        place, here, there = found
+        raise CampaignError(
+            f"{name}: is not the paper's scene, so its shots cannot be set beside the paper's: {place} is {here} here "
+            f"and {there} there; spacing, hit points and numerics may differ"
+        )
+
+
+def _scene(campaign: Campaign) -> dict[str, Any]:
+    """What the paper publishes of its scene, as a campaign has it."""
+    lattice = {"spacing", "staggered", "holes", "rotation"}
+    return {
+        "core": campaign.core.model_dump(),
+        "plate": campaign.plate.model_dump(exclude={"pattern": lattice, "degradation_length": True}),
+        "interaction": campaign.interaction.model_dump(),
+        "impact": campaign.impact.model_dump(),
+        "scatter": campaign.scatter.model_dump(),
+        "hits": {"sampling": campaign.hits.sampling, "number": len(campaign.sampler())},
+        "output": {"standoffs": list(campaign.output.standoffs)},
+    }
 
 
 def computed_row(dataset: xarray.Dataset, hit: int) -> Row:

@@ -29,6 +29,7 @@ from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_scatter
 from ..scene.units import Number, PositiveLength, Title, brief, quantity, quoted
 from ..solver.bending import check_bending
+from .plausible import warn_of
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
 
@@ -227,6 +228,11 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _standoffs_clear_of_plate(self) -> Self:
         self.output.check_standoffs(self.core)
+        return self
+
+    @model_validator(mode="after")
+    def _looks_as_meant(self) -> Self:
+        warn_of(self)
         return self
 
 

@@ -15,7 +15,7 @@ from warpimpact import __version__
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
-from .mistakes import bug_report, told
+from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
 from .replay import add_replay
 from .run import add_run
@@ -44,7 +44,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = _parser().parse_args(argv)
     try:
-        with redirect_stdout(Plain(sys.stdout)):
+        with redirect_stdout(Plain(sys.stdout)), implausible_told():
             code: int | None = arguments.command(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:

@@ -66,18 +66,17 @@ def add_validate(commands: Commands) -> None:
         type=Path,
         nargs="?",
         metavar="CAMPAIGN.toml",
-        help="campaign with two hits (default: the bundled one)",
+        help="the paper's scene with two hits; lattice and numerics may differ (default: the bundled one)",
     )
     add_device(parser)
 
 
 def _validate(arguments: argparse.Namespace) -> None:
-    from importlib.resources import files
-
-    from warpimpact.analysis.paper import validation_table
+    from warpimpact.analysis.paper import check_scene, paper_campaign, validation_table
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.campaign.run import run
 
-    bundled = Path(str(files("warpimpact.campaigns") / "paper_shots.toml"))
-    campaign = Campaign.from_toml(arguments.campaign or bundled)
+    path = arguments.campaign or paper_campaign()
+    campaign = Campaign.from_toml(path)
+    check_scene(campaign, str(path))
     print(validation_table(run(campaign, device=arguments.device)))

@@ -4,9 +4,13 @@ import os
 import sys
 import tempfile
 import traceback
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+from .plain import say
 
 
 def told(error: Exception) -> str | None:
@@ -45,6 +49,23 @@ def mistakes() -> tuple[type[Exception], ...]:
     from warpimpact.solver.device import DeviceError
 
     return CampaignError, ClusterError, OutputError, ResultError, DeviceError
+
+
+@contextmanager
+def implausible_told() -> Iterator[None]:
+    """A value that is probably not what was meant gets a line on stderr, once."""
+    with warnings.catch_warnings():
+        show, told = warnings.showwarning, set[str]()
+
+        def show_once(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
+            if category.__name__ != "Implausible":  # its module takes a while to import
+                show(message, category, *place, **more)
+            elif str(message) not in told:
+                told.add(str(message))
+                say(f"warning: {message}")
+
+        warnings.showwarning = show_once
+        yield
 
 
 @contextmanager

@@ -38,7 +38,8 @@ def add_plot(commands: Commands) -> None:
         _plot,
         summary="draw maps of one result, or of several side by side",
         description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
-        "against tilt, and the uncertainty of a map. For several results: maps side by side with one colour scale.",
+        "against tilt, and what is uncertain where shots scatter or an error was estimated. For several results: maps "
+        "side by side with one colour scale.",
         example="plot slotted.nc -o maps",
     )
     add_results(parser)

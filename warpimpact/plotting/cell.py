@@ -93,7 +93,7 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None)
 
 def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None) -> xarray.DataArray:
     """The variable, shape [hits], at one stand-off if it has stand-offs."""
-    mapped = [name for name in v.HIT_NUMBERS if name in dataset]
+    mapped = [name for name in (*v.HIT_NUMBERS, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR) if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
     array = dataset[variable]

@@ -10,8 +10,8 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, nearest_hits, scale_of, shots_text, shown
-from warpimpact.plotting.distribution import dispersion, marginals, uncertainty
+from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown
+from warpimpact.plotting.distribution import dispersion, is_uncertain, marginals, uncertainty
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -84,7 +84,7 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
             name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
             figures[name] = hit_map(dataset, variable, standoff)
     figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
-    if nearest_hits(dataset) is not None:
+    if is_uncertain(dataset, v.RESIDUAL_VELOCITY):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
     return _saved(figures, folder, stem)
 

@@ -5,7 +5,7 @@ import pytest
 
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import dispersion, marginals, probability_map, uncertainty
+from warpimpact.plotting import dispersion, marginals, probability_map, save_maps, uncertainty
 
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED]
 
@@ -34,13 +34,42 @@ def test_hits_on_one_point_give_their_mean():
     assert np.isfinite(local.half_width).all()
 
 
+def scattered(dataset):
+    """Shots that arrive at different velocities."""
+    velocity = dataset["impact_velocity"]
+    return dataset.assign(impact_velocity=velocity + np.random.default_rng(6).normal(0.0, 5.0, velocity.size))
+
+
+def test_where_nothing_scatters_nothing_is_uncertain(make_result, tmp_path):
+    """A smooth map that bends is not uncertain for that."""
+    dataset = make_result(512)
+    with pytest.raises(ValueError, match="shots that all arrive alike, with no estimate of its numerical error"):
+        uncertainty(dataset, "residual_velocity")
+    assert not [path for path in save_maps(dataset, tmp_path, "a") if "uncertainty" in path.name]
+
+
+def test_of_a_run_to_a_tolerance_the_numerical_error_is_shown(make_result, tmp_path):
+    dataset = make_result(np.where(np.arange(512) % 4, Status.PERFORATED, Status.ARRESTED))
+    error = dataset["residual_velocity"].copy(data=np.linspace(0.1, 0.9, 512))
+    dataset = dataset.assign(residual_velocity_error=error)
+    figure = uncertainty(dataset, "residual_velocity")
+    image = np.asarray(figure.axes[1].images[0].get_array())
+    shown = image[np.isfinite(image)]
+    assert np.isnan(image).any()
+    assert set(shown) <= set(error.values[np.arange(512) % 4 > 0])
+    assert figure.axes[3].get_ylabel() == "estimated numerical error [m/s]"
+    assert [path for path in save_maps(dataset, tmp_path, "a") if path.name == "a_uncertainty.png"]
+    with pytest.raises(ValueError, match="with no estimate of its numerical error"):
+        uncertainty(dataset, "deflection")
+
+
 def test_uncertainty_shows_local_mean_and_interval_across_the_edges(make_result):
     dataset = make_result(2048)
     period = dataset.attrs["plate_period"][0]
     wave = np.cos(2.0 * np.pi * dataset["hit_y"] / period)  # continues across the edges
     noise = np.random.default_rng(4).normal(0.0, 2.0, 2048)
     dataset["residual_velocity"].values[:] = 700.0 + 50.0 * wave + noise
-    figure = uncertainty(dataset, "residual_velocity")
+    figure = uncertainty(scattered(dataset), "residual_velocity")
     value, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
     truth = 700.0 + 50.0 * np.cos(2.0 * np.pi * ((np.arange(100) + 0.5) / 100 - 0.5))
     held = np.mean(np.abs(value - truth) <= half_width)
@@ -51,13 +80,13 @@ def test_uncertainty_shows_local_mean_and_interval_across_the_edges(make_result)
 
 def test_uncertainty_is_grey_where_hits_have_no_value(make_result):
     dataset = make_result(np.where(np.arange(512) % 4, Status.PERFORATED, Status.ARRESTED))
-    image = np.asarray(uncertainty(dataset, "tilt").axes[0].images[0].get_array())
+    image = np.asarray(uncertainty(scattered(dataset), "tilt").axes[0].images[0].get_array())
     assert 0.1 < np.isnan(image).mean() < 0.4
 
 
 def test_hits_that_leave_gaps_have_no_uncertainty(make_result):
     with pytest.raises(ValueError, match="do not cover the cell"):
-        uncertainty(make_result(32), "tilt")
+        uncertainty(scattered(make_result(32)), "tilt")
 
 
 def test_probability_map_holds_the_share_at_every_place(make_result):
@@ -105,7 +134,11 @@ def test_marginals_are_the_quantiles_of_strips(make_result):
 def test_uniform_results_have_marginals_and_dispersion(make_result, status):
     dataset = make_result([status] * 100)
     dataset["residual_velocity"][:] = 764.0
-    for figure in (marginals(dataset, "residual_velocity"), dispersion(dataset), uncertainty(dataset, "tilt")):
+    for figure in (
+        marginals(dataset, "residual_velocity"),
+        dispersion(dataset),
+        uncertainty(scattered(dataset), "tilt"),
+    ):
         figure.draw_without_rendering()
 
 

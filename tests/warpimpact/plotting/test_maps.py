@@ -282,7 +282,6 @@ def test_save_maps_writes_one_png_per_map(covered, tmp_path):
         "plate_tilt_130mm.png",
         "plate_marginals.png",
         "plate_dispersion.png",
-        "plate_uncertainty.png",
     ]
     for path in paths:
         with Image.open(path) as image:

@@ -1,0 +1,59 @@
+"""What of a campaign is probably not what was meant: a warning with the value as it was read, and the likely slip."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible
+from ..scene.scatter import QUANTITIES
+
+if TYPE_CHECKING:
+    from .campaign import Campaign
+
+_OF_A_PLATE = (
+    "thickness",
+    "resistance",
+    "shear_coefficient",
+    "degradation_interval",
+    "degradation_length",
+    "density",
+)
+
+
+def warn_of(campaign: Campaign) -> None:
+    """Warn (`Implausible`) of every value that is possible, but far from what such campaigns have."""
+    usual = USUAL | {"hits": hit_bounds(campaign.plate.sampled_cell, campaign.plate.size)}
+    for sentence in implausible(_values(campaign), usual):
+        warnings.warn(sentence, Implausible, stacklevel=2)
+
+
+def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:
+    """Place, kind and value of all that has bounds."""
+    core, plate = campaign.core, campaign.plate
+    yield "core: length", "core.length", core.length
+    yield "core: largest diameter", "core.diameter", 2.0 * core.max_radius
+    if core.density is not None:
+        yield "core.density", "core.density", core.density
+    yield "core: mass", "core.mass", core.mass_properties.mass
+    for name in _OF_A_PLATE:
+        yield f"plate.{name}", f"plate.{name}", getattr(plate, name)
+    for side in plate.size or ():
+        yield "plate.size", "plate.size", side
+    if plate.open_area > 0.0:
+        for side in plate.pattern.unit_cell:
+            yield "plate.pattern: cell", "plate.pattern.cell", side
+    for name, value in campaign.impact:
+        yield f"impact.{name}", f"impact.{name}", value
+    for standoff in campaign.output.standoffs:
+        yield "output.standoffs", "output.standoffs", standoff
+    for name, column in (campaign.hits.listed or {}).items():
+        kind = f"{QUANTITIES[name].table}.{name}" if name in QUANTITIES else "hits"
+        ends = [float(column[np.abs(column).argmax()])]
+        if kind != "hits":  # which may be as small as it likes
+            ends.append(float(column[np.abs(column).argmin()]))
+        for value in dict.fromkeys(ends):
+            yield f"hits.file, column {name}", kind, value
