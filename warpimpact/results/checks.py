@@ -12,17 +12,21 @@ import xarray
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
+_LABELS = (v.AXIS, v.QUATERNION, v.SETTING, v.SCHEME, v.STUDY_LEVEL)
+"""Variables that hold words."""
 _TEXTS = (
     *(attr.TITLE, attr.HISTORY, attr.REFERENCES, attr.CAMPAIGN, attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     *(attr.DEVICE, attr.NUMERICS, attr.NUMERICS_GIVEN, attr.FINGERPRINT, attr.SAMPLING, attr.SYMMETRIES, attr.CORE),
-    *(attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT),
+    *(attr.MATERIAL, attr.CAMPAIGN_ANGLES, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
+    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT),
 )
-_TABLES = (attr.CORE, attr.IMPACT, attr.NUMERICS_GIVEN)
+_TABLES = (attr.CORE, attr.IMPACT, attr.MATERIAL, attr.NUMERICS_GIVEN, attr.RESOLUTION)
 """Texts that are JSON objects."""
 _COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS)
 _NUMBERS = (
     *(attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.SEED, attr.OPEN_AREA, attr.AREAL_DENSITY, attr.LIGAMENT),
     *(attr.PLATE_THICKNESS, attr.FAILED_SHARE, attr.ESTIMATE, attr.CONFIDENCE, attr.HIT),
+    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90),
 )
 _PAIRS = (attr.PLATE_PERIOD, attr.ESTIMATE_INTERVAL)
 _TOGETHER = (
@@ -32,6 +36,7 @@ _TOGETHER = (
     (attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     (attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS, attr.CONFIDENCE),
     (attr.COMPUTED_HITS, attr.SYMMETRIES),
+    (attr.PROMISE_KEPT, attr.RESOLUTION, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.NUMERICS_GIVEN),
 )
 """Attributes of which the first needs the others."""
 
@@ -48,7 +53,7 @@ def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
 
 def _variable_fault(array: xarray.DataArray, declared: v.Variable) -> str | None:
     one = array.variable
-    if declared == v.AXIS or declared == v.QUATERNION:
+    if any(declared is label for label in _LABELS):
         return None
     if one.dtype.kind not in "iuf":
         return f'its variable "{declared}" has no numbers'

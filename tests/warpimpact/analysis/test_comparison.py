@@ -359,7 +359,7 @@ def test_one_plate_is_run_and_several_are_compared(tmp_path: Path) -> None:
     [
         (["a.nc"], "a.nc: got one result, but compare needs at least two results, or one campaign"),
         (["a.nc", "a.nc"], "a.nc: got this result 2 times, but each result counts once"),
-        (["a.nc", "b.nc"], "a.nc: cannot be read as a netCDF file"),
+        (["a.nc", "b.nc"], "a.nc: cannot be read (it is not there)"),
         (["a.nc", "b.nc", "-o", "a.gif"], "a.gif: the name of a picture must end in .png, .pdf or .svg"),
         (["a.nc", "b.nc", "--angle", "30"], '--angle: got "30", which has no unit'),
         (["a.nc", "b.nc", "--standoff", "30"], '--standoff: got "30", which has no unit'),

@@ -10,7 +10,7 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.compute import compute
+from warpimpact.campaign.compute import compute, promise_in
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
@@ -63,7 +63,7 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
     campaign = campaign_with(tmp_path, (VELOCITY, f"{NORMAL}\n{changes}"))
     whole = run(campaign, device="cpu")
     for hit in range(0, 64, 9):
-        alone = compute(campaign, campaign.sampler().shots(hit, 1), device="cpu")
+        alone = compute(campaign, campaign.sampler().shots(hit, 1), promise=promise_in(whole), device="cpu")
         for name in OUTCOME_VARIABLES:
             assert np.array_equal(alone[name][0], whole[name][hit], equal_nan=True), name
 

@@ -12,7 +12,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.comparison import compare, comparison_text
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import comparison_text
 from warpimpact.analysis.effectiveness import effectiveness, number_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.replay import replay

@@ -275,7 +275,7 @@ def test_a_result_of_the_first_version_keeps_its_radians(folder: Path) -> None:
     result.attrs["campaign"] = text
     assert replay(result, 1, folder=folder).attrs["agreement"] == "bit-identical"
     result.attrs["campaign_angles"] = "degree"
-    with pytest.raises(ResultError, match="whose shot is no longer what the campaign"):
+    with pytest.raises(ResultError, match="now give another shot than the stored one"):
         replay(result, 1, folder=folder)
 
 
