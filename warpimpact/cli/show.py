@@ -38,7 +38,8 @@ def add_plot(commands: Commands) -> None:
         _plot,
         summary="draw the maps of a result, or of several side by side",
         description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
-        "against tilt, and what is uncertain where shots scatter or an error was estimated. Of several results, maps side by side in the same colours.",
+        "against tilt, and what is uncertain where shots scatter or an error was estimated. Of several "
+        "results, maps side by side in the same colours.",
         example="plot slotted.nc -o maps",
     )
     add_results(parser)
