@@ -40,6 +40,7 @@ class Standing:
 
     Attributes:
         done, total: shots; `total` is the most that a stop rule allows.
+        saved: shots of whole shards, which no interrupt loses; `done` counts those of unfinished ones too.
         resumed: shots that an earlier run had done.
         failed: shots whose computation failed.
         estimates: running estimates of the main quantities, over the shots from the first on without a gap.
@@ -48,6 +49,7 @@ class Standing:
 
     done: int
     total: int
+    saved: int
     resumed: int
     failed: int
     estimates: dict[Measure, Estimate]
@@ -324,7 +326,7 @@ class _Watch:
         tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
         estimates = {tally.measure: tally.estimate() for tally in tallies if tally.measure.kind != "quantile"}
         done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
-        return Standing(done, self._total, self.resumed, self.failed, estimates, self.promise)
+        return Standing(done, self._total, self.done, self.resumed, self.failed, estimates, self.promise)
 
 
 def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:

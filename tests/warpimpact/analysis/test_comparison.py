@@ -149,15 +149,34 @@ def test_plates_of_different_weight_are_ranked_by_the_ratio_to_the_solid_plate(m
     assert same.ranks(MEAN) == {"light": 2, "heavy": 1}
 
 
-def with_solid(dataset: xarray.Dataset, fraction: float) -> xarray.Dataset:
-    """Beside a solid plate that leaves this energy fraction in every shot."""
-    values = {
-        "solid_status": 0,
-        "solid_residual_velocity": float(velocities(np.array(fraction))),
-        "solid_deflection": 0.0,
-    }
-    columns = {name: ("solid_hit", np.array([value])) for name, value in values.items()}
-    return dataset.assign(columns | {"solid_tilt": (("solid_hit", "standoff"), np.zeros((1, 2)))})
+@pytest.mark.parametrize("fewest", [400, 150])
+def test_differences_at_equal_weight_hold_as_often_as_they_say(fewest: int, make_plate_result) -> None:
+    """Ratios of known means to those of solid plates under the same shots, which scatter too."""
+    held, numbers = dict.fromkeys((MEAN, TILTED), 0), np.random.default_rng(11)
+    for _ in range(TRIALS):
+        plates, common = [], numbers.random(400)
+        for weight, shift in ((20.0, 0.1), (40.0, 0.0)):
+            fraction = 0.3 * common + 0.3 * numbers.random(400) + 0.1 + shift  # of mean 0.4 + shift
+            tilt = np.where(numbers.random(400) < 0.4 + shift, 60.0, 10.0)
+            plate = make_plate_result(velocities(fraction), tilt, areal_density=weight)
+            solid = 0.2 * common + 0.2 * numbers.random(400) + 0.4  # of mean 0.6
+            plates.append(with_solid(plate, solid, np.where(numbers.random(400) < 0.5, 60.0, 10.0)))
+        plates[1] = plates[1].isel(hit=slice(fewest), solid_hit=slice(fewest))
+        comparison = compare(plates, ["a", "b"])
+        for measure, truth in ((MEAN, 0.1 / 0.6), (TILTED, 0.1 / 0.5)):
+            pair = difference(comparison, measure, "a", "b")
+            held[measure] += pair.low <= truth <= pair.high
+    assert min(held.values()) >= LEAST, held
+
+
+def with_solid(dataset: xarray.Dataset, fraction: np.ndarray | float, tilt: np.ndarray | float = 0.0) -> xarray.Dataset:
+    """Beside a solid plate that leaves these energy fractions and tilts [degree] at 130 mm, one or one per shot."""
+    fraction, tilt = np.broadcast_arrays(np.atleast_1d(fraction), tilt)
+    columns = {"solid_status": 0.0 * fraction, "solid_residual_velocity": velocities(fraction)}
+    return dataset.assign(
+        {name: ("solid_hit", values) for name, values in columns.items()}
+        | {"solid_tilt": (("solid_hit", "standoff"), np.stack([0.0 * tilt, tilt], axis=1))}
+    )
 
 
 def test_differences_of_material_are_named(make_plate_result) -> None:
@@ -300,7 +319,7 @@ def test_a_comparison_that_was_broken_off_goes_on(
     @contextmanager
     def breaking() -> Iterator[Callable[[Standing], None]]:
         def follow(standing: Standing) -> None:
-            if Path("slots.nc").exists() and standing.done >= 256:
+            if Path("slots.nc").exists() and standing.saved >= 256:
                 raise KeyboardInterrupt
 
         yield follow

@@ -51,7 +51,7 @@ def test_a_killed_worker_costs_nothing(
     killed_at = []
 
     def kill_one(standing: Standing) -> None:
-        if standing.done >= 512 and not killed_at:
+        if standing.saved >= 512 and not killed_at:
             os.kill(victim, signal.SIGKILL)
             killed_at.append(standing.done)
 

@@ -30,6 +30,9 @@ SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
 COUNT = 4000  # sixteen shards, the last one short
 KILLS = 20
+LONG = "count = 1000000"  # minutes of computing, of which a test sees the first shard
+PATIENCE = 600.0
+"""Until what must come is missing, however busy the machine [s]."""
 HERE = Path(__file__).parents[1]
 pytestmark = pytest.mark.usefixtures("small_shards")
 WARPIMPACT = (
@@ -72,23 +75,23 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
     monkeypatch.syspath_prepend(HERE)
     processes = multiprocessing.get_context("forkserver")
     processes.set_forkserver_preload(["small_shards", "warpimpact.campaign.run", "scipy.stats"])
-    moments, output = random.Random(1), tmp_path / "a.nc"
-    for _ in range(2):  # the first one waits for the imports
-        begin = time.monotonic()
-        whole = processes.Process(target=main, args=([*command(tmp_path / "timed.nc"), "--overwrite"],))
-        whole.start()
-        whole.join()
-        longest = time.monotonic() - begin
-    kills, completed, found = 0, 0, set()
+    moments, output, kills, completed = random.Random(1), tmp_path / "a.nc", 0, 0
+
+    def saved() -> int:
+        return len(list(tmp_path.glob("a.nc.parts/hits_*.nc")))
+
     while kills < KILLS or not output.exists():
+        # Progress on the disk says when, whatever the speed: up to five shards on, and a moment after.
+        wanted, later = saved() + moments.randint(0, 5), moments.uniform(0.0, 0.05)
         run_process = processes.Process(target=main, args=(command(output),))
         run_process.start()
-        run_process.join(moments.uniform(0.2, 1.0) * longest if kills < KILLS else None)
+        while run_process.is_alive() and (kills >= KILLS or saved() < wanted):
+            run_process.join(0.005)
+        run_process.join(later)
         if run_process.is_alive():
             run_process.kill()
             run_process.join()
             kills += 1
-            found.add(len(list(tmp_path.glob("a.nc.parts/hits_*.nc"))))
         else:
             assert run_process.exitcode == 0
         if output.exists() and not (tmp_path / "a.nc.parts").exists():
@@ -96,20 +99,19 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
             completed += 1
             if kills < KILLS:
                 output.unlink()
-    assert completed >= 1
-    assert len(found) >= 2  # the moments were all over the run
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.nc", "timed.nc"]
+    assert completed >= 2  # 20 kills leave some fifty shards behind, and a run has sixteen
+    assert [path.name for path in tmp_path.iterdir()] == ["a.nc"]
 
 
 def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
-    path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 100000"), encoding="utf-8")
+    path.write_text(SLOTTED_PLATE.replace("count = 4096", LONG), encoding="utf-8")
     command = ["run", str(path), "-o", str(output), "--device", "cpu"]
     with subprocess.Popen(
         [*WARPIMPACT, *command], env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.DEVNULL
     ) as first:
         try:
-            limit = time.monotonic() + 60.0
+            limit = time.monotonic() + PATIENCE
             while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
                 assert first.poll() is None
                 assert time.monotonic() < limit
@@ -180,7 +182,7 @@ def stopped_after(shards: int, error: BaseException) -> object:
     """A progress function that interrupts the run."""
 
     def follow(standing: Standing) -> None:
-        if standing.done >= 256 * shards and standing.done < standing.total:
+        if standing.saved >= 256 * shards:
             raise error
 
     return follow
@@ -457,7 +459,7 @@ def test_a_disk_that_is_full_at_once_leaves_nothing(size: int, saved: str, campa
 def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: list[str], tmp_path: Path) -> None:
     """A terminal sends Ctrl-C to all processes of the group; a batch system ends the first one."""
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
-    path.write_text(SLOTTED_PLATE.replace("count = 4096", "count = 100000"), encoding="utf-8")
+    path.write_text(SLOTTED_PLATE.replace("count = 4096", LONG), encoding="utf-8")
     # A shell's background job ignores Ctrl-C.
     listen = _after("signal.signal(signal.SIGINT, signal.SIG_DFL)")
     command = [*listen, *WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu", *where]
@@ -468,7 +470,7 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
         text=True,
         start_new_session=True,
     ) as process:
-        limit = time.monotonic() + 60.0
+        limit = time.monotonic() + PATIENCE
         while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
             assert process.poll() is None
             assert time.monotonic() < limit
@@ -477,10 +479,9 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
             os.killpg(process.pid, by)
         else:
             process.send_signal(by)
-        begin = time.monotonic()
-        _, shown = process.communicate(timeout=30)
-    assert time.monotonic() - begin < 5.0  # it waits for no task
+        _, shown = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
+    assert not output.exists()
     assert "Traceback" not in shown
     last = shown.splitlines()[-1]
     assert last.startswith("warpimpact: interrupted; ")

@@ -96,7 +96,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     campaign = own.model_copy(update={"hits": own.hits.model_copy(update={"count": count})})
 
     def break_off(standing: Standing) -> None:
-        if standing.done >= 256:
+        if standing.saved >= 256:
             raise KeyboardInterrupt
 
     with pytest.raises(Interrupted):

@@ -145,7 +145,7 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
     assert told["estimate"] == pytest.approx(share.mean(), rel=1e-12)
 
     def interrupt(standing: Standing) -> None:
-        if standing.done >= 256:
+        if standing.saved >= 256:
             raise KeyboardInterrupt
 
     straight, resumed = tmp_path / "straight.nc", tmp_path / "resumed.nc"

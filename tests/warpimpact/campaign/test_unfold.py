@@ -212,7 +212,7 @@ def test_an_unfolded_run_is_streamed_resumed_and_replayed(
 
     def interrupt(standing: Standing) -> None:
         assert standing.total == 1096
-        if standing.done >= parts.FEWEST:
+        if standing.saved >= parts.FEWEST:
             raise KeyboardInterrupt
 
     straight, resumed = tmp_path / "straight.nc", tmp_path / "resumed.nc"

@@ -18,7 +18,7 @@ def standing(done: int, *, failed: int = 0, resumed: int = 100) -> Standing:
     velocity = Estimate(731.25, 730.5, 732.0, done, 10.0)
     tilt = Estimate(23.0, 22.0, 24.0, done, 5.0)
     measures = (Measure.parse("mean(residual_velocity)"), Measure.parse("mean(tilt@130mm)"))
-    return Standing(done, 1000, resumed, failed, dict(zip(measures, (velocity, tilt), strict=True)))
+    return Standing(done, 1000, done, resumed, failed, dict(zip(measures, (velocity, tilt), strict=True)))
 
 
 class Terminal(io.StringIO):

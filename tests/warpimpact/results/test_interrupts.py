@@ -9,19 +9,20 @@ from warpimpact.results.interrupts import uninterrupted
 
 
 @pytest.fixture
-def interrupted_by_sigterm():
-    """SIGTERM as a run handles it."""
+def interrupted():
+    """SIGTERM as a run handles it, and SIGINT as the program of a terminal does: a background job may ignore it."""
 
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
     yield
-    signal.signal(signal.SIGTERM, before)
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_waits_for_the_end_of_the_block(number: signal.Signals, interrupted_by_sigterm: None) -> None:
+def test_a_signal_waits_for_the_end_of_the_block(number: signal.Signals, interrupted: None) -> None:
     reached = []
     handler = signal.getsignal(number)
     with pytest.raises(KeyboardInterrupt):  # noqa: PT012
