@@ -101,7 +101,7 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
     x, y = tilt.values[both], velocity.values[both]
     if len(x) > _MOST_POINTS:
         density = axes.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
-        axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per cell")
+        axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per cell", format="{x:g}")
     else:
         axes.scatter(x, y, s=7, color=_BLUE, alpha=0.4, linewidths=0)
     if len(x):

@@ -44,6 +44,8 @@ def study_figure(dataset: xarray.Dataset) -> Figure:
 def _draw(axes: Axes, quoted: xarray.Dataset, quantity: v.Variable) -> None:
     """One panel: every setting, the front, the named fidelities, and the uncertainty of the converged answer."""
     axes.set(xscale="log", yscale="log", xlabel="hits per second", ylabel=f"{QUOTED:.0%} error of {_PANELS[quantity]}")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")  # that of a logarithmic axis writes mathtext, which figures leave unparsed
     axes.grid(which="major", color="0.9")
     axes.set_axisbelow(True)
     quoted = quoted.isel(setting=(quoted[v.ERRORS[quantity]] > 0.0).values)  # a logarithm has no 0

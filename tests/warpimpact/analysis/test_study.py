@@ -296,3 +296,12 @@ def test_a_wrong_number_of_hits_ends_with_2(hits: str) -> None:
     with pytest.raises(SystemExit) as ended:
         main(["study", str(SLOTTED_PLATE), "--hits", hits])
     assert ended.value.code == 2
+
+
+def test_ticks_of_logarithmic_axes_are_plain_numbers(small: xarray.Dataset) -> None:
+    # Figures leave mathtext unparsed, so that a title may hold a dollar sign.
+    figure = study_figure(small)
+    figure.canvas.draw()
+    labels = [label.get_text() for axes in figure.axes for label in (*axes.get_xticklabels(), *axes.get_yticklabels())]
+    assert any(labels)
+    assert not any("$" in label for label in labels)

@@ -157,3 +157,12 @@ def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
         expected = np.stack([behind["tilt"][:, 0], behind["residual_velocity"]], axis=-1)
         np.testing.assert_allclose(shown.get_offsets(), expected)
     assert sum(patch.get_height() for patch in above.patches) == count / 2
+
+
+def test_the_colours_of_a_density_are_labelled_with_plain_numbers(make_result):
+    figure = dispersion(make_result(6000))
+    figure.canvas.draw()
+    bar = figure.axes[-1]
+    labels = [label.get_text() for label in (*bar.get_xticklabels(), *bar.get_yticklabels())]
+    assert any(labels)
+    assert not any("$" in label for label in labels)
