@@ -92,7 +92,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Derivative of the share of contact by the closing speed [s/m], or where a core swings to and fro between two
         walls in turn, step by step, the chord down to no contact: full contact has no slope, and where a step is long
         enough for the core to pass the whole ramp, nothing else would stop it. As what the last step changed is
-        foreseen, a chord in the place of the slope is an error of second order of the step alone."""
+        foreseen, a chord instead of the slope adds an error of second order in the step only."""
         return wp.where(closing < law.steadied, share / wp.max(closing, tiny), slope)
 
     @wp.func

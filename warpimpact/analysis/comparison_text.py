@@ -26,7 +26,7 @@ def comparison_text(comparison: Comparison) -> str:
 
 def _conditions(comparison: Comparison) -> list[str]:
     together = f"Differences of a measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
-    chance = "Intervals tell of the hits that were drawn, not of what the model leaves out."
+    chance = "The intervals describe the hits that were drawn, not what the model leaves out."
     return [*hits_used(comparison), together, chance, *comparison.notes]
 
 

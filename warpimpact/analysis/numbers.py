@@ -14,7 +14,7 @@ def number_text(number: float) -> str:
 
 
 def interval_text(low: float, high: float, text: Callable[[float], str] = number_text) -> str:
-    """Of a confidence interval: a dash where there is none, and one end where the shots tell of one only."""
+    """A confidence interval as text: a dash if there is none, one end if the shots give only one."""
     if math.isnan(low) and math.isnan(high):
         return "-"
     if math.isnan(low):

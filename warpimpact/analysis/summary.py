@@ -26,7 +26,7 @@ SLICE = 2**18
 class Spread:
     """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none.
 
-    ``interval`` holds the mean at 95 %, and is NaN where the hits tell of none.
+    ``interval`` holds the mean at 95 %, and is NaN if the hits give none.
     """
 
     count: int

@@ -81,7 +81,7 @@ class Campaign(Model):
             count: number of hits, in place of the file's.
 
         Raises:
-            CampaignError: the file is missing, is no TOML, or asks for something that cannot be.
+            CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
         """
         path = Path(path)
         return cls.from_text(read_text(path), name=str(path), folder=path.parent, count=count)
@@ -97,7 +97,7 @@ class Campaign(Model):
             count: number of hits, in place of the text's.
 
         Raises:
-            CampaignError: the text is no TOML, or asks for something that cannot be.
+            CampaignError: the text is not TOML, or has a value that is not allowed.
         """
         data = parsed(text, name)
         if isinstance(plates := data.get("plate"), list):
@@ -248,7 +248,7 @@ def _check_nose_first(largest: dict[str, float]) -> None:
 
 
 def _override_count(data: dict[str, Any], count: int) -> None:
-    """Put a count in the place of that of the file; a stop rule has it as its largest."""
+    """Replace the count of the file; for a stop rule this is the largest count."""
     stopped = isinstance(data.get("stop"), dict)
     if stopped:
         data["stop"]["max_count"] = count

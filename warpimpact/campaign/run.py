@@ -60,7 +60,7 @@ Follow = Callable[[Standing], None]
 
 
 class Interrupted(KeyboardInterrupt):
-    """A run was broken off; the message tells what is saved."""
+    """A run was interrupted; the message says what is saved."""
 
 
 def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = None) -> xarray.Dataset:
