@@ -89,10 +89,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def steady_slope(law: Law, share: real, slope: real, closing: real):
-        """Derivative of the share of contact by the closing speed [s/m], or where a core swings to and fro between two
-        walls in turn, step by step, the chord down to no contact: full contact has no slope, and where a step is long
-        enough for the core to pass the whole ramp, nothing else would stop it. As what the last step changed is
-        foreseen, a chord instead of the slope adds an error of second order in the step only."""
+        """Derivative of the share of contact by the closing speed [s/m].
+
+        Where a core swings between two walls from step to step, it is the chord down to no contact instead. Full
+        contact has no slope, and a long step carries the core across the whole ramp. The change of the last step is
+        foreseen, so the chord adds an error of second order.
+        """
         return wp.where(closing < law.steadied, share / wp.max(closing, tiny), slope)
 
     @wp.func
