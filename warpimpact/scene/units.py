@@ -89,14 +89,42 @@ def _float(value: Real) -> float:
 
 @cache
 def _registry() -> Any:
-    import pint  # a third of a second, needed only where a string carries a unit
+    import pint  # a third of a second
 
     return pint.UnitRegistry()
+
+
+COMMON = {
+    ("m", "m"): 1.0,
+    ("mm", "m"): 1e-3,
+    ("cm", "m"): 1e-2,
+    ("um", "m"): 1e-6,
+    ("kg", "kg"): 1.0,
+    ("g", "kg"): 1e-3,
+    ("s", "s"): 1.0,
+    ("us", "s"): 1e-6,
+    ("Pa", "Pa"): 1.0,
+    ("MPa", "Pa"): 1e6,
+    ("GPa", "Pa"): 1e9,
+    ("kg/m^3", "kg/m^3"): 1.0,
+    ("m/s", "m/s"): 1.0,
+    ("rad", "rad"): 1.0,
+    ("deg", "rad"): math.pi / 180.0,
+    ("rad/s", "rad/s"): 1.0,
+}
+"""Factors of the units that most campaigns use: reading these files needs no pint, which takes as long to load as some
+thousand hits take to compute. A test sets each beside pint's."""
 
 
 @cache
 def _factor(unit: str, si_unit: str) -> float:
     """Factor from `unit` to `si_unit`; LookupError for an unknown unit, ValueError for another kind."""
+    if (unit, si_unit) in COMMON:
+        return COMMON[unit, si_unit]
+    return _by_pint(unit, si_unit)
+
+
+def _by_pint(unit: str, si_unit: str) -> float:
     import pint
 
     if _TOWER.search(unit):
