@@ -172,7 +172,7 @@ class PolynomialCore(Core):
 
     def radius(self, s: Array) -> Array:
         """Radius [m] at stations `s` [m] within [0, length]; same shape."""
-        return np.maximum(self._polynomial(s), 0.0)
+        return np.asarray(np.maximum(self._polynomial(s), 0.0))
 
     @property
     def _polynomial(self) -> Polynomial:

@@ -58,7 +58,7 @@ class MaskPattern(Pattern):
             np.floor(coordinate / self.cell_size + cells / 2).astype(np.int64) % cells
             for coordinate, cells in zip((y, z), self.material.shape, strict=True)
         )
-        return ~self.material[i, j]
+        return np.asarray(~self.material[i, j])
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """Closed outlines, each of shape [points, 2] [m], of holes; the rectangle cuts them."""
