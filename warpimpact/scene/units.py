@@ -9,12 +9,15 @@ from itertools import islice
 from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
 """Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
+_STRING = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$"
+_STRING_WITH_UNIT = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*\S.*$"
+"""What editors accept, in the dialect of JSON schemas; which units there are is for the reader."""
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", re.DOTALL)
 
 
@@ -144,7 +147,13 @@ def _part(value: object, depth: int = 3) -> object:
 
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
-    return BeforeValidator(_Quantity(name, unit, example))
+    """The reader of a quantity, and what the JSON schema of a campaign says of it."""
+    told = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
+    if unit:
+        told["unit"] = "deg" if unit == "rad" else unit
+    return BeforeValidator(
+        _Quantity(name, unit, example), json_schema_input_type=Annotated[float | str, WithJsonSchema(told)]
+    )
 
 
 def in_radians(value: float) -> str:

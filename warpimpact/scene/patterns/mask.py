@@ -23,6 +23,11 @@ class MaskPattern(Pattern):
     value is material. In a PNG image y runs from left to right and z from bottom to top: black is hole, one
     other grey is material. An SVG drawing has the same orientation and must have a width and a height in mm. Filled
     shapes are holes, and a cell is hole if its middle lies in one.
+
+    Attributes:
+        shape: "mask".
+        file: PNG image, .npy array or SVG drawing.
+        cell_size: side of a cell [m].
     """
 
     shape: Literal["mask"] = "mask"
