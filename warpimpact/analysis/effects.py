@@ -141,7 +141,7 @@ def _energy_fraction(part: xarray.Dataset) -> Array:
 def _inclination(part: xarray.Dataset, standoff: float) -> Array:
     """Between axis and line of fire, nose or base first alike [degree], shape [hits]."""
     tilt = part[v.TILT].sel(standoff=standoff, method="nearest").values
-    return np.minimum(tilt, 180.0 - tilt)
+    return np.asarray(np.minimum(tilt, 180.0 - tilt))
 
 
 def _energy_density(core: Core, standoff: float) -> Callable[[xarray.Dataset], Array]:

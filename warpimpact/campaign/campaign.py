@@ -53,7 +53,20 @@ class Output(Record):
 
 
 class Campaign(Model):
-    """What is shot at what, where, how finely it is computed and what is reported."""
+    """What is shot at what, where, how finely it is computed and what is reported.
+
+    Attributes:
+        title: one line, which figures and reports show.
+        core: the rigid core.
+        plate: what it is shot at.
+        impact: how the core arrives.
+        hits: where it hits.
+        interaction: stress on the surface of the core.
+        numerics: how finely the shots are computed.
+        output: what is reported.
+        scatter: distributions of values that scatter. A file has them in the places of the values.
+        stop: when the run ends, instead of a count.
+    """
 
     title: Title
     core: AnyCore

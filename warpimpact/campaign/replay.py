@@ -26,7 +26,7 @@ ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 _OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES)
 
 
-def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
+def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xarray.Dataset:
     """Compute one hit of a result again, on the CPU, from the campaign that the result contains.
 
     If symmetry unfolded the hit, the computed hit of its group is computed again and its history is unfolded.
@@ -34,7 +34,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     Args:
         result: the Dataset of `run`.
         hit: its index in the result.
-        folder: folder of the files that the campaign names.
+        folder: folder of the files that the campaign names, if it names any.
 
     Returns:
         The Dataset of `results.history_dataset`. Its attribute `agreement` compares its end with the stored
@@ -47,7 +47,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     hits = result.sizes["hit"]
     if not 0 <= hit < hits:
         raise ResultError(f"hit: got {hit}, but the result has hits 0 to {hits - 1}")
-    campaign = _campaign(result, folder)
+    campaign = _campaign(result, Path(folder))
     sampler = campaign.sampler()
     if len(sampler) != hits and (campaign.stop is None or len(sampler) < hits):
         raise ResultError(f"got a result with {hits} hits, but its campaign and the files it names give {len(sampler)}")

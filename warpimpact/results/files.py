@@ -148,6 +148,23 @@ def read(path: Path) -> xarray.Dataset:
         return file.load()
 
 
+def open_result(path: str | Path) -> xarray.Dataset:
+    """Open a result file. Only what is used of it is read; ``with open_result(path) as result:`` closes it.
+
+    Args:
+        path: a file of ``warpimpact run``, of `run_to_file`, or of ``to_netcdf`` of a result.
+
+    Returns:
+        The Dataset of `run`, one entry per hit.
+
+    Raises:
+        ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
+    """
+    with opened(Path(path)):
+        pass  # it is a sound result
+    return _opened(Path(path))
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[xarray.Dataset]:
     """A result file of which only what is used is read.

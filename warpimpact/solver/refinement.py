@@ -122,7 +122,7 @@ class Change:
     def in_tolerances(self, tolerance: Tolerance) -> Array:
         """The larger of both in units of the tolerance, shape [shots]."""
         tilt = self.tilt.max(axis=1, initial=0.0) / tolerance.tilt
-        return np.maximum(self.residual_velocity / tolerance.residual_velocity, tilt)
+        return np.asarray(np.maximum(self.residual_velocity / tolerance.residual_velocity, tilt))
 
 
 def _apart(coarse: Array, fine: Array) -> Array:
