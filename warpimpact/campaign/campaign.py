@@ -45,11 +45,13 @@ class Output(Record):
     Attributes:
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
         solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
+        exit_state: store velocity, axis and position of every core at the end of contact.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1, max_length=64)] = (0.05, 0.13)
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
+    exit_state: Annotated[bool, Field(strict=True)] = True
 
 
 class Campaign(Model):

@@ -20,7 +20,7 @@ from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images
+from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Shots
@@ -247,7 +247,7 @@ def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[in
     the solid reference."""
     hits = dataset.sizes["hit"]
     for place, index in enumerate(task):
-        shard = dataset.isel(hit=slice(place * size, (place + 1) * size))
+        shard = numbered(dataset.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
         if index:
             shard = shard.drop_dims("solid_hit", errors="ignore")
         time = dataset.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits

@@ -133,6 +133,7 @@ class March:
         )
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
         status = contact.status.numpy().astype(np.int8)
+        values |= _exits(contact, status)
         return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
@@ -287,6 +288,17 @@ class March:
             for count in pool.map(work, _chunks(total, max(1, min(CPU_CHUNK, total // (4 * len(slots)))))):
                 done += count
                 progress(done)
+
+
+def _exits(contact: Any, status: NDArray[np.int8]) -> dict[str, Array]:
+    """The state of every core at the end of contact; NaN where the computation failed."""
+    failed, arrested = (status >= Status.UNFINISHED)[:, None], (status == Status.ARRESTED)[:, None]
+    state = {
+        "exit_velocity": np.where(arrested, 0.0, _host(contact.velocity)),
+        "exit_axis": _host(contact.axis),
+        "exit_position": _host(contact.position),
+    }
+    return {name: np.where(failed, np.nan, values) for name, values in state.items()}
 
 
 def _after(finished: int, total: int, progress: Progress) -> Progress1:
