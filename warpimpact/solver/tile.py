@@ -136,5 +136,5 @@ def tent_taps(length: float, cell: float) -> Array:
         half_width = ramp * (0.5 * ramp - moment) / (points * (ramp / 3.0 - moment))
         if reach < half_width + 1e-9 <= reach + 1 + 2e-9:
             break
-    weights: Array = 1.0 - np.abs(np.arange(-reach, reach + 1)) / half_width
-    return weights / weights.sum()
+    weights = 1.0 - np.abs(np.arange(-reach, reach + 1)) / half_width
+    return np.asarray(weights / weights.sum())
