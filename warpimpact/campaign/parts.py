@@ -270,7 +270,7 @@ class Parts:
         def named(written: Path) -> Path:
             return placed.setdefault(index, self._named(index, written))
 
-        files.write(dataset, self.folder / f"{self._stem(index)}.nc", named=named)
+        files.write(dataset, self.folder / f"{self._stem(index)}.nc", named=named, compressed=False)
         self.saved |= placed
         _logger.info("shard %d of %d saved: %d hits", index + 1, self.count, dataset.sizes["hit"])
 

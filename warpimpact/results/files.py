@@ -28,31 +28,34 @@ class ResultError(ValueError):
     """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
-def write(dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None) -> None:
+def write(
+    dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None, compressed: bool = True
+) -> None:
     """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
 
     Args:
         named: gives the name of what was written, by its contents, in place of `path`.
+        compressed: smaller, at the cost of some time.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
     with uninterrupted(), aside(path, named=named) as file:
-        _write(dataset, file)
+        _write(dataset, file, compressed=compressed)
 
 
-def _write(dataset: xarray.Dataset, file: Path, *, chunk: int | None = None, **options: Any) -> None:
+def _write(
+    dataset: xarray.Dataset, file: Path, *, chunk: int | None = None, compressed: bool = True, **options: Any
+) -> None:
     """Write a Dataset, with the coordinates that have a group of their own in it."""
     groups = {group: [name for name in names if name in dataset.coords] for group, names in v.GROUPS.items()}
     hits = dataset.drop_vars([name for names in groups.values() for name in names])
     options = {"format": "NETCDF4", "engine": "netcdf4"} | options
-    hits.to_netcdf(file, encoding=_encoding(hits, chunk=chunk), **options)
+    hits.to_netcdf(file, encoding=_encoding(hits, chunk=chunk, compressed=compressed), **options)
     for group, names in groups.items():
         if names:
             inner = dataset[names].reset_coords(names).drop_attrs(deep=False)
-            inner.to_netcdf(
-                file, mode="a", group=group, encoding=_encoding(inner), format="NETCDF4", engine="netcdf4"
-            )
+            inner.to_netcdf(file, mode="a", group=group, encoding=_encoding(inner), format="NETCDF4", engine="netcdf4")
 
 
 CHUNK = 2**15
@@ -99,12 +102,14 @@ def _append(joined: Any, part: Path, at: int) -> int:
     return end
 
 
-def _encoding(dataset: xarray.Dataset, *, chunk: int | None = None) -> dict[str, dict[str, Any]]:
+def _encoding(
+    dataset: xarray.Dataset, *, chunk: int | None = None, compressed: bool = True
+) -> dict[str, dict[str, Any]]:
     """How variables are stored: compressed, and with `chunk` hits per chunk if that is given."""
     encoding: dict[str, dict[str, Any]] = {
         str(name): {"zlib": True, "complevel": 1}
         for name, array in dataset.variables.items()
-        if array.dtype.kind in "if"  # netCDF compresses no strings
+        if compressed and array.dtype.kind in "if"  # netCDF compresses no strings
     }
     for name in dataset.coords:
         encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
