@@ -31,6 +31,9 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
     plates = shared.pop("plate", None)
     if not isinstance(plates, list) or len(plates) < 2:
         raise CampaignError(f"{path}: plate: a comparison needs two or more tables [[plate]], each with a name")
+    hits = shared.get("hits")
+    if isinstance(hits, dict):
+        shared["hits"] = {"irreducible": False} | hits  # the same hits for plates of different symmetry
     campaigns: dict[str, Campaign] = {}
     for place, plate in enumerate(plates):
         name = _name(plate, f"{path}: plate[{place}].name")

@@ -73,12 +73,22 @@ def check_scatter(hits: Hits, scatter: Scatter) -> None:
     Raises:
         ValueError: names the quantity that scatters.
     """
-    turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if name in scatter.given]
+    turned = _turned(scatter)
     if hits.irreducible and turned:
         raise ValueError(
             f"got hits.irreducible = true beside a distribution of impact.{turned[0]}, but a symmetry must hold for "
             "every shot; of the impact quantities only velocity may scatter with it"
         )
+
+
+def is_possible(hits: Hits, scatter: Scatter) -> bool:
+    """Whether `check_scatter` has nothing against these hits."""
+    return not (hits.irreducible and _turned(scatter))
+
+
+def _turned(scatter: Scatter) -> list[str]:
+    """Quantities that scatter and turn a shot out of its symmetry."""
+    return [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if name in scatter.given]
 
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:
