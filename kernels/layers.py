@@ -9,9 +9,8 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, exposure, footprint, interaction, plate_grid, rigid_body
+from . import contact, core_surface, exposure, footprint, interaction, passage, plate_grid, rigid_body
 from . import shots as conditions
-from .status import LayerStatus, Status
 from .variant import Variant
 
 
@@ -26,14 +25,8 @@ def build(variant: Variant) -> SimpleNamespace:
     Surface, Pose, Plate, Window, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window, laws.Law
     Body, State, Load = motion.Body, motion.State, motion.Load
     Fields, Footprint, Touches, Shots = contacts.Fields, prints.Footprint, contacts.Touches, launch.Shots
-    own = launch.own
-    ARRESTED, RICOCHETED, UNFINISHED = (
-        wp.constant(int(s)) for s in (Status.ARRESTED, Status.RICOCHETED, Status.UNFINISHED)
-    )
-    PASSED, MISSED, ENTERED, NOT_REACHED = (
-        wp.constant(int(s))
-        for s in (LayerStatus.PERFORATED, LayerStatus.MISSED, LayerStatus.ARRESTED, LayerStatus.NOT_REACHED)
-    )
+    passages, own = passage.build(variant), launch.own
+    Passage = passages.Passage
 
     @wp.struct
     class Layers:
@@ -77,22 +70,6 @@ def build(variant: Variant) -> SimpleNamespace:
         open: wp.array(dtype=wp.bool)
 
     @wp.struct
-    class Passage:
-        """How each core left each layer: arrays of shape [shots, layers], SI and radians.
-
-        Velocity, tilt and time are those at the instant when the last point of the core leaves the layer through its
-        rear face; NaN where that does not happen. Per shot: the layer that the core came to rest in, or −1, and how far
-        behind this layer's front face any of its points came [m].
-        """
-
-        status: wp.array2d(dtype=wp.int32)
-        velocity: wp.array2d(dtype=real)
-        tilt: wp.array2d(dtype=real)
-        time: wp.array2d(dtype=real)
-        stopped_in: wp.array(dtype=wp.int32)
-        depth: wp.array(dtype=real)
-
-    @wp.struct
     class Reached:
         """Layers that a step can touch, and the ends of the core along x [m]. `first` > `last` if there is none.
         `deepest` is the largest x that the core has reached so far."""
@@ -125,12 +102,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """No layer is reached yet."""
         for k in range(layers.count):
             stack.open[slot * layers.count + k] = False
-            passage.status[shot, k] = NOT_REACHED
-            passage.velocity[shot, k] = real(wp.nan)
-            passage.tilt[shot, k] = real(wp.nan)
-            passage.time[shot, k] = real(wp.nan)
-        passage.stopped_in[shot] = -1
-        passage.depth[shot] = real(wp.nan)
+        passages.begin(passage, shot, layers.count)
 
     @wp.func
     def ends_of(surface: Surface, pose: Pose):
@@ -211,25 +183,6 @@ def build(variant: Variant) -> SimpleNamespace:
         return plate.clear[grid.tile_at(plate, window, y, z)] > reach
 
     @wp.func
-    def leave(
-        passage: Passage,
-        body: Body,
-        shot: wp.int32,
-        layer: wp.int32,
-        state: State,
-        beyond: real,
-        time: real,
-        flight: vec3,
-    ):
-        """Record how a core whose last point is `beyond` a layer's rear face [m] left the layer."""
-        since = beyond / wp.max(state.velocity[0], one)
-        axis = motion.turned(body, motion.axis_of(state.attitude), state.angular_momentum, -since)
-        passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, PASSED, MISSED)
-        passage.velocity[shot, layer] = wp.length(state.velocity)
-        passage.tilt[shot, layer] = wp.atan2(wp.length(wp.cross(axis, flight)), wp.dot(axis, flight))
-        passage.time[shot, layer] = time - since
-
-    @wp.func
     def reach(
         surface: Surface,
         body: Body,
@@ -284,8 +237,8 @@ def build(variant: Variant) -> SimpleNamespace:
                     found.last_ring = surface.rings - 1
                     found.inside = found.inside and (touch.inside or not window.weakens)
                 stack.found[here] = touch
-            elif low > rear and passage.status[shot, k] != PASSED and passage.status[shot, k] != MISSED:
-                leave(passage, body, shot, k, state, rearmost - rear, time, flight)
+            elif low > rear and not passages.has_left(passage, shot, k):
+                passages.leave(passage, body, shot, k, state, rearmost - rear, time, flight)
         return found, reached
 
     @wp.func
@@ -333,8 +286,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 )
                 if part.touching:
                     load.touching = True
-                    if passage.status[shot, k] == NOT_REACHED:
-                        passage.status[shot, k] = ENTERED
+                    passages.enter(passage, shot, k)
                 load.damped = load.damped or part.damped
                 load.force += part.force
                 load.moment += part.moment
@@ -372,14 +324,8 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(layers.count):
             front = own_of(layers.front, k, shot)
             rear = front + own_of(layers.thickness, k, shot)
-            if passage.status[shot, k] == ENTERED:
-                stays = status == ARRESTED and reached.foremost > front and reached.rearmost < rear
-                passage.status[shot, k] = wp.where(stays, ARRESTED, RICOCHETED)
-                if stays:
-                    passage.stopped_in[shot] = k
-                    passage.depth[shot] = reached.deepest - front
-            if status >= UNFINISHED and passage.status[shot, k] == RICOCHETED:
-                passage.status[shot, k] = status
+            inside = reached.foremost > front and reached.rearmost < rear
+            passages.conclude(passage, shot, k, status, inside, reached.deepest - front)
 
     return SimpleNamespace(
         Layers=Layers,

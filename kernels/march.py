@@ -161,7 +161,6 @@ def build(variant: Variant) -> SimpleNamespace:
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
             if wp.static(variant.layered):
-                now = (real(step) + half) * dt + skipped
                 found, reached = stacked.reach(
                     surface,
                     body,
@@ -175,7 +174,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     state,
                     pose,
                     reached,
-                    now,
+                    (real(step) + half) * dt + skipped,
                     flight,
                     dt,
                 )
@@ -214,9 +213,8 @@ def build(variant: Variant) -> SimpleNamespace:
                     last = Change()
                 if pace.rows > 0:
                     force, moment = motion.mean_load(body, before, load, dt)
-                    traces.record(
-                        trace, shot * pace.rows + step, (real(step) + half) * dt + skipped, state, force, moment
-                    )
+                    now = (real(step) + half) * dt + skipped
+                    traces.record(trace, shot * pace.rows + step, now, state, force, moment)
                 if wp.static(variant.layered):
                     if found.last_ring < 0:
                         free = stacked.free_time(surface, target, shot, state, pose, reached, dt)

@@ -249,6 +249,7 @@ class _Scattering(Model):
     @classmethod
     def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
         """Parameters may have units of their quantity."""
+        assert info.field_name is not None
         if not isinstance(value, dict) or info.field_name not in cls._quantities:
             return value
         read = quantity(cls._quantities[info.field_name].type)
@@ -257,7 +258,8 @@ class _Scattering(Model):
     @field_validator("*", mode="after")
     @classmethod
     def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
-        if isinstance(value, Distribution) and info.field_name in cls._quantities:
+        assert info.field_name is not None
+        if isinstance(value, Distribution):
             low, high = value.quantile(np.array([EDGE, 1.0 - EDGE]))
             try:
                 check_range(info.field_name, low, high, cls._quantities)
