@@ -28,6 +28,13 @@ class Layer(Plate):
     offset: tuple[Length, Length] = (0.0, 0.0)
 
 
+def value_in(plate: Plate, name: str) -> float:
+    """A quantity of a layer by the name that it scatters under; a plate in front has no offset."""
+    if name.startswith("offset"):
+        return plate.offset["yz".index(name[-1])] if isinstance(plate, Layer) else 0.0
+    return float(getattr(plate, name))
+
+
 class Target(Model):
     """What is shot at. Nothing couples its layers but the core.
 
