@@ -17,6 +17,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.scene import Plate
+from warpimpact.scene.target import value_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -74,13 +75,15 @@ def to_dataset(
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     values |= {name: shots.columns[name] for name in v.SCATTER_VARIABLES if name in shots.columns}
-    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES)
+    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.LAYER_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
+    values |= _of_layers(scene, shots)
     if v.EXIT_POSITION in values:
         zero = np.zeros(len(shots))
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
-    optional = (*v.EXIT_VARIABLES, *v.SCATTER_VARIABLES, *v.BENDING_VARIABLES)
+    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES, *v.LAYER_SCATTER)
+    optional = (*v.EXIT_VARIABLES, *v.SCATTER_VARIABLES, *v.BENDING_VARIABLES, *layers)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES
@@ -145,9 +148,10 @@ def is_choice(dataset: xarray.Dataset) -> bool:
 def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """Shots and outcomes of the solid plate, with the names of a hit map and along "hit"; None if there are none.
 
-    Its hits are the first ones of the Dataset, or one where one shot tells of all. A solid plate is its own reference.
+    Its hits are the first ones of the Dataset, or one where one shot tells of all. A solid plate that stands alone is
+    its own reference.
     """
-    if dataset.attrs.get(attr.OPEN_AREA) == 0.0:
+    if dataset.attrs.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset.variables:
         return dataset
     if not v.SOLID_VARIABLES.keys() <= dataset.variables.keys():
         return None
@@ -219,6 +223,21 @@ def history_dataset(
     return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )
+
+
+def _of_layers(scene: Scene, shots: Shots) -> dict[str, NDArray[np.float64]]:
+    """Faces of the layers, and what differs in them from shot to shot; empty if the plate stands alone."""
+    target = scene.target
+    if not target.layers:
+        return {}
+    values = dict(zip(v.LAYER_FACES, target.faces.T, strict=True))
+    for variable in v.LAYER_SCATTER:
+        if variable in shots.columns:
+            name = variable.removeprefix("layer_")
+            own = [shots.own(name, value_in(target.plate, name))]
+            own += [shots.own_of_layer(name, k, value_in(layer, name)) for k, layer in enumerate(target.layers)]
+            values[variable] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
+    return values
 
 
 def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:

@@ -11,6 +11,7 @@ from .model import Array
 from .plate import Plate
 from .scatter import Scatter
 from .shots import Hits, Impact
+from .target import Layer
 
 _ROUNDING = 1e-12
 """A smaller component of the unit vector along the line of flight, or a smaller angle [rad], counts as 0: cos 90° is
@@ -73,7 +74,7 @@ def check_scatter(hits: Hits, scatter: Scatter) -> None:
     Raises:
         ValueError: names the quantity that scatters.
     """
-    turned = _turned(scatter)
+    turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if name in scatter.given]
     if hits.irreducible and turned:
         raise ValueError(
             f"got hits.irreducible = true beside a distribution of impact.{turned[0]}, but a symmetry must hold for "
@@ -81,14 +82,18 @@ def check_scatter(hits: Hits, scatter: Scatter) -> None:
         )
 
 
-def is_possible(hits: Hits, scatter: Scatter) -> bool:
-    """Whether `check_scatter` has nothing against these hits."""
-    return not (hits.irreducible and _turned(scatter))
+def check_layers(hits: Hits, layers: Sequence[Layer]) -> None:
+    """Refuse layers that may not have the symmetry of `hits.irreducible`.
 
-
-def _turned(scatter: Scatter) -> list[str]:
-    """Quantities that scatter and turn a shot out of its symmetry."""
-    return [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if name in scatter.given]
+    Raises:
+        ValueError: names the layer.
+    """
+    for k, layer in enumerate(layers):
+        if hits.irreducible and (layer.open_area > 0.0 or layer.size is not None):
+            raise ValueError(
+                f"got hits.irreducible = true beside layer[{k}] with a pattern or a rim, but only layers that are "
+                "solid and unbounded leave the symmetry of the plate"
+            )
 
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:
