@@ -194,7 +194,8 @@ def history_dataset(
     core, plate = scene.core, scene.target.plate
     hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
     history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
-    section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * core.bounding_radius
+    farthest = np.abs(history.position[:, 1:]).max() if scene.target.layers else 0.0
+    section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * (core.bounding_radius + 0.25 * farthest)
     values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}
     values |= {
         v.PLATE_POSITION: history.position + np.array([0.0, hit_y, hit_z]),
@@ -204,6 +205,7 @@ def history_dataset(
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
     cells = (replay.cell_y, replay.cell_z)
+    values |= _sections(scene, hit, section)
     values |= outlines_in(plate, *((float(some.min()), float(some.max())) for some in cells))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
@@ -220,7 +222,8 @@ def history_dataset(
         .assign_coords(_described(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
-    return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES), values)).assign_attrs(
+    layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if scene.target.layers else ()
+    return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )
 
@@ -238,6 +241,32 @@ def _of_layers(scene: Scene, shots: Shots) -> dict[str, NDArray[np.float64]]:
             own += [shots.own_of_layer(name, k, value_in(layer, name)) for k, layer in enumerate(target.layers)]
             values[variable] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
     return values
+
+
+def _sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+    """Faces of the layers for one hit, and where each is solid along y and z through the hit point; empty if the plate
+    stands alone."""
+    target, hit_y, hit_z = scene.target, float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
+    if not target.layers:
+        return {}
+
+    def own(name: str) -> list[float]:
+        means = [value_in(plate, name) for plate in target.plates]
+        return hit[f"layer_{name}"].values.tolist() if f"layer_{name}" in hit else means
+
+    thickness = own("thickness")
+    if v.THICKNESS in hit:
+        thickness[0] = float(hit[v.THICKNESS])
+    front = np.array(target.fronts([np.array(one) for one in thickness]))
+    places = list(zip(target.plates, own("offset_y"), own("offset_z"), strict=True))
+    along_y = [plate.is_solid(hit_y - y + section, np.array(hit_z - z)) for plate, y, z in places]
+    along_z = [plate.is_solid(np.array(hit_y - y), hit_z - z + section) for plate, y, z in places]
+    return {
+        v.LAYER_FRONT: front,
+        v.LAYER_REAR: front + np.array(thickness),
+        v.LAYER_SOLID_ALONG_Y: np.array(along_y).astype(np.int8),
+        v.LAYER_SOLID_ALONG_Z: np.array(along_z).astype(np.int8),
+    }
 
 
 def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:

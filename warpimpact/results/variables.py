@@ -67,8 +67,8 @@ class Variable(str):
 
     @property
     def is_number_of_hit(self) -> bool:
-        """Whether it has one number per hit, or one per hit and stand-off. Maps and measures need this."""
-        return self.flags is None and self.dims in {("hit",), ("hit", "standoff")}
+        """Whether it has one number with a unit per hit, or one per hit and stand-off. Maps and measures need this."""
+        return self.flags is None and self.units != "1" and self.dims in {("hit",), ("hit", "standoff")}
 
 
 _HIT, _AT_STANDOFF = ("hit",), ("hit", "standoff")
@@ -265,6 +265,16 @@ SOLID_ALONG_Z = Variable(
     "solid_along_z", ("section",), "1", "1 where the plate is solid along z through the hit point, else 0"
 )
 
+LAYER_SOLID_ALONG_Y = Variable(
+    "layer_solid_along_y", ("layer", "section"), "1", "1 where the layer is solid along y through the hit point, else 0"
+)
+LAYER_SOLID_ALONG_Z = Variable(
+    "layer_solid_along_z", ("layer", "section"), "1", "1 where the layer is solid along z through the hit point, else 0"
+)
+
+LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
+"""Present only with layers behind the plate, as LAYER_FACES, which are those of the hit here."""
+
 HISTORY_VARIABLES = (
     POSITION,
     PLATE_POSITION,
@@ -288,6 +298,7 @@ RESIDUAL_ANGULAR_VELOCITY = "residual_angular_velocity"
 HIT_POINT = {"y": HIT_Y, "z": HIT_Z}
 OUTLINE = {"y": OUTLINE_Y, "z": OUTLINE_Z}
 CELL = {"y": CELL_Y, "z": CELL_Z}
+LAYER_SOLID_ALONG = {"y": LAYER_SOLID_ALONG_Y, "z": LAYER_SOLID_ALONG_Z}
 SOLID_ALONG = {"y": SOLID_ALONG_Y, "z": SOLID_ALONG_Z}
 
 # --- Study of speed and accuracy; some names also occur in a hit map, with another meaning ---

@@ -88,16 +88,21 @@ class March:
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
-        """Share of the resistance that is left after some steps of the first shot on the CPU, in the window of its
-        march."""
+        """Share of the plate's resistance that is left after some steps of the first shot on the CPU, in the window of
+        its march."""
         scratch = self._scratch(1, *self.cells)
+        for name in self._fields():  # the window of a layer that is not reached stays closed
+            getattr(scratch[0], name).zero_()
         self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
         first = self.inputs.put(np.zeros(1), wp.int32)
         self._launch(first, self._empty(self.stage.Outcomes, (1,)), scratch, 1, 0, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
-        exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
-        return np.asarray(self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure))
+        exposure = np.zeros(math.prod(self.cells))
+        if self.variant.degrades and self.arrays.materials[0].weakens:
+            exposure = _host(scratch[0].exposure)[: exposure.size]
+        decayed = np.exp(self.arrays.shots["decay_rate"][0] * exposure.reshape(self.cells))
+        return np.asarray(self._material() * decayed)
 
     def body(self) -> MassProperties:
         """Mass properties of the first shot."""

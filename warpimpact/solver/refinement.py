@@ -106,9 +106,9 @@ def simulate_to_tolerance(
 
 @dataclass(frozen=True)
 class Change:
-    """What changes between two levels: of the residual velocity [m/s], behind a layer if that is more, shape [shots],
-    and of the tilt [rad], shape [shots, stand-offs]. 0 where neither has a value, infinite where the status differs or
-    only one has a value."""
+    """What changes between two levels: of the residual velocity [m/s], or that behind a layer if it changes by more,
+    shape [shots]; and of the tilt [rad], shape [shots, stand-offs]. 0 where neither has a value, infinite where the
+    status differs or only one has a value."""
 
     residual_velocity: Array
     tilt: Array
