@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         make_shots,
     )
     from .solver.device import DeviceError
+    from .solver.limit import limit_thickness, limit_velocity
     from .solver.simulate import Outcomes, simulate
 
     __version__: str
@@ -89,6 +90,8 @@ __all__ = [
     "TrianglePattern",
     "__version__",
     "compare",
+    "limit_thickness",
+    "limit_velocity",
     "make_shots",
     "open_result",
     "read_plates",
@@ -114,6 +117,8 @@ _HOMES = {
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
     "replay": ".campaign.replay",
+    "limit_thickness": ".solver.limit",
+    "limit_velocity": ".solver.limit",
     "run": ".campaign.run",
     "run_to_file": ".campaign.run",
     "simulate": ".solver.simulate",
