@@ -73,7 +73,10 @@ class CampaignReference(FromTheCode):
             return
         yield from [f"{depth} `[{name}]`", "", part.get("description", "").capitalize(), ""]
         if len(models) > 1 and "shape" in models[0]["properties"]:
+            shared = self.shared(models)
+            yield from self.keys(shared)
             for model in models:
+                model["properties"] = {k: v for k, v in model["properties"].items() if k not in shared["properties"]}
                 yield from self.variant(model, "shape", depth + "#")
             return
         for model in models:
@@ -87,6 +90,17 @@ class CampaignReference(FromTheCode):
             for key, inner in model["properties"].items():
                 if not any("distribution" in one.get("properties", {}) or "oneOf" in one for one in self.chosen(inner)):
                     yield from self.of_table(f"{name}.{key}", inner, depth)
+
+    def shared(self, models: list[dict[str, Any]]) -> dict[str, Any]:
+        """The keys that all of some models have alike."""
+        first, *others = models
+        alike = {
+            key: part
+            for key, part in first["properties"].items()
+            if all(other["properties"].get(key) == part for other in others)
+        }
+        required = [key for key in first.get("required", []) if all(key in one.get("required", []) for one in others)]
+        return {"properties": alike, "required": required}
 
     def variant(self, model: dict[str, Any], key: str, depth: str = "###") -> Iterator[str]:
         name = model["properties"][key]["const"]

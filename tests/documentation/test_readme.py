@@ -27,6 +27,7 @@ def test_each_line_works_after_those_above_it(tmp_path: Path) -> None:
         assert line[0] == "warpimpact"
         few = ["--count", "128"] if line[1] in ("run", "compare") else []
         few = ["--trajectories", "1"] if line[1] == "report" else few
+        few = ["--hits", "2"] if line[1] == "study" else few
         done = subprocess.run(
             [sys.executable, "-c", "import sys; from warpimpact.cli import main; sys.exit(main())", *line[1:], *few],
             cwd=tmp_path,
@@ -43,6 +44,21 @@ def test_each_line_works_after_those_above_it(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", few_hits], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "perforated" in done.stdout
+
+
+@pytest.mark.skipif(not (CHECKOUT / ".git").exists(), reason="no checkout")
+def test_what_the_lines_write_is_ignored_by_git() -> None:
+    made = ["slotted.toml", "slotted.nc", "slotted.nc.parts/lock", "slotted_plate.png", "slotted_hit34_flight.png"]
+    made += ["slotted.csv", "slots.html", "round holes.nc", "two_plates.png", "warpimpact.schema.json"]
+    done = subprocess.run(
+        ["git", "check-ignore", "--stdin"],
+        input="\n".join([*made, "pyproject.toml", "README.md"]),
+        cwd=CHECKOUT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.replace('"', "").splitlines() == made
 
 
 def test_every_command_is_in_the_readme_or_in_its_help() -> None:
