@@ -25,6 +25,7 @@ class FromTheCode(SphinxDirective):
         raise NotImplementedError
 
     def run(self) -> list[nodes.Node]:
+        self.env.note_reread()  # the code may have changed
         return self.parse_text_to_nodes("\n".join(self.lines()), allow_section_headings=True)
 
 
@@ -49,6 +50,7 @@ class CampaignReference(FromTheCode):
         from warpimpact.campaign.schema import campaign_schema
 
         self.schema = campaign_schema()
+        yield from ["## Tables of the file", ""]
         yield from self.keys(self.schema)
         for name, part in self.schema["properties"].items():
             yield from self.of_table(name, part)
@@ -128,6 +130,8 @@ class CampaignReference(FromTheCode):
         return next((one for one in part.get("anyOf", []) if "type" in one), part)
 
     def kind(self, part: dict[str, Any]) -> str:
+        if "items" not in part and any("properties" in one for one in self.chosen(part)):
+            return "table"
         part = self.leaf(part)
         if "unit" in part:
             return str(part["unit"])
@@ -138,8 +142,6 @@ class CampaignReference(FromTheCode):
             return f"list of {self.kind(inner)}"
         if "$ref" in part and "properties" not in self.definition(part["$ref"]):
             return self.kind(self.definition(part["$ref"]))
-        if self.chosen(part):
-            return "table"
         kinds = part.get("type", "string")
         return "number" if isinstance(kinds, list) else {"string": "text", "boolean": "true or false"}.get(kinds, kinds)
 
@@ -155,7 +157,7 @@ class CampaignReference(FromTheCode):
 
     def bounds(self, part: dict[str, Any]) -> str:
         part = self.leaf(part)
-        inner = part.get("items", {}) if part.get("type") == "array" else part
+        inner = (part.get("items") or part.get("prefixItems", [{}])[0]) if part.get("type") == "array" else part
         words = [f'"{one}"' if isinstance(one, str) else str(one) for one in inner.get("enum", [])]
         told = [", ".join(map(code, words))] if words else []
         for name, sign in (("exclusiveMinimum", ">"), ("minimum", "≥"), ("exclusiveMaximum", "<"), ("maximum", "≤")):

@@ -45,6 +45,7 @@ def test_every_key_of_a_campaign_is_on_its_page(pages: Path) -> None:
     keys = {key for one in (schema, *schema["$defs"].values()) for key in one.get("properties", {})}
     assert len(keys) > 60
     assert not [key for key in keys if not re.search(rf"\b{key}\b", shown)]
+    assert "title" in shown.partition("[core]")[0]
     assert "2^30" in shown  # of hits.count
     assert "7850 kg/m^3" in shown  # default with its unit
 
