@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .campaign.replay import replay
     from .campaign.run import run, run_to_file
     from .campaign.stop import Stop
-    from .campaign.team import ClusterError
+    from .campaign.team import ClusterError, cluster_team
     from .campaign.text import CampaignError
     from .export.table import to_dataframe
     from .results.files import OutputError, ResultError, open_result
@@ -89,6 +89,7 @@ __all__ = [
     "Tolerance",
     "TrianglePattern",
     "__version__",
+    "cluster_team",
     "compare",
     "limit_thickness",
     "limit_velocity",
@@ -113,6 +114,7 @@ _HOMES = {
     "OutputError": ".results.files",
     "ResultError": ".results.files",
     "Stop": ".campaign.stop",
+    "cluster_team": ".campaign.team",
     "compare": ".analysis.comparison",
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
