@@ -40,7 +40,8 @@ def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:
         yield "core.density", "core.density", core.density
     yield "core: mass", "core.mass", core.mass_properties.mass
     for name in _OF_A_PLATE:
-        yield f"plate.{name}", f"plate.{name}", getattr(plate, name)
+        if (value := getattr(plate, name)) is not None:  # exposure counts the time or the path
+            yield f"plate.{name}", f"plate.{name}", value
     for side in plate.size or ():
         yield "plate.size", "plate.size", side
     if plate.open_area > 0.0:

@@ -15,6 +15,7 @@ from warpimpact import __version__
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
+from .limit import add_limit
 from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
 from .replay import add_replay
@@ -23,6 +24,7 @@ from .show import add_inspect, add_plate, add_plot
 
 _COMMANDS = (
     add_run,
+    add_limit,
     add_inspect,
     add_plot,
     add_compare,

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from warpimpact.scene import Scene, Shots
+    from warpimpact.solver.limit import Limits
     from warpimpact.solver.refinement import Estimates
     from warpimpact.solver.simulate import Outcomes, Replay
 
@@ -79,6 +80,19 @@ def to_dataset(
         _described(v.COORDINATES, coordinates),
         _ATTRIBUTES | dict(attributes) | {attr.PLATE_PERIOD: np.array(period)},
     )
+
+
+def with_limits(dataset: xarray.Dataset, quantity: str, limits: Limits, images: int) -> xarray.Dataset:
+    """The Dataset of shots that just perforate, with their limits.
+
+    Args:
+        quantity: of the limits, a key of LIMITS.
+        limits: of the first of every `images` shots, SI.
+    """
+    names = v.LIMITS[quantity]
+    values: dict[str, Any] = {name: np.repeat(getattr(limits, name.field), images) for name in names}
+    values[names.converged] = values[names.converged].astype(np.int8)
+    return dataset.assign(_described(names, values))
 
 
 def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:

@@ -56,8 +56,8 @@ class Measure:
         share: share of the values below a quantile.
         above, limit: side and limit of a probability, in the units of the Dataset.
 
-    A share counts all shots except those whose computation failed. The other kinds count the cores that passed the
-    plate.
+    A share, and what is asked of limits, counts all shots except those whose computation failed. The other kinds count
+    the cores that passed the plate.
     """
 
     text: str
@@ -132,7 +132,10 @@ class Measure:
         column = dataset[self.variable]
         if self.standoff is not None:
             column = column.sel(standoff=self.standoff, method="nearest")
-        values = np.where(passed(dataset), column.values, np.nan)
+        counts = ~failed(dataset) if self.variable in v.LIMIT_VARIABLES else passed(dataset)
+        values = np.where(counts, column.values, np.nan)
+        if self.kind == "mean":
+            return np.where(np.isinf(values), np.nan, values)  # a limit beyond the largest value tried
         if self.kind != "probability":
             return values
         beyond = values > self.limit if self.above else values < self.limit

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -169,6 +169,36 @@ LEVEL = Variable("level", _HIT, "1", "level of resolution on which the hit was c
 ESTIMATE_VARIABLES = (RESIDUAL_VELOCITY_ERROR, TILT_ERROR, CONVERGED, LEVEL)
 """Present only in a run to a tolerance."""
 
+
+class LimitVariables(NamedTuple):
+    """The variables of a search of limits."""
+
+    value: Variable
+    lower: Variable
+    upper: Variable
+    runs: Variable
+    converged: Variable
+
+
+def _limit_variables(quantity: str, units: str, long_name: str) -> LimitVariables:
+    name = f"limit_{quantity}"
+    return LimitVariables(
+        Variable(name, _HIT, units, long_name, field="value", shown_by=_MAIN),
+        Variable(f"{name}_lower", _HIT, units, f"{long_name}, lower end", field="lower"),
+        Variable(f"{name}_upper", _HIT, units, f"{long_name}, upper end", field="upper"),
+        Variable("limit_runs", _HIT, "1", "how often the hit was computed", field="runs"),
+        Variable("limit_converged", _HIT, "1", "whether the ends meet the tolerance, 1 or 0", field="converged"),
+    )
+
+
+LIMITS = {
+    "velocity": _limit_variables("velocity", "m s-1", "limit velocity"),
+    "thickness": _limit_variables("thickness", "m", "limit thickness of the plate"),
+}
+"""By the quantity of a search. Present only in a result of `warpimpact limit`, whose other variables are those of the
+shot as it just perforates: at the end of its limit where the core passed."""
+LIMIT_VARIABLES = tuple(variables.value for variables in LIMITS.values())
+
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
@@ -176,7 +206,9 @@ OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *OUTLINE_VARIABLES)
 """Present in every hit map."""
-HIT_NUMBERS = tuple(v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit)
+HIT_NUMBERS = tuple(
+    v for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit
+)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
 # --- History of one hit ---
