@@ -45,15 +45,30 @@ class Output(Record):
     Attributes:
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
         solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
+        exit_state: store velocity, axis and position of every core at the end of contact.
     """
 
     standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1, max_length=64)] = (0.05, 0.13)
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
+    exit_state: Annotated[bool, Field(strict=True)] = True
 
 
 class Campaign(Model):
-    """What is shot at what, where, how finely it is computed and what is reported."""
+    """What is shot at what, where, how finely it is computed and what is reported.
+
+    Attributes:
+        title: one line, which figures and reports show.
+        core: the rigid core.
+        plate: what it is shot at.
+        impact: how the core arrives.
+        hits: where it hits.
+        interaction: stress on the surface of the core.
+        numerics: how finely the shots are computed.
+        output: what is reported.
+        scatter: distributions of values that scatter. A file has them in the places of the values.
+        stop: when the run ends, instead of a count.
+    """
 
     title: Title
     core: AnyCore

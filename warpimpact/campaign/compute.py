@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -16,7 +17,8 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import solid_dataset, to_dataset
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import solid_coordinates, to_dataset
 from warpimpact.scene import Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
@@ -76,7 +78,8 @@ def compute(
     if solid.thickness is not None:
         solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
     reference = scene.model_copy(update={"target": thinner})
-    return dataset.merge(solid_dataset(_outcomes(reference, solid, numerics, device, threads)[0]))
+    outcomes, _ = _outcomes(reference, solid, numerics, device, threads)
+    return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
 
 
 def described(
@@ -101,7 +104,7 @@ def described(
     """
     scene, group, chosen = campaign.scene, campaign.symmetries, find_device(device)
     computed, ligament = len(shots) // len(group), campaign.plate.ligament
-    return to_dataset(
+    dataset = to_dataset(
         scene,
         shots,
         unfolded(outcomes, group),
@@ -112,6 +115,7 @@ def described(
             attr.CAMPAIGN: campaign.text,
             attr.CAMPAIGN_ANGLES: "degree",
             **attr.versions(),
+            **attr.machine(),
             attr.DEVICE: f"{chosen.alias} ({chosen.name})",
             attr.SAMPLING: campaign.hits.sampling,
             attr.SEED: campaign.hits.seed,
@@ -120,9 +124,11 @@ def described(
             attr.OPEN_AREA: campaign.plate.open_area,
             attr.AREAL_DENSITY: campaign.plate.areal_density,
             attr.CORE: campaign.core.model_dump_json(),
+            attr.PLATE: _plate(campaign),
             attr.IMPACT: _impact(campaign),
             attr.MATERIAL: _material(campaign),
             attr.NUMERICS: _numerics(campaign, numerics, shots),
+            **_numbers_of(campaign, numerics, shots),
             attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             attr.FAILED_SHARE: campaign.output.failed_share,
             attr.COMPUTE_TIME: elapsed,
@@ -133,7 +139,9 @@ def described(
         | (_symmetry(group, computed) if campaign.hits.irreducible else {})
         | dict(attributes),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
+        double=is_double(campaign),
     )
+    return dataset if campaign.output.exit_state else dataset.drop_vars(v.EXIT_VARIABLES)
 
 
 class HitMap:
@@ -160,6 +168,11 @@ class HitMap:
     def promise_in(self, dataset: xarray.Dataset) -> Any:
         """What was found by the pilot of a result."""
         return promise_in(dataset)
+
+
+def is_double(campaign: Campaign) -> bool:
+    """Whether it is computed, and stored, in double precision."""
+    return campaign.numerics.precision == "double"
 
 
 def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
@@ -245,6 +258,14 @@ def _material(campaign: Campaign) -> str:
     return json.dumps(of_plate | campaign.interaction.model_dump())
 
 
+def _plate(campaign: Campaign) -> str:
+    """The plate as JSON; of a mask, the name of its file."""
+    told = campaign.plate.model_dump(mode="json")
+    if isinstance(file := told["pattern"].get("file"), str):
+        told["pattern"]["file"] = Path(file).name
+    return json.dumps(told)
+
+
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
     """Symmetries by which hits were unfolded, and the number of computed hits."""
     return {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
@@ -276,3 +297,20 @@ def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
     )
+
+
+def _numbers_of(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -> dict[str, Any]:
+    """The numerics in force as numbers, by the names of attributes."""
+    precision = {attr.PRECISION: "double" if is_double(campaign) else "single"}
+    if (tolerance := campaign.numerics.tolerance) is not None:
+        return precision | {
+            attr.TOLERANCE_RESIDUAL_VELOCITY: tolerance.residual_velocity,
+            attr.TOLERANCE_TILT: math.degrees(tolerance.tilt),
+        }
+    resolution = resolve(numerics, campaign.scene, shots.columns)
+    return precision | {
+        attr.PATCHES_AXIAL: resolution.patches_axial,
+        attr.PATCHES_AROUND: resolution.patches_around,
+        attr.GRID_SPACING: resolution.grid_spacing,
+        attr.TIME_STEP: resolution.step_of(campaign.impact, campaign.plate),
+    }

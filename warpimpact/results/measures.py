@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images, passed
+from warpimpact.results.dataset import failed, images, is_choice, passed
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -133,7 +133,7 @@ class Measure:
         if self.standoff is not None:
             column = column.sel(standoff=self.standoff, method="nearest")
         counts = ~failed(dataset) if self.variable in v.LIMIT_VARIABLES else passed(dataset)
-        values = np.where(counts, column.values, np.nan)
+        values = np.where(counts, column.values.astype(np.float64), np.nan)
         if self.kind == "mean":
             return np.where(np.isinf(values), np.nan, values)  # a limit beyond the largest value tried
         if self.kind != "probability":
@@ -169,5 +169,7 @@ class Tally:
 
 
 def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
-    """Arguments of `Dealt` that fit the sampling of a result."""
+    """Arguments of `Dealt` that fit the sampling of a result. Chosen hits are no longer dealt out in turn."""
+    if is_choice(dataset):
+        return {"replicates": 1, "images": 1}
     return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": images(dataset)}

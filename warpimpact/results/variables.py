@@ -1,4 +1,7 @@
-"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings."""
+"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings.
+
+Long because it is one table: each variable stands here once.
+"""
 
 from __future__ import annotations
 
@@ -72,12 +75,13 @@ _HIT, _AT_STANDOFF = ("hit",), ("hit", "standoff")
 _MAIN = ("run", "inspect", "plot", "report")
 
 # --- Coordinates of a hit map ---
+HIT = Variable("hit", _HIT, "1", "number of the hit in its campaign, from 0")
 HIT_Y = Variable("hit_y", _HIT, "m", "hit point on the front face, y")
 HIT_Z = Variable("hit_z", _HIT, "m", "hit point on the front face, z")
 STANDOFF = Variable("standoff", ("standoff",), "m", "distance behind the rear face")
 AXIS = Variable("axis", ("axis",), "1", "axis of the plate frame")
 
-COORDINATES = (HIT_Y, HIT_Z, STANDOFF, AXIS)
+COORDINATES = (HIT, HIT_Y, HIT_Z, STANDOFF, AXIS)
 
 # --- Impact ---
 IMPACT_VELOCITY = Variable("impact_velocity", _HIT, "m s-1", "impact velocity", field="velocity")
@@ -107,7 +111,7 @@ SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS
 STATUS = Variable("status", _HIT, "1", "how the shot ended", flags=Status)
 RESIDUAL_VELOCITY = Variable("residual_velocity", _HIT, "m s-1", "residual velocity", shown_by=_MAIN)
 DEFLECTION = Variable("deflection", _HIT, "degree", "angle between residual velocity and line of fire", shown_by=_MAIN)
-ANGULAR_VELOCITY = Variable("angular_velocity", ("hit", "axis"), "rad s-1", "residual angular velocity")
+ANGULAR_VELOCITY = Variable("angular_velocity", ("hit", "axis"), "rad s-1", "angular velocity at the end of contact")
 ENERGY_LOSS = Variable("energy_loss", _HIT, "J", "kinetic energy lost in the plate")
 CONTACT_DURATION = Variable("contact_duration", _HIT, "s", "duration of contact")
 TILT = Variable("tilt", _AT_STANDOFF, "degree", "angle between core axis and line of fire", shown_by=_MAIN)
@@ -127,6 +131,14 @@ OUTCOME_VARIABLES = (
     YAW,
     TOTAL_YAW,
 )
+
+_VECTOR = ("hit", "axis")
+EXIT_VELOCITY = Variable("exit_velocity", _VECTOR, "m s-1", "velocity at the end of contact")
+EXIT_AXIS = Variable("exit_axis", _VECTOR, "1", "unit vector along the core towards its nose at the end of contact")
+EXIT_POSITION = Variable("exit_position", _VECTOR, "m", "centre of mass at the end of contact, in the plate frame")
+
+EXIT_VARIABLES = (EXIT_VELOCITY, EXIT_AXIS, EXIT_POSITION)
+"""Present unless `output.exit_state` is false. With `angular_velocity` they start a flight behind the plate."""
 
 
 def _solid(variable: Variable) -> Variable:
@@ -204,7 +216,11 @@ OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit c
 
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
-VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *OUTLINE_VARIABLES)
+GROUPS = {"plate": OUTLINE_VARIABLES, "solid": tuple(SOLID_VARIABLES)}
+"""What is not along "hit" stands in groups of the file. In memory these are coordinates, which no choice of hits
+spreads over the hits."""
+
+VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
 HIT_NUMBERS = tuple(
     v for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit
@@ -352,4 +368,4 @@ def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    return [*OUTCOME_VARIABLES, *(name for name in BENDING_VARIABLES if name in dataset)]
+    return [*OUTCOME_VARIABLES, *(name for name in (*EXIT_VARIABLES, *BENDING_VARIABLES) if name in dataset)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +11,7 @@ from .model import Array
 from .plate import Plate
 from .scatter import EDGE, QUANTITIES, Scatter
 from .shots import Hits, Impact, Shots
+from .sobol import Sobol
 from .symmetry import check_scatter, irreducible_part, symmetries_used
 
 _HIT_COLUMNS = 2
@@ -47,7 +47,7 @@ class Sampler:
         self._hits = hits.model_copy(update={"count": computed})
         self._scatter = (scatter or Scatter()).given
         dimensions = _HIT_COLUMNS + (len(QUANTITIES) if self._scatter else 0)
-        self._sobol = [_Sobol(dimensions, hits.seed, replicate) for replicate in range(replicates)]
+        self._sobol = [Sobol(dimensions, _seed(hits.seed, replicate)) for replicate in range(replicates)]
 
     def __len__(self) -> int:
         """Number of shots."""
@@ -118,27 +118,9 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
     return sampler.shots(0, len(sampler))
 
 
-class _Sobol:
-    """One scrambled Sobol sequence. It remembers how far it was read."""
-
-    def __init__(self, dimensions: int, seed: int, replicate: int) -> None:
-        self.dimensions, self._seed = dimensions, seed
-        self._key = (replicate,) if replicate else ()
-        self._engine: Any = None
-
-    def points(self, first: int, count: int) -> Array:
-        """Points of the unit cube from number `first` on, shape [count, dimensions]."""
-        from scipy.stats.qmc import Sobol  # a second to import
-
-        if self._engine is None or self._engine.num_generated > first:
-            seed = np.random.SeedSequence(self._seed, spawn_key=self._key)  # new: the engine counts what it spawns
-            self._engine = Sobol(d=self.dimensions, rng=np.random.default_rng(seed))
-        if first > self._engine.num_generated:
-            self._engine.fast_forward(first - self._engine.num_generated)
-        # The sequence is balanced at powers of two. scipy warns if the first draw has another number of points.
-        drawn = 1 << (count - 1).bit_length() if first == 0 else count
-        points: Array = self._engine.random(drawn)
-        return points[:count]
+def _seed(seed: int, replicate: int) -> np.random.SeedSequence:
+    """Seed of one scrambling."""
+    return np.random.SeedSequence(seed, spawn_key=(replicate,) if replicate else ())
 
 
 def _pairs(seed: int, first: int, count: int) -> tuple[Array, Array]:

@@ -88,7 +88,11 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Distribution(Model, ABC):
-    """A distribution of one quantity; its fields hold SI and radians."""
+    """A distribution of one quantity; its fields hold SI and radians.
+
+    Attributes:
+        distribution: its name.
+    """
 
     distribution: str
 
@@ -111,7 +115,12 @@ class Continuous(Distribution, ABC):
 
 
 class Bounded(Continuous, ABC):
-    """A distribution that ends at low and high."""
+    """A distribution that ends at low and high.
+
+    Attributes:
+        low: smallest value.
+        high: largest value.
+    """
 
     low: _Finite
     high: _Finite
@@ -124,7 +133,12 @@ class Bounded(Continuous, ABC):
 
 
 class Normal(Continuous):
-    """Mean and standard deviation."""
+    """Mean and standard deviation.
+
+    Attributes:
+        mean: of the quantity.
+        std: standard deviation.
+    """
 
     distribution: Literal["normal"] = "normal"
     mean: _Finite
@@ -137,7 +151,12 @@ class Normal(Continuous):
 
 
 class TruncatedNormal(Bounded):
-    """The part of a normal distribution between low and high; `mean` and `std` are those of the whole."""
+    """The part of a normal distribution between low and high; `mean` and `std` are those of the whole.
+
+    Attributes:
+        mean: of the whole distribution.
+        std: standard deviation of the whole distribution.
+    """
 
     distribution: Literal["truncated_normal"] = "truncated_normal"
     mean: _Finite
@@ -166,7 +185,11 @@ class Uniform(Bounded):
 
 
 class Triangular(Bounded):
-    """From low to high with its peak at mode."""
+    """From low to high with its peak at mode.
+
+    Attributes:
+        mode: where the peak is.
+    """
 
     distribution: Literal["triangular"] = "triangular"
     mode: _Finite
@@ -185,8 +208,12 @@ class Triangular(Bounded):
 
 
 class Lognormal(Continuous):
-    """The logarithm is normal. Half of the values lie below `median`; `sigma` is the standard deviation of the
-    logarithm."""
+    """The logarithm is normal.
+
+    Attributes:
+        median: half of the values lie below it.
+        sigma: standard deviation of the logarithm.
+    """
 
     distribution: Literal["lognormal"] = "lognormal"
     median: _Positive
@@ -199,8 +226,12 @@ class Lognormal(Continuous):
 
 
 class Discrete(Distribution):
-    """One of several values. Weights are proportional to the probabilities; without weights all values are equally
-    probable."""
+    """One of several values.
+
+    Attributes:
+        values: those that there are.
+        weights: proportional to the probabilities; without weights all values are equally probable.
+    """
 
     distribution: Literal["discrete"] = "discrete"
     values: Annotated[tuple[_Finite, ...], Field(min_length=1)]
@@ -227,7 +258,7 @@ class Discrete(Distribution):
 AnyDistribution = Annotated[
     Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Discrete, Field(discriminator="distribution")
 ]
-_PURE_NUMBERS = {"distribution", "sigma", "weights"}
+PURE_NUMBERS = {"distribution", "sigma", "weights"}
 
 
 class Scatter(Model):
@@ -257,7 +288,7 @@ class Scatter(Model):
             return value
         assert info.field_name is not None
         read = quantity(QUANTITIES[info.field_name].type)
-        return {name: part if name in _PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
+        return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
 
     @field_validator("*", mode="after")
     @classmethod
@@ -278,7 +309,7 @@ class Scatter(Model):
         if not isinstance(written, dict) or quantity(QUANTITIES[info.field_name].type).unit != "rad":
             return written
         mark = in_radians if info.mode == "json" else Radians
-        return {name: part if name in _PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
+        return {name: part if name in PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
 
     @property
     def given(self) -> dict[str, Distribution]:

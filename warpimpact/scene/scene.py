@@ -1,7 +1,7 @@
 """Scene: one core, its target, how the material resists, and what is recorded of a shot."""
 
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
@@ -78,6 +78,12 @@ class Target(Model):
     plate: Plate
 
 
+if TYPE_CHECKING:
+    AnyTarget: TypeAlias = Target | Any  # what a scene holds, or what it takes, a plate above all
+else:
+    AnyTarget = Target
+
+
 class Scene(Model):
     """What is shot at what, and what is recorded. Outcomes depend on the scene, the shots and the numerics only.
 
@@ -89,7 +95,7 @@ class Scene(Model):
     """
 
     core: AnyCore
-    target: Target
+    target: AnyTarget
     interaction: Interaction = Interaction()
     record: Record = Record()
 

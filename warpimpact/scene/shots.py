@@ -35,8 +35,12 @@ def _is_tilt(angle: float) -> float:
     return angle
 
 
-Obliquity = Annotated[Angle, AfterValidator(_is_obliquity)]
-Tilt = Annotated[Angle, AfterValidator(_is_tilt)]
+Obliquity = Annotated[
+    Angle, AfterValidator(_is_obliquity), Field(json_schema_extra={"minimum": 0, "exclusiveMaximum": 90})
+]
+Tilt = Annotated[
+    Angle, AfterValidator(_is_tilt), Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90})
+]
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 
 
@@ -46,7 +50,7 @@ class Impact(Model):
     An angle is given in degrees, or as a string with its unit; the fields hold radians.
 
     Attributes:
-        velocity: [m/s].
+        velocity: of the centre of mass [m/s].
         obliquity: angle between line of flight and plate normal [rad].
         azimuth: direction of the obliquity in the plate, from +y towards +z [rad].
         pitch, yaw: projected attitude of the axis beyond that of the line of flight [rad].
@@ -85,7 +89,7 @@ class Hits(Model):
             those quantities: angles in degrees, all else in SI.
         repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
         replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
-            two. Their spread tells how certain a mean is; `scramblings` says what None is.
+            two; 16 unless given. Their spread tells how certain a mean is.
         area: what the sampling covers: one unit cell, or a plate smaller than it, or all of a finite "plate".
         irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
             each hit there with its images, as many in all as `count` holds, or one hit's.

@@ -176,7 +176,7 @@ def _most_steps(resolution: Resolution, conditions: dict[str, Array]) -> int:
     """Steps after which any of the shots is given up."""
     names = ("velocity", "obliquity", "thickness", "longest_time")
     step = resolution.step_at(*(conditions[name] for name in names))
-    return math.ceil((conditions["longest_way"] / (conditions["velocity"] * step)).max())
+    return math.ceil(float((conditions["longest_way"] / (conditions["velocity"] * step)).max()))
 
 
 def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) -> Array:

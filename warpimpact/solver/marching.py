@@ -95,7 +95,7 @@ class March:
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
         exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
-        return self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure)
+        return np.asarray(self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure))
 
     def body(self) -> MassProperties:
         """Mass properties of the first shot."""
@@ -133,6 +133,7 @@ class March:
         )
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
         status = contact.status.numpy().astype(np.int8)
+        values |= _exits(contact, status)
         return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
@@ -175,8 +176,8 @@ class March:
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        per_ring = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        rings = self.inputs.surface.rings * per_ring
+        per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        rings: int = self.inputs.surface.rings * per_ring
         return len(self._fields()) * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
@@ -185,7 +186,7 @@ class March:
 
     @property
     def _keeps_fields(self) -> bool:
-        return self.variant.nodal or self.variant.degrades
+        return bool(self.variant.nodal or self.variant.degrades)
 
     def _patches(self) -> int:
         """Patches of a slot's touches."""
@@ -287,6 +288,17 @@ class March:
             for count in pool.map(work, _chunks(total, max(1, min(CPU_CHUNK, total // (4 * len(slots)))))):
                 done += count
                 progress(done)
+
+
+def _exits(contact: Any, status: NDArray[np.int8]) -> dict[str, Array]:
+    """The state of every core at the end of contact; NaN where the computation failed."""
+    failed, arrested = (status >= Status.UNFINISHED)[:, None], (status == Status.ARRESTED)[:, None]
+    state = {
+        "exit_velocity": np.where(arrested, 0.0, _host(contact.velocity)),
+        "exit_axis": _host(contact.axis),
+        "exit_position": _host(contact.position),
+    }
+    return {name: np.where(failed, np.nan, values) for name, values in state.items()}
 
 
 def _after(finished: int, total: int, progress: Progress) -> Progress1:

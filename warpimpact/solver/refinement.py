@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 LEVELS = (0, 2, 4, 6, 8)
 """Levels of LADDER that a shot goes through, each some four times as expensive as the one before."""
-CLOSE, FAR = 0.4, 1.0
+CLOSE, FAR = 0.25, 1.0
 """A shot has converged where its last change is at most CLOSE of the tolerance; or where its last change is within the
 tolerance and the change from two levels before within FAR times that. Two levels may agree by chance, three rarely."""
 
@@ -122,7 +122,7 @@ class Change:
     def in_tolerances(self, tolerance: Tolerance) -> Array:
         """The larger of both in units of the tolerance, shape [shots]."""
         tilt = self.tilt.max(axis=1, initial=0.0) / tolerance.tilt
-        return np.maximum(self.residual_velocity / tolerance.residual_velocity, tilt)
+        return np.asarray(np.maximum(self.residual_velocity / tolerance.residual_velocity, tilt))
 
 
 def _apart(coarse: Array, fine: Array) -> Array:

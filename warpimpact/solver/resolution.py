@@ -62,6 +62,7 @@ LADDER = (
     Fidelity(60, 80, 3.5, 0.1),
     Fidelity(84, 108, 5.0, 0.07),
     Fidelity(116, 148, 7.0, 0.05),
+    Fidelity(160, 204, 10.0, 0.035),
 )
 """Levels of resolution, coarse to fine: patches, grid and step are refined together. The error about halves from one
 to the next, and the cost about doubles."""

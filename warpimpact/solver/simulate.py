@@ -34,6 +34,9 @@ class Outcomes:
         tilt: angle between core axis and line of fire [rad], shape [shots, stand-offs].
         pitch, yaw: projected angles of the axis [rad], shape [shots, stand-offs].
         total_yaw: angle between core axis and residual velocity [rad], shape [shots, stand-offs].
+        exit_velocity: at the end of contact, plate frame [m/s], shape [shots, 3]; 0 for an arrested core.
+        exit_axis: unit vector towards the nose then, shape [shots, 3].
+        exit_position: centre of mass then, from the hit point [m], shape [shots, 3].
     """
 
     status: NDArray[np.int8]
@@ -46,6 +49,9 @@ class Outcomes:
     pitch: Array
     yaw: Array
     total_yaw: Array
+    exit_velocity: Array
+    exit_axis: Array
+    exit_position: Array
 
 
 @dataclass(frozen=True)
