@@ -50,7 +50,8 @@ class Measure:
 
     Attributes:
         text: as the user wrote it.
-        kind: "mean", "quantile", "probability" (of a variable beyond a limit) or "share" (of a status).
+        kind: "mean", "quantile", "probability" (of a variable beyond a limit) or "share" (of a status, or of broken
+            cores).
         variable: of the Dataset, or the status of a share.
         standoff: distance behind the rear face [m], if the variable depends on it.
         share: share of the values below a quantile.
@@ -85,7 +86,7 @@ class Measure:
 
     @classmethod
     def _from(cls, text: str, kind: str, parts: dict[str, str]) -> Self:
-        name, allowed = parts["variable"], tuple(STATUSES) if kind == "share" else MEASURED
+        name, allowed = parts["variable"], (*STATUSES, str(v.BROKEN)) if kind == "share" else MEASURED
         if name not in allowed:
             raise ValueError(f'got "{name}", but it must be one of {", ".join(allowed)}')
         if kind == "share":
@@ -127,6 +128,8 @@ class Measure:
 
     def values(self, dataset: xarray.Dataset) -> Array:
         """The number of every shot, shape [hits]; NaN for a shot that does not count."""
+        if self.kind == "share" and self.variable == v.BROKEN:
+            return np.asarray(dataset[v.BROKEN].values, dtype=np.float64)  # NaN of a failed shot
         if self.kind == "share":
             return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
         column = dataset[self.variable]

@@ -103,8 +103,9 @@ SHEAR_COEFFICIENT = Variable("shear_coefficient", _HIT, "1", "friction per norma
 DEGRADATION = Variable("degradation", _HIT, "1", "share of the resistance left after an interval of contact")
 THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
 MASS = Variable("mass", _HIT, "kg", "mass of the core")
+STRENGTH = Variable("strength", _HIT, "Pa", "strength of the core, a nominal bending stress")
 
-SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS)
+SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH)
 """Present only in a campaign in which they differ from shot to shot."""
 
 # --- How the shot ended ---
@@ -181,6 +182,14 @@ LEVEL = Variable("level", _HIT, "1", "level of resolution on which the hit was c
 ESTIMATE_VARIABLES = (RESIDUAL_VELOCITY_ERROR, TILT_ERROR, CONVERGED, LEVEL)
 """Present only in a run to a tolerance."""
 
+BROKEN = Variable("broken", _HIT, "1", "1 where the bending stress passed the strength of the core, else 0")
+BROKEN_TIME = Variable("broken_time", _HIT, "s", "when the core broke, since the first touch of the front face")
+BROKEN_X = Variable("broken_x", _HIT, "m", "where the section that broke was, behind the front face")
+BROKEN_SECTION = Variable("broken_section", _HIT, "m", "distance of the section that broke from the nose")
+
+BROKEN_VARIABLES = (BROKEN, BROKEN_TIME, BROKEN_X, BROKEN_SECTION)
+"""Present only for a core with a strength. A broken core goes on as one rigid body."""
+
 
 class LimitVariables(NamedTuple):
     """The variables of a search of limits."""
@@ -223,7 +232,9 @@ spreads over the hits."""
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
 HIT_NUMBERS = tuple(
-    v for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit
+    v
+    for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES, *BROKEN_VARIABLES)
+    if v.is_number_of_hit
 )
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
@@ -368,4 +379,7 @@ def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    return [*OUTCOME_VARIABLES, *(name for name in (*EXIT_VARIABLES, *BENDING_VARIABLES) if name in dataset)]
+    return [
+        *OUTCOME_VARIABLES,
+        *(name for name in (*EXIT_VARIABLES, *BENDING_VARIABLES, *BROKEN_VARIABLES) if name in dataset),
+    ]

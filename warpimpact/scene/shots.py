@@ -170,7 +170,7 @@ class Shots:
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
         resistance [Pa], shear_coefficient, degradation, thickness [m]: of the plate, and
-        mass: of the core [kg]; None where all shots have the scene's own value.
+        mass [kg], strength [Pa]: of the core; None where all shots have the scene's own value.
     """
 
     hit_y: Array
@@ -186,6 +186,7 @@ class Shots:
     degradation: Array | None = None
     thickness: Array | None = None
     mass: Array | None = None
+    strength: Array | None = None
 
     def __len__(self) -> int:
         """Number of shots."""

@@ -27,6 +27,8 @@ LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
 STEP_ALLOWANCE = 200
 """How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+UNBREAKABLE = 1.0e30
+"""Strength of a core that has none [Pa], beyond any stress."""
 
 
 @dataclass(frozen=True)
@@ -161,6 +163,7 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots) -> dict[str,
         "inertia_transverse": scale * body.inertia_transverse,
         "a0": a0,
         "a1": a1,
+        "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
         "friction": shots.own("shear_coefficient", plate.shear_coefficient),
         "decay_rate": decay_rate(degradation, plate.degradation_unit),
         "degradation": degradation,

@@ -137,8 +137,8 @@ class March:
         return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
-        """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is
-        0."""
+        """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is 0.
+        Of cores that have a strength: whether, when and where they broke."""
         found = self.bending.numpy()
         columns = {
             "largest_bending_moment": found["moment"],
@@ -146,6 +146,11 @@ class March:
             "bending_stress": found["stress"],
             "bending_stress_section": np.where(found["stress"] > 0.0, found["stress_station"], np.nan),
         }
+        if self.scene.core.strength is not None or self.shots.strength is not None:
+            broken = found["broken"] > 0
+            columns["broken"] = found["broken"]
+            columns |= {name: np.where(broken, found[name], np.nan) for name in ("broken_time", "broken_x")}
+            columns["broken_section"] = np.where(broken, found["broken_station"], np.nan)
         failed = status >= Status.UNFINISHED
         return {name: np.where(failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
 

@@ -72,6 +72,23 @@ class BentOutcomes(Outcomes):
 
 
 @dataclass(frozen=True)
+class BrokenOutcomes(BentOutcomes):
+    """Outcomes of cores that have a strength; arrays of shape [shots]. A broken core goes on as one rigid body.
+
+    Attributes:
+        broken: 1 where the nominal bending stress passed the strength, else 0.
+        broken_time: when it first did, since the first touch of the front face [s]; the middle of a step.
+        broken_x: where its most stressed section was then, behind the front face [m].
+        broken_section: distance of this section behind the nose tip [m].
+    """
+
+    broken: Array
+    broken_time: Array
+    broken_x: Array
+    broken_section: Array
+
+
+@dataclass(frozen=True)
 class Replay:
     """One shot with its full history: SI, float64.
 
@@ -130,7 +147,8 @@ def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
 
 def _outcomes(march: March, contact: Any) -> Outcomes:
     report = march.report(contact)
-    return BentOutcomes(**report) if march.variant.bends else Outcomes(**report)
+    kind = BrokenOutcomes if "broken" in report else BentOutcomes if march.variant.bends else Outcomes
+    return kind(**report)
 
 
 def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None) -> list[Array]:
