@@ -73,7 +73,7 @@ class LimitMap(HitMap):
         try:
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
-            raise CampaignError(f"plate: {error}") from None
+            raise CampaignError(str(error)) from None
         if quantity == "velocity":
             return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
         return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * campaign.plate.thickness)

@@ -9,6 +9,7 @@ from .core import AnyCore, Core
 from .interaction import Interaction
 from .model import Model
 from .plate import Plate
+from .target import Target
 from .units import PositiveLength
 
 
@@ -16,7 +17,7 @@ class Record(Model):
     """What is recorded of every shot beside how it ended.
 
     Attributes:
-        standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
+        standoffs: distances behind the rear face of the target at which the attitude is reported [m], increasing.
         standoff_point: the point of the core that passes them.
         bending: whether the largest bending moment and stress of each core are reported.
     """
@@ -52,7 +53,7 @@ class Record(Model):
             )
 
     def check_standoffs(self, core: Core) -> None:
-        """Refuse stand-offs at which a core may still be in the plate.
+        """Refuse stand-offs at which a core may still be in the target.
 
         Raises:
             ValueError: names the first stand-off and the least that is allowed.
@@ -63,23 +64,13 @@ class Record(Model):
         if self.standoffs and self.standoffs[0] < needed:
             raise ValueError(
                 f"got {self._name}.standoffs of {self.standoffs[0]:g} m, "
-                f"but a core of this size is certain to be out of the plate only from {needed:.4g} m"
+                f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
             )
 
     @property
     def _name(self) -> str:
         """Name of the field that holds this record."""
         return type(self).__name__.lower()
-
-
-class Target(Model):
-    """What is shot at.
-
-    Attributes:
-        plate: the plate, with its front face at x = 0.
-    """
-
-    plate: Plate
 
 
 if TYPE_CHECKING:

@@ -125,7 +125,7 @@ class Hits(Model):
         if self.file is None:
             return None
         required = ("hit_y", "hit_z")
-        columns = read_columns(self.file, required, tuple(f.name for f in fields(Shots) if f.name not in required))
+        columns = read_columns(self.file, required, _listable(required))
         return {name: np.radians(column) if name in _ANGLES else column for name, column in columns.items()}
 
     @property
@@ -171,6 +171,9 @@ class Shots:
         spin: about the axis [rad/s].
         resistance [Pa], shear_coefficient, degradation, thickness [m]: of the plate, and
         mass [kg], strength [Pa]: of the core; None where all shots have the scene's own value.
+        layer_thickness [m], layer_resistance [Pa], layer_shear_coefficient, layer_degradation, layer_offset_y [m],
+            layer_offset_z [m]: of the layers behind the plate, shape [shots, layers]; NaN where a layer has the scene's
+            own value, None where all layers have.
     """
 
     hit_y: Array
@@ -187,6 +190,12 @@ class Shots:
     thickness: Array | None = None
     mass: Array | None = None
     strength: Array | None = None
+    layer_thickness: Array | None = None
+    layer_resistance: Array | None = None
+    layer_shear_coefficient: Array | None = None
+    layer_degradation: Array | None = None
+    layer_offset_y: Array | None = None
+    layer_offset_z: Array | None = None
 
     def __len__(self) -> int:
         """Number of shots."""
@@ -205,7 +214,19 @@ class Shots:
         """A quantity of every shot, shape [shots]; where they do not have one of their own that of the scene, [1]."""
         return self.columns.get(name, np.array([otherwise]))
 
+    def own_of_layer(self, name: str, layer: int, otherwise: float) -> Array:
+        """A quantity of a layer behind the plate, likewise."""
+        columns = self.columns.get(f"layer_{name}")
+        if columns is None or np.isnan(columns[:, layer]).all():
+            return np.array([otherwise])
+        return np.where(np.isnan(columns[:, layer]), otherwise, columns[:, layer])
+
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """One after the other; all have the same columns."""
         return cls(**{name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns})
+
+
+def _listable(required: tuple[str, ...]) -> tuple[str, ...]:
+    """Quantities that a list of hits may have beside those required: one number per shot."""
+    return tuple(f.name for f in fields(Shots) if f.name not in required and not f.name.startswith("layer_"))

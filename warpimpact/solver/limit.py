@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.refinement import picked, with_rows
 from warpimpact.solver.resolution import FIDELITIES, Fidelity
@@ -142,7 +142,8 @@ def _in_short_steps(numerics: Numerics | Fidelity | None) -> Numerics | Fidelity
 
 
 def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
-    """Refuse a plate that weakens by time: it stops no core, however slow, so there is no limit (docs/model.md §4).
+    """Refuse a target with a plate that weakens by time: it stops no core, however slow, so there is no limit
+    (docs/model.md §4).
 
     Args:
         shots: whose own degradation counts, too.
@@ -150,14 +151,21 @@ def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
     Raises:
         ValueError: names what to give instead.
     """
-    plate = scene.target.plate
-    own = shots is not None and shots.degradation is not None and bool((shots.degradation < 1.0).any())
-    if plate.degradation_distance is None and (own or plate.degradation < 1.0):
+    for k, (place, plate) in enumerate(scene.target.named):
+        if plate.degradation_distance is not None or not _weakens(plate, shots, k):
+            continue
         raise ValueError(
-            "got a plate that weakens by time (degradation_interval), which stops no core, however slow, so no limit "
-            "exists; give degradation_distance in its place: impact velocity × degradation_interval has the same "
-            "effect at that velocity"
+            f"{place}: got a plate that weakens by time (degradation_interval), which stops no core, however slow, so "
+            "no limit exists; give degradation_distance in its place: impact velocity × degradation_interval has the "
+            "same effect at that velocity"
         )
+
+
+def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
+    """Whether a plate, layer 0, or a layer behind it weakens in any shot."""
+    own = None if shots is None else shots.degradation if layer == 0 else shots.layer_degradation
+    column = own if own is None or layer == 0 else own[:, layer - 1]
+    return plate.degradation < 1.0 or (column is not None and bool((column < 1.0).any()))
 
 
 class _Computing(NamedTuple):

@@ -18,8 +18,10 @@ from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
+from warpimpact.solver.bending import bending_columns
 from warpimpact.solver.device import cores, free_memory, load
 from warpimpact.solver.inputs import Inputs
+from warpimpact.solver.layering import Passages, deep_cells
 from warpimpact.solver.resolution import Fidelity
 
 Array = NDArray[np.float64]
@@ -63,6 +65,7 @@ class March:
         self.variant, self.stage = self.arrays.variant, self.inputs.stage
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
+        self.passages = Passages(self.stage, len(shots), len(self.inputs.plates), self.variant, device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -86,16 +89,21 @@ class March:
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
-        """Share of the resistance that is left after some steps of the first shot on the CPU, in the window of its
-        march."""
+        """Share of the plate's resistance that is left after some steps of the first shot on the CPU, in the window of
+        its march."""
         scratch = self._scratch(1, *self.cells)
+        for name in self._fields():  # the window of a layer that is not reached stays closed
+            getattr(scratch[0], name).zero_()
         self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
         first = self.inputs.put(np.zeros(1), wp.int32)
         self._launch(first, self._empty(self.stage.Outcomes, (1,)), scratch, 1, 0, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
-        exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
-        return np.asarray(self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure))
+        exposure = np.zeros(math.prod(self.cells))
+        if self.variant.degrades and self.arrays.materials[0].weakens:
+            exposure = _host(scratch[0].exposure)[: exposure.size]
+        decayed = np.exp(self.arrays.shots["decay_rate"][0] * exposure.reshape(self.cells))
+        return np.asarray(self._material() * decayed)
 
     def body(self) -> MassProperties:
         """Mass properties of the first shot."""
@@ -134,25 +142,14 @@ class March:
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
         status = contact.status.numpy().astype(np.int8)
         values |= _exits(contact, status)
-        return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
+        bent = self._bending(status) if self.variant.bends else {}
+        return {"status": status} | values | bent | self.passages.columns()
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
-        """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is 0.
-        Of cores that have a strength: whether, when and where they broke."""
-        found = self.bending.numpy()
-        columns = {
-            "largest_bending_moment": found["moment"],
-            "bending_section": np.where(found["moment"] > 0.0, found["moment_station"], np.nan),
-            "bending_stress": found["stress"],
-            "bending_stress_section": np.where(found["stress"] > 0.0, found["stress_station"], np.nan),
-        }
-        if self.scene.core.strength is not None or self.shots.strength is not None:
-            broken = found["broken"] > 0
-            columns["broken"] = found["broken"]
-            columns |= {name: np.where(broken, found[name], np.nan) for name in ("broken_time", "broken_x")}
-            columns["broken_section"] = np.where(broken, found["broken_station"], np.nan)
-        failed = status >= Status.UNFINISHED
-        return {name: np.where(failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
+        """What is known of the bending of every shot."""
+        breaks = self.scene.core.strength is not None or self.shots.strength is not None
+        known = self.variant.bends
+        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks) if known else {}
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""
@@ -179,11 +176,21 @@ class March:
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
 
+    def _windows(self, cells_y: int, cells_z: int) -> list[tuple[int, int]]:
+        """Cells of the windows of all layers, if the plate's has this many."""
+        return [(cells_y, cells_z)] + [
+            deep_cells(self.arrays, layer, cells_y) for layer in range(1, len(self.inputs.plates))
+        ]
+
+    def _nodes(self, cells_y: int, cells_z: int) -> int:
+        """Nodes of a slot in all its windows."""
+        return sum(y * z for y, z in self._windows(cells_y, cells_z))
+
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings: int = self.inputs.surface.rings * per_ring
-        return len(self._fields()) * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
+        return len(self._fields()) * self._nodes(cells_y, cells_z) * size + self._patches() * (6 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
@@ -202,18 +209,18 @@ class March:
         free = free_memory() if self.device.is_cpu else self.device.free_memory
         wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
-        return min(wanted, affordable, (2**31 - 1) // (cells_y * cells_z))
+        return min(wanted, affordable, (2**31 - 1) // self._nodes(cells_y, cells_z))
 
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
 
-    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, Any]:
-        """Fields and touches of some slots."""
+    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, ...]:
+        """Fields, touches and layers of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         scratch, touches = self.stage.Fields(), self.stage.Touches()
         scratch.cells_y, scratch.cells_z = cells_y, cells_z
         for name in self._fields():
-            setattr(scratch, name, empty(slots * cells_y * cells_z))
+            setattr(scratch, name, empty(slots * self._nodes(cells_y, cells_z)))
         patches = slots * self._patches()
         for name in ("area", "slope", "shift", "gain", "y", "z"):
             setattr(touches, name, empty(patches))
@@ -223,13 +230,14 @@ class March:
         touches.ring_area = empty(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
-        return scratch, touches
+            touches.total_area = empty(rings)
+        return scratch, touches, self.passages.stack(slots)
 
     def _launch(
         self,
         order: Any,
         outcomes: Any,
-        scratch: tuple[Any, Any],
+        scratch: tuple[Any, ...],
         slots: int,
         first: int,
         count: int,
@@ -249,9 +257,10 @@ class March:
                 inputs.law,
                 inputs.shots,
                 inputs.pace,
+                inputs.target,
                 *scratch,
             ],
-            outputs=[outcomes, self.bending, self.history],
+            outputs=[outcomes, self.passages.filled, self.bending, self.history],
             device=self.device,
         )
         return count
@@ -259,6 +268,8 @@ class March:
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
         load(self.stage.kernel, self.device)
+        if self.variant.layered:
+            self.inputs.place_windows(self._windows(*self.cells))
         launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
         if self.device.is_cpu:
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)

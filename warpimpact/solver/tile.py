@@ -84,7 +84,7 @@ class _Itself:
         return id(self.pattern)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
     """The tile of a pattern, kept for later shots at the same plate."""
     pattern = itself.pattern
