@@ -149,6 +149,7 @@ def build(variant: Variant) -> SimpleNamespace:
         touched = bool(False)
         if wp.static(variant.bends):
             worst = Bending()
+            worst.strength = own(shots.strength, shot)
         contact_steps = int(0)
         skipped = real(0.0)  # time between layers that no step counts
         last = Change()
@@ -204,8 +205,9 @@ def build(variant: Variant) -> SimpleNamespace:
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
                     if wp.static(variant.bends):
+                        middle = (real(step) + half) * dt + skipped
                         worst = bends.bent(
-                            worst, surface, sections, body, touches, slot, found, pose, state, load, last, dt
+                            worst, surface, sections, body, touches, slot, found, pose, state, load, last, dt, middle
                         )
                     state = motion.kick(body, state, load, dt)
                     last = motion.change_between(body, before, state)

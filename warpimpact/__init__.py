@@ -116,6 +116,8 @@ _HOMES = {
     "Stop": ".campaign.stop",
     "cluster_team": ".campaign.team",
     "compare": ".analysis.comparison",
+    "limit_thickness": ".solver.limit",
+    "limit_velocity": ".solver.limit",
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
     "replay": ".campaign.replay",

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
-from ..results.variables import BENDING_VARIABLES
+from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES
 from ..scene import (
     AnyCore,
     Hits,
@@ -204,6 +204,8 @@ class Campaign(Model):
             raise ValueError("got hits.replicates = 1 beside stop, but an interval of a sobol sampling needs some")
         if self.stop.measure.variable in BENDING_VARIABLES and not self.output.bending:
             raise ValueError(f'got stop.quantity = "{self.stop.quantity}", but that needs output.bending = true')
+        if self.stop.measure.variable in BROKEN_VARIABLES and self.core.strength is None:
+            raise ValueError(f'got stop.quantity = "{self.stop.quantity}", but that needs core.strength')
         at = self.stop.measure.standoff
         if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
             standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -61,13 +62,50 @@ def compute(
     begin = time.perf_counter()
     outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow)
     elapsed = time.perf_counter() - begin
-    period, chosen = campaign.hits.covered(campaign.plate), find_device(device)
-    ligament = campaign.plate.ligament
+    dataset = described(
+        campaign,
+        shots,
+        outcomes,
+        numerics=numerics,
+        device=device,
+        elapsed=elapsed,
+        attributes={} if promise is None else _promised(promise),
+        estimates=estimates,
+    )
+    if solid is None:
+        return dataset
+    solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
+    outcomes, _ = _outcomes(reference, solid, numerics, device, threads)
+    return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
+
+
+def described(
+    campaign: Campaign,
+    shots: Shots,
+    outcomes: Outcomes,
+    *,
+    numerics: Numerics | Fidelity,
+    device: str,
+    elapsed: float,
+    attributes: Mapping[str, Any],
+    estimates: Estimates | None = None,
+) -> xarray.Dataset:
+    """The Dataset of some shots of a campaign.
+
+    Args:
+        shots: whole groups of images.
+        outcomes: of the first shot of every group; the estimates likewise.
+        numerics: with which they were computed.
+        elapsed: time that this took [s].
+        attributes: global attributes beside those of any campaign.
+    """
+    scene, group, chosen = campaign.scene, campaign.symmetries, find_device(device)
+    computed, ligament = len(shots) // len(group), campaign.plate.ligament
     dataset = to_dataset(
         scene,
         shots,
         unfolded(outcomes, group),
-        period=period,
+        period=campaign.hits.covered(campaign.plate),
         attributes={
             attr.TITLE: campaign.title,
             attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
@@ -91,22 +129,42 @@ def compute(
             attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             attr.FAILED_SHARE: campaign.output.failed_share,
             attr.COMPUTE_TIME: elapsed,
-            attr.HITS_PER_SECOND: len(computed) / elapsed,
+            attr.HITS_PER_SECOND: computed / elapsed,
         }
         | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
-        | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {})
-        | ({} if promise is None else _promised(promise)),
+        | (_symmetry(group, computed) if campaign.hits.irreducible else {})
+        | dict(attributes),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
         double=is_double(campaign),
     )
-    if not campaign.output.exit_state:
-        dataset = dataset.drop_vars(v.EXIT_VARIABLES)
-    if solid is None:
-        return dataset
-    solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
-    outcomes, _ = _outcomes(reference, solid, numerics, device, threads)
-    return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
+    return dataset if campaign.output.exit_state else dataset.drop_vars(v.EXIT_VARIABLES)
+
+
+class HitMap:
+    """What a run computes of every hit of a campaign: how it ends. Another kind of run derives from it.
+
+    Attributes:
+        content: what decides the bits of a result, beside the campaign, the versions and the device.
+        measures: whose running estimates are told; those of a hit map where there are none.
+        takes_solid: whether the solid plate of equal areal density is computed, too.
+    """
+
+    content: Mapping[str, str] = MappingProxyType({})
+    measures: Sequence[str] = ()
+    takes_solid = True
+
+    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> xarray.Dataset:
+        """Compute some shots; the arguments are those of `compute`."""
+        return compute(campaign, shots, **how)
+
+    def promise_of(self, campaign: Campaign, device: str = "auto") -> Any:
+        """What a pilot of the campaign finds; None if the campaign fixes the resolution itself."""
+        return promise_of(campaign, device)
+
+    def promise_in(self, dataset: xarray.Dataset) -> Any:
+        """What was found by the pilot of a result."""
+        return promise_in(dataset)
 
 
 def is_double(campaign: Campaign) -> bool:
@@ -138,15 +196,18 @@ def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
     """
     if campaign.numerics.explicit is not None:
         return None
+    return keep(campaign.scene, campaign.numerics, pilot_of(campaign, PILOT), device=device)
+
+
+def pilot_of(campaign: Campaign, most: int) -> Shots:
+    """Some of the hits of a campaign, no two of them images of each other."""
     sampler, group = campaign.sampler(), len(campaign.symmetries)
     hits = len(sampler) // group
-    count = min(PILOT, hits)
+    count = min(most, hits)
     if campaign.hits.sampling in ("sobol", "random"):
-        pilot = sampler.shots(0, count * group)[::group]
-    else:
-        places = np.linspace(0, hits, count, endpoint=False).astype(int)
-        pilot = Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
-    return keep(campaign.scene, campaign.numerics, pilot, device=device)
+        return sampler.shots(0, count * group)[::group]
+    places = np.linspace(0, hits, count, endpoint=False).astype(int)
+    return Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
 
 
 def _promised(promise: Promise) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -15,7 +15,6 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import promise_in
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import attributes as attr
@@ -24,7 +23,6 @@ from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Shots
-from warpimpact.solver.promise import Promise
 from warpimpact.statistics.intervals import Estimate
 from warpimpact.statistics.stopping import looks
 
@@ -53,7 +51,7 @@ class Standing:
     resumed: int
     failed: int
     estimates: dict[Measure, Estimate]
-    promise: Promise | None = None
+    promise: Any = None
 
 
 Follow = Callable[[Standing], None]
@@ -188,11 +186,11 @@ class _End:
 def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End:
     """Compute the shards that the store lacks, until all are there or the stop rule is met."""
     sampler = campaign.sampler()
-    watch = _Watch(campaign, len(sampler), store)
+    watch = _Watch(campaign, len(sampler), store, team.job.measures)
     for index in sorted(store.saved):
         watch.add(index, store.load(index))
     watch.resumed = watch.done
-    watch.promise = promise = promise_in(store.load(min(store.saved))) if store.saved else team.pilot()
+    watch.promise = promise = team.job.promise_in(store.load(min(store.saved))) if store.saved else team.pilot()
     tasks = _tasks(store, len(sampler), team.task)
     waiting: dict[Future[xarray.Dataset], range] = {}
     try:
@@ -200,7 +198,9 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
             width = team.width()
             while len(waiting) < width and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
-                solid = _solid_shots(campaign, shots[: store.extent]) if task.start == 0 else None
+                solid = (
+                    _solid_shots(campaign, shots[: store.extent]) if team.job.takes_solid and task.start == 0 else None
+                )
                 waiting[team.submit(promise, shots, solid)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
             for future in finished:
@@ -262,13 +262,13 @@ class _Watch:
     same shots however it was computed.
     """
 
-    def __init__(self, campaign: Campaign, total: int, store: _Store) -> None:
+    def __init__(self, campaign: Campaign, total: int, store: _Store, measures: Sequence[str] = ()) -> None:
         self._total, self._shards, self._load = total, -(-total // store.extent), store.load
         self._rule = campaign.stop
         last = campaign.output.standoffs[-1]
-        measures = [Measure.parse("mean(residual_velocity)"), Measure.parse(f"mean(tilt@{last * 1e3:.10g}mm)")]
+        measures = measures or ("mean(residual_velocity)", f"mean(tilt@{last * 1e3:.10g}mm)")
         dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries)}
-        self._tallies = [Tally(measure, **dealt) for measure in measures]
+        self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
         if self._rule is not None:
             rule = self._rule
             self._stop = Tally(rule.measure, **dealt, confidence=rule.confidence)
@@ -278,7 +278,7 @@ class _Watch:
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
         self.end: _End | None = None
-        self.promise: Promise | None = None
+        self.promise: Any = None
 
     def add(self, index: int, shard: xarray.Dataset) -> None:
         """Take in a shard that the store has; one that comes before its turn is loaded when that is."""
@@ -333,7 +333,7 @@ class _Watch:
 def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:
     """Global attributes of a complete result over those of its first shard."""
     return {
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {dataset.attrs[attr.HISTORY].partition(' ')[2]}",
         attr.COMPUTE_TIME: end.compute_time,
         attr.HITS_PER_SECOND: end.hits / images(dataset) / end.compute_time,
         **_computed(dataset, end.hits),

@@ -15,14 +15,14 @@ from typing import Any
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import compute, made_by, promise_of
+from warpimpact.campaign.compute import HitMap, made_by
 from warpimpact.results import attributes as attr
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
-from warpimpact.solver.promise import Promise
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
+_HIT_MAP = HitMap()
 
 
 class ClusterError(RuntimeError):
@@ -34,17 +34,19 @@ class Team:
     """Computes shots in the background.
 
     Attributes:
+        job: what is computed of every hit.
         pilot: finds the promise of the campaign, None if it fixes the resolution itself.
         submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Dataset
             comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
-        made_by: versions and kind of device, which decide the bits.
+        made_by: versions, kind of device and the job's content, which decide the bits.
         underway: how many shots of unfinished tasks are done.
     """
 
-    pilot: Callable[[], Promise | None]
-    submit: Callable[[Promise | None, Shots, Shots | None], Future[xarray.Dataset]]
+    job: HitMap
+    pilot: Callable[[], Any]
+    submit: Callable[[Any, Shots, Shots | None], Future[xarray.Dataset]]
     width: Callable[[], int]
     task: int
     made_by: dict[str, str]
@@ -52,11 +54,12 @@ class Team:
 
 
 @contextmanager
-def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
+def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Iterator[Team]:
     """The devices of this machine, each computing one task at a time.
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), or names with commas between them.
+        job: what to compute of every hit.
 
     Raises:
         DeviceError: a device is absent, or they are of different kinds, which compute different bits.
@@ -66,7 +69,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     for chosen in devices:
         idle.put(str(chosen))
 
-    def work(promise: Promise | None, shots: Shots, solid: Shots | None) -> xarray.Dataset:
+    def work(promise: Any, shots: Shots, solid: Shots | None) -> xarray.Dataset:
         name, thread = idle.get(), threading.get_ident()
 
         def progress(finished: int, total: int) -> None:
@@ -75,7 +78,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
             done[thread] = finished
 
         try:
-            return compute(campaign, shots, promise=promise, solid=solid, device=name, progress=progress)
+            return job.compute(campaign, shots, promise=promise, solid=solid, device=name, progress=progress)
         finally:
             done[thread] = 0
             idle.put(name)
@@ -83,11 +86,12 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
     try:
         yield Team(
-            pilot=lambda: promise_of(campaign, str(devices[0])),
+            job=job,
+            pilot=lambda: job.promise_of(campaign, str(devices[0])),
             submit=lambda *shots: pool.submit(work, *shots),
             width=lambda: 2 * len(devices),
             task=_task_size(kind),
-            made_by=kind,
+            made_by=kind | dict(job.content),
             underway=lambda: sum(done.copy().values()),
         )
     finally:
@@ -101,7 +105,12 @@ def _task_size(kind: dict[str, str]) -> int:
 
 @contextmanager
 def cluster_team(
-    campaign: Campaign, *, address: str | None = None, workers: int | None = None, device: str = "auto"
+    campaign: Campaign,
+    *,
+    address: str | None = None,
+    workers: int | None = None,
+    device: str = "auto",
+    job: HitMap = _HIT_MAP,
 ) -> Iterator[Team]:
     """The workers of a Dask cluster; what one that dies was computing goes to another.
 
@@ -109,6 +118,7 @@ def cluster_team(
         address: of a scheduler.
         workers: processes to start on this machine, where there is no address.
         device: that every worker computes on.
+        job: what to compute of every hit.
 
     Raises:
         ClusterError: dask is not installed, the scheduler cannot be reached or is lost, or shots kill one worker after
@@ -140,11 +150,12 @@ def cluster_team(
         executor = client.get_executor(pure=False)
         try:
             yield Team(
-                pilot=lambda: client.submit(promise_of, campaign, device, pure=False).result(),
-                submit=lambda *shots: executor.submit(_compute_alike, campaign, *shots, device, threads, kind),
+                job=job,
+                pilot=lambda: client.submit(job.promise_of, campaign, device, pure=False).result(),
+                submit=lambda *shots: executor.submit(_compute_alike, job, campaign, *shots, device, threads, kind),
                 width=lambda: 2 * max(1, sum(client.nthreads().values())),
                 task=_task_size(kind),
-                made_by=kind,
+                made_by=kind | dict(job.content),
                 underway=lambda: 0,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
@@ -167,8 +178,9 @@ def _ignoring_interrupts(plugin: Any) -> Any:
 
 
 def _compute_alike(
+    job: HitMap,
     campaign: Campaign,
-    promise: Promise | None,
+    promise: Any,
     shots: Shots,
     solid: Shots | None,
     device: str,
@@ -182,7 +194,7 @@ def _compute_alike(
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    return compute(campaign, shots, promise=promise, solid=solid, device=device, threads=threads)
+    return job.compute(campaign, shots, promise=promise, solid=solid, device=device, threads=threads)
 
 
 def _devices(names: str) -> list[Any]:

@@ -15,6 +15,7 @@ from warpimpact import __version__
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
+from .limit import add_limit
 from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
 from .progress import told as progress_told
@@ -27,6 +28,7 @@ _COMMANDS = (
     add_examples,
     add_new,
     add_run,
+    add_limit,
     add_inspect,
     add_plot,
     add_compare,

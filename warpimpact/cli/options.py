@@ -65,6 +65,14 @@ def add_device(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_computing(parser: argparse.ArgumentParser) -> None:
+    """Where to compute: a device, or the workers of a cluster."""
+    add_device(parser)
+    cluster = parser.add_mutually_exclusive_group()
+    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
+    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
+
+
 def at_least(least: int) -> Callable[[str], int]:
     """Return a parser of whole numbers that are at least `least`."""
 

@@ -1,6 +1,5 @@
 """Progress of a computation: a bar on a terminal, plain lines in a log."""
 
-import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -109,9 +108,8 @@ def _running(standing: "Standing") -> str:
         for measure, estimate in standing.estimates.items()
         if estimate.count > 1
     ]
-    if (promise := standing.promise) is not None:
-        errors = f"{promise.residual_velocity_error:.2g} m/s and {math.degrees(promise.tilt_error):.2g} deg"
-        parts.append(f"accuracy {errors} for 90 % of the hits{'' if promise.kept else ', not as promised'}")
+    if standing.promise is not None:
+        parts.append(standing.promise.phrase)
     return ", ".join([*parts, f"{standing.failed} failed"])
 
 

@@ -8,7 +8,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
-from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
+from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
 from .paths import check_place
 from .plain import say
 from .progress import show_standing, warn
@@ -28,10 +28,7 @@ def add_run(commands: Commands) -> None:
     )
     add_campaign(parser)
     add_output(parser, "RESULT.nc", "result file (default: the campaign's name, in this folder)")
-    add_device(parser)
-    cluster = parser.add_mutually_exclusive_group()
-    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
-    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
+    add_computing(parser)
     add_count(parser)
     parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; start a new one if there is none"

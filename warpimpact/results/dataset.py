@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from warpimpact.scene import Scene, Shots
+    from warpimpact.solver.limit import Limits
     from warpimpact.solver.refinement import Estimates
     from warpimpact.solver.simulate import Outcomes, Replay
 
@@ -75,7 +76,7 @@ def to_dataset(
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     values |= {name: shots.columns[name] for name in v.SCATTER_VARIABLES if name in shots.columns}
-    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.LAYER_VARIABLES)
+    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *v.LAYER_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
     values |= _of_layers(scene, shots)
     if v.EXIT_POSITION in values:
@@ -83,7 +84,7 @@ def to_dataset(
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
     layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES, *v.LAYER_SCATTER)
-    optional = (*v.EXIT_VARIABLES, *v.SCATTER_VARIABLES, *v.BENDING_VARIABLES, *layers)
+    optional = (*v.EXIT_VARIABLES, *v.SCATTER_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layers)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES
@@ -97,6 +98,19 @@ def to_dataset(
         _described((*v.COORDINATES, *v.OUTLINE_VARIABLES), coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
+
+
+def with_limits(dataset: xarray.Dataset, quantity: str, limits: Limits, images: int) -> xarray.Dataset:
+    """The Dataset of shots that just perforate, with their limits.
+
+    Args:
+        quantity: of the limits, a key of LIMITS.
+        limits: of the first of every `images` shots, SI.
+    """
+    names = v.LIMITS[quantity]
+    values: dict[str, Any] = {name: np.repeat(getattr(limits, name.field), images) for name in names}
+    values[names.converged] = values[names.converged].astype(np.int8)
+    return dataset.assign(_described(names, values))
 
 
 def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:

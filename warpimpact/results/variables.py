@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from enum import IntEnum
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -103,8 +103,9 @@ SHEAR_COEFFICIENT = Variable("shear_coefficient", _HIT, "1", "friction per norma
 DEGRADATION = Variable("degradation", _HIT, "1", "share of the resistance left after an interval of contact")
 THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
 MASS = Variable("mass", _HIT, "kg", "mass of the core")
+STRENGTH = Variable("strength", _HIT, "Pa", "strength of the core, a nominal bending stress")
 
-SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS)
+SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH)
 """Present only in a campaign in which they differ from shot to shot."""
 
 # --- How the shot ended ---
@@ -214,6 +215,44 @@ LEVEL = Variable("level", _HIT, "1", "level of resolution on which the hit was c
 ESTIMATE_VARIABLES = (RESIDUAL_VELOCITY_ERROR, TILT_ERROR, CONVERGED, LEVEL)
 """Present only in a run to a tolerance."""
 
+BROKEN = Variable("broken", _HIT, "1", "1 where the bending stress passed the strength of the core, else 0")
+BROKEN_TIME = Variable("broken_time", _HIT, "s", "when the core broke, since the first touch of the front face")
+BROKEN_X = Variable("broken_x", _HIT, "m", "where the section that broke was, behind the front face")
+BROKEN_SECTION = Variable("broken_section", _HIT, "m", "distance of the section that broke from the nose")
+
+BROKEN_VARIABLES = (BROKEN, BROKEN_TIME, BROKEN_X, BROKEN_SECTION)
+"""Present only for a core with a strength. A broken core goes on as one rigid body."""
+
+
+class LimitVariables(NamedTuple):
+    """The variables of a search of limits."""
+
+    value: Variable
+    lower: Variable
+    upper: Variable
+    runs: Variable
+    converged: Variable
+
+
+def _limit_variables(quantity: str, units: str, long_name: str) -> LimitVariables:
+    name = f"limit_{quantity}"
+    return LimitVariables(
+        Variable(name, _HIT, units, long_name, field="value", shown_by=_MAIN),
+        Variable(f"{name}_lower", _HIT, units, f"{long_name}, lower end", field="lower"),
+        Variable(f"{name}_upper", _HIT, units, f"{long_name}, upper end", field="upper"),
+        Variable("limit_runs", _HIT, "1", "how often the hit was computed", field="runs"),
+        Variable("limit_converged", _HIT, "1", "whether the ends meet the tolerance, 1 or 0", field="converged"),
+    )
+
+
+LIMITS = {
+    "velocity": _limit_variables("velocity", "m s-1", "limit velocity"),
+    "thickness": _limit_variables("thickness", "m", "limit thickness of the plate"),
+}
+"""By the quantity of a search. Present only in a result of `warpimpact limit`, whose other variables are those of the
+shot as it just perforates: at the end of its limit where the core passed."""
+LIMIT_VARIABLES = tuple(variables.value for variables in LIMITS.values())
+
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
@@ -225,9 +264,8 @@ spreads over the hits."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
-HIT_NUMBERS = tuple(
-    v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES, *LAYER_VARIABLES) if v.is_number_of_hit
-)
+_OF_HITS = (*LIMIT_VARIABLES, *SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES, *BROKEN_VARIABLES)
+HIT_NUMBERS = tuple(v for v in (*_OF_HITS, *LAYER_VARIABLES) if v.is_number_of_hit)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
 # --- History of one hit ---
@@ -382,5 +420,5 @@ def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    optional = (*EXIT_VARIABLES, *BENDING_VARIABLES, *LAYER_VARIABLES)
+    optional = (*EXIT_VARIABLES, *BENDING_VARIABLES, *BROKEN_VARIABLES, *LAYER_VARIABLES)
     return [*OUTCOME_VARIABLES, *(name for name in optional if name in dataset)]

@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from .files import input_file, read_table
 from .model import Array, Model
-from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass
+from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass, PositiveStress
 
 # Gauss–Legendre on 32 nodes is exact to degree 63: r⁴ of any polynomial core up to degree 15.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
@@ -42,8 +42,9 @@ class Core(Model, ABC):
         mass: of the core [kg]; exactly one of mass and density is given.
         density: of its material [kg/m³].
         centre_of_mass: distance behind the nose tip [m]; it follows from the shape unless it is given.
-        inertia_axial: moment of inertia about the axis [kg m²]; it follows from the shape unless it is given.
-        inertia_transverse: about a line across the axis through the centre of mass [kg m²]; likewise.
+        inertia_axial, inertia_transverse: moments of inertia [kg m²] about the axis, and about a line across it through
+            the centre of mass; likewise.
+        strength: nominal bending stress above which the core counts as broken [Pa]; None is a core that never breaks.
     """
 
     mass: PositiveMass | None = None
@@ -51,6 +52,7 @@ class Core(Model, ABC):
     centre_of_mass: Length | None = None
     inertia_axial: PositiveInertia | None = None
     inertia_transverse: PositiveInertia | None = None
+    strength: PositiveStress | None = None
 
     if TYPE_CHECKING:  # a field of the drawn cores, a property of the tabulated one
 
@@ -92,8 +94,7 @@ class Core(Model, ABC):
     def mass_properties(self) -> MassProperties:
         """Integrals over the solid of revolution, with the overrides in place.
 
-        The transverse moment is that of the homogeneous body about its own centroid, also where
-        `centre_of_mass` is overridden.
+        The transverse moment is that about the centroid, also where `centre_of_mass` is overridden.
         """
         s, weight = self._quadrature()
         area = np.pi * self.radius(s) ** 2 * weight

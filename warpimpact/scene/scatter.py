@@ -1,4 +1,7 @@
-"""Scatter: distributions of quantities that differ from shot to shot, from scipy.stats."""
+"""Scatter: distributions of quantities that differ from shot to shot, from scipy.stats.
+
+Long because every distribution, and every quantity that may scatter, stands here once.
+"""
 
 from __future__ import annotations
 
@@ -32,6 +35,7 @@ from .units import (
     PositiveLength,
     PositiveMass,
     PositiveSpeed,
+    PositiveStress,
     Radians,
     in_radians,
     quantity,
@@ -61,6 +65,7 @@ QUANTITIES = {
     "degradation": Quantity("plate", Annotated[Number, Field(ge=0, le=1)]),
     "thickness": Quantity("plate", PositiveLength),
     "mass": Quantity("core", PositiveMass),
+    "strength": Quantity("core", PositiveStress),
 }
 """By name. The position in this table is the column of the random numbers. So the draws of a quantity do not depend on
 which other quantities scatter."""
@@ -235,6 +240,18 @@ class Lognormal(Continuous):
         return stats.lognorm(self.sigma, scale=self.median)
 
 
+class Weibull(Distribution):
+    """The strength of the weakest link: 63 % of the values lie below `scale`; a large `shape` has little spread."""
+
+    distribution: Literal["weibull"] = "weibull"
+    shape: _Positive
+    scale: _Positive
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`."""
+        return np.asarray(self.scale * (-np.log1p(-share)) ** (1.0 / self.shape))
+
+
 class Discrete(Distribution):
     """One of several values.
 
@@ -266,9 +283,10 @@ class Discrete(Distribution):
 
 
 AnyDistribution = Annotated[
-    Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Discrete, Field(discriminator="distribution")
+    Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Weibull | Discrete,
+    Field(discriminator="distribution"),
 ]
-PURE_NUMBERS = {"distribution", "sigma", "weights"}
+PURE_NUMBERS = {"distribution", "sigma", "shape", "weights"}
 
 
 class _Scattering(Model):
@@ -350,6 +368,7 @@ class Scatter(_Scattering):
     degradation: AnyDistribution | None = None
     thickness: AnyDistribution | None = None
     mass: AnyDistribution | None = None
+    strength: AnyDistribution | None = None
     layers: tuple[LayerScatter, ...] = ()
 
     @property

@@ -35,13 +35,17 @@ class Record(Model):
         return standoffs
 
     def check_bending(self, core: Core) -> None:
-        """Refuse to record the bending moment of a core that overrides its mass properties.
+        """Refuse to record the bending moment of a core that overrides its mass properties, and a strength without it.
 
         Raises:
             ValueError: names what the core overrides.
         """
         overridden = ("centre_of_mass", "inertia_axial", "inertia_transverse")
         given = [name for name in overridden if getattr(core, name) is not None]
+        if core.strength is not None and not self.bending:
+            raise ValueError(
+                f"got core.strength without {self._name}.bending = true, but a core breaks by its bending stress"
+            )
         if self.bending and given:
             raise ValueError(
                 f"got bending = true beside core.{given[0]}, but a bending moment needs the mass of every slice, which "

@@ -170,7 +170,7 @@ class Shots:
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
         resistance [Pa], shear_coefficient, degradation, thickness [m]: of the plate, and
-        mass: of the core [kg]; None where all shots have the scene's own value.
+        mass [kg], strength [Pa]: of the core; None where all shots have the scene's own value.
         layer_thickness [m], layer_resistance [Pa], layer_shear_coefficient, layer_degradation, layer_offset_y [m],
             layer_offset_z [m]: of the layers behind the plate, shape [shots, layers]; NaN where a layer has the scene's
             own value, None where all layers have.
@@ -189,6 +189,7 @@ class Shots:
     degradation: Array | None = None
     thickness: Array | None = None
     mass: Array | None = None
+    strength: Array | None = None
     layer_thickness: Array | None = None
     layer_resistance: Array | None = None
     layer_shear_coefficient: Array | None = None

@@ -28,6 +28,8 @@ LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
 STEP_ALLOWANCE = 200
 """How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+UNBREAKABLE = 1.0e30
+"""Strength of a core that has none [Pa], beyond any stress."""
 
 
 @dataclass(frozen=True)
@@ -178,6 +180,7 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
         "inertia_transverse": scale * body.inertia_transverse,
         "a0": plate.a0,
         "a1": plate.a1,
+        "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
         "friction": plate.friction,
         "decay_rate": plate.decay_rate,
         "degradation": plate.degradation,

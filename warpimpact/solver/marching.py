@@ -18,6 +18,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
+from warpimpact.solver.bending import bending_columns
 from warpimpact.solver.device import cores, free_memory, load
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.layering import Passages, deep_cells
@@ -145,17 +146,10 @@ class March:
         return {"status": status} | values | bent | self.passages.columns()
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
-        """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is
-        0."""
-        found = self.bending.numpy()
-        columns = {
-            "largest_bending_moment": found["moment"],
-            "bending_section": np.where(found["moment"] > 0.0, found["moment_station"], np.nan),
-            "bending_stress": found["stress"],
-            "bending_stress_section": np.where(found["stress"] > 0.0, found["stress_station"], np.nan),
-        }
-        failed = status >= Status.UNFINISHED
-        return {name: np.where(failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
+        """What is known of the bending of every shot."""
+        breaks = self.scene.core.strength is not None or self.shots.strength is not None
+        known = self.variant.bends
+        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks) if known else {}
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""

@@ -63,6 +63,12 @@ class Promise:
     residual_velocity_error: float
     tilt_error: float
 
+    @property
+    def phrase(self) -> str:
+        """The errors, for a line of progress."""
+        errors = f"{self.residual_velocity_error:.2g} m/s and {math.degrees(self.tilt_error):.2g} deg"
+        return f"accuracy {errors} for 90 % of the hits{'' if self.kept else ', not as promised'}"
+
 
 def keep(scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto") -> Promise:
     """Find the coarsest level of resolution that keeps the promise of a named fidelity.

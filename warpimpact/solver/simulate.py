@@ -72,6 +72,23 @@ class BentOutcomes(Outcomes):
 
 
 @dataclass(frozen=True)
+class BrokenOutcomes(BentOutcomes):
+    """Outcomes of cores that have a strength; arrays of shape [shots]. A broken core goes on as one rigid body.
+
+    Attributes:
+        broken: 1 where the nominal bending stress passed the strength, else 0.
+        broken_time: when it first did, since the first touch of the front face [s]; the middle of a step.
+        broken_x: where its most stressed section was then, behind the front face [m].
+        broken_section: distance of this section behind the nose tip [m].
+    """
+
+    broken: Array
+    broken_time: Array
+    broken_x: Array
+    broken_section: Array
+
+
+@dataclass(frozen=True)
 class LayeredOutcomes(Outcomes):
     """Outcomes with how each core left each layer; layer 0 is the plate. The others are those of the whole target.
 
@@ -97,6 +114,11 @@ class LayeredOutcomes(Outcomes):
 @dataclass(frozen=True)
 class LayeredBentOutcomes(BentOutcomes, LayeredOutcomes):
     """Outcomes with both."""
+
+
+@dataclass(frozen=True)
+class LayeredBrokenOutcomes(BrokenOutcomes, LayeredOutcomes):
+    """Outcomes with both, of cores that have a strength."""
 
 
 @dataclass(frozen=True)
@@ -158,13 +180,16 @@ def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
 
 
 def _outcomes(march: March, contact: Any) -> Outcomes:
-    kinds: dict[tuple[bool, bool], type[Outcomes]] = {
-        (False, False): Outcomes,
-        (True, False): BentOutcomes,
-        (False, True): LayeredOutcomes,
-        (True, True): LayeredBentOutcomes,
+    report = march.report(contact)
+    kinds: dict[tuple[bool, bool, bool], type[Outcomes]] = {
+        (False, False, False): Outcomes,
+        (True, False, False): BentOutcomes,
+        (True, True, False): BrokenOutcomes,
+        (False, False, True): LayeredOutcomes,
+        (True, False, True): LayeredBentOutcomes,
+        (True, True, True): LayeredBrokenOutcomes,
     }
-    return kinds[march.variant.bends, march.variant.layered](**march.report(contact))
+    return kinds[march.variant.bends, "broken" in report, march.variant.layered](**report)
 
 
 def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None) -> list[Array]:
