@@ -121,8 +121,6 @@ _HOMES = {
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
     "replay": ".campaign.replay",
-    "limit_thickness": ".solver.limit",
-    "limit_velocity": ".solver.limit",
     "run": ".campaign.run",
     "run_to_file": ".campaign.run",
     "simulate": ".solver.simulate",
