@@ -7,6 +7,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .analysis.hit_map import hit_map
     from .campaign.campaign import Campaign
     from .campaign.run import run
     from .export.table import to_dataframe
@@ -66,6 +67,7 @@ __all__ = [
     "Target",
     "TrianglePattern",
     "__version__",
+    "hit_map",
     "make_shots",
     "run",
     "simulate",
@@ -74,6 +76,7 @@ __all__ = [
 
 _HOMES = {
     "Campaign": ".campaign.campaign",
+    "hit_map": ".analysis.hit_map",
     "run": ".campaign.run",
     "simulate": ".solver.simulate",
     "to_dataframe": ".export.table",

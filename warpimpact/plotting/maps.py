@@ -14,6 +14,7 @@ from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, sc
 from warpimpact.plotting.distribution import dispersion, is_uncertain, marginals, uncertainty
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.files import OutputError
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -72,8 +73,12 @@ def overview(dataset: xarray.Dataset) -> Figure:
     return figure
 
 
-def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
-    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths."""
+def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bool = False) -> list[Path]:
+    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths.
+
+    Raises:
+        OutputError: one of them exists, and must not be replaced.
+    """
     figures: dict[str, Figure] = {
         "overview": overview(dataset),
         "status": status_map(dataset),
@@ -86,22 +91,29 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
     if is_uncertain(dataset, v.RESIDUAL_VELOCITY):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
-    return _saved(figures, folder, stem)
+    return _saved(figures, folder, stem, overwrite=overwrite)
 
 
-def save_beside(datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str) -> list[Path]:
-    """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths."""
+def save_beside(
+    datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str, *, overwrite: bool = False
+) -> list[Path]:
+    """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths.
+
+    Raises:
+        OutputError: one of them exists, and must not be replaced.
+    """
     figures: dict[str, Figure] = {variable: hit_maps(datasets, variable) for variable in _MAIN}
-    return _saved(figures, folder, stem)
+    return _saved(figures, folder, stem, overwrite=overwrite)
 
 
-def _saved(figures: Mapping[str, Figure], folder: Path, stem: str) -> list[Path]:
+def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite: bool) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name, figure in figures.items():
-        paths.append(folder / f"{stem}_{name}.png")
-        figure.savefig(paths[-1], dpi=150)
-    return paths
+    paths = {folder / f"{stem}_{name}.png": figure for name, figure in figures.items()}
+    if not overwrite and (existing := next(filter(Path.exists, paths), None)):
+        raise OutputError(f"{existing}: exists already; name another folder or give --overwrite")
+    for path, figure in paths.items():
+        figure.savefig(path, dpi=150)
+    return list(paths)
 
 
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int) -> tuple[Figure, list[Axes]]:

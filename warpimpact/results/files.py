@@ -50,9 +50,7 @@ def _write(dataset: xarray.Dataset, file: Path, *, chunk: int | None = None, **o
     for group, names in groups.items():
         if names:
             inner = dataset[names].reset_coords(names).drop_attrs(deep=False)
-            inner.to_netcdf(
-                file, mode="a", group=group, encoding=_encoding(inner), format="NETCDF4", engine="netcdf4"
-            )
+            inner.to_netcdf(file, mode="a", group=group, encoding=_encoding(inner), format="NETCDF4", engine="netcdf4")
 
 
 CHUNK = 2**15

@@ -68,7 +68,11 @@ def test_outcomes_have_the_precision_in_which_they_were_computed_and_shots_are_d
     outcomes = {*OUTCOME_VARIABLES, *EXIT_VARIABLES}
     for double, expected in ((False, np.float32), (True, np.float64)):
         types = {name: array.dtype for name, array in make_result(double=double).variables.items()}
-        assert {types.pop(name) for name in ("status", "hit", "axis")} == {np.dtype("i1"), np.dtype("i4"), np.dtype("<U1")}
+        assert {types.pop(name) for name in ("status", "hit", "axis")} == {
+            np.dtype("i1"),
+            np.dtype("i4"),
+            np.dtype("<U1"),
+        }
         for name, dtype in types.items():
             assert dtype == (expected if name in outcomes else np.float64), name
 
