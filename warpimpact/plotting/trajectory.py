@@ -136,7 +136,10 @@ def course(dataset: xarray.Dataset) -> Figure:
 
 
 def plate(dataset: xarray.Dataset) -> Figure:
-    """Resistance left in the plate, from the first contact to the end, seen from behind (the paper's fig. 6)."""
+    """Resistance left in the plate, from the first contact to the end, seen from behind (the paper's fig. 6).
+
+    Each cell of the plate is shown as a share of its own at the start, which a cell at the edge of a hole has less of.
+    """
     share = dataset[v.RESISTANCE_SHARE]
     columns = min(3, share.sizes["snapshot"])
     rows = -(-share.sizes["snapshot"] // columns)
@@ -146,7 +149,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
     figure.suptitle(_title(dataset, "resistance left in the plate, seen from behind"))
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     y, z = (_cell_edges(dataset[v.CELL[axis]]) for axis in "yz")
-    for panel, snapshot in zip(panels.flat, share.where(share[0] >= 0.5), strict=False):
+    for panel, snapshot in zip(panels.flat, (share / share[0]).where(share[0] >= 0.5), strict=False):
         image = panel.imshow(
             snapshot.T, origin="lower", extent=(*y, *z), cmap="viridis", vmin=0.0, vmax=1.0, interpolation="nearest"
         )

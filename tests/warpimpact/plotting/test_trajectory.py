@@ -160,7 +160,9 @@ def test_plate_is_shown_at_every_snapshot_with_holes_left_out(history: xarray.Da
         assert (right - left, top - bottom) == pytest.approx((cell * snapshot.shape[0], cell * snapshot.shape[1]))
         drawn = image.get_array().T
         np.testing.assert_array_equal(np.ma.getmaskarray(drawn), share.values[0] < 0.5)
-        np.testing.assert_array_equal(drawn[share.values[0] >= 0.5], snapshot[share.values[0] >= 0.5])
+        shown = share.values[0] >= 0.5
+        np.testing.assert_allclose(drawn[shown], (snapshot / share.values[0])[shown])
+    assert (panels[0].images[0].get_array().compressed() == 1.0).all()  # nothing is weakened at the first touch
 
 
 def test_figures_are_written(history: xarray.Dataset, tmp_path: Path) -> None:
