@@ -234,8 +234,8 @@ def test_overview_shows_four_aligned_maps(covered):
     assert titles == ["residual velocity", "deflection", "tilt, 130 mm behind the plate", "status"]
     boxes = [axes.get_position().bounds for axes in figure.axes if axes.get_title()]
     np.testing.assert_allclose([box[2:] for box in boxes], [boxes[0][2:]] * 4)
-    assert boxes[0][0] == boxes[2][0]
-    assert boxes[2][1] == boxes[3][1]
+    assert boxes[0][0] == pytest.approx(boxes[2][0])
+    assert boxes[2][1] == pytest.approx(boxes[3][1])
     assert all(axes.get_legend() is None for axes in figure.axes)
     (legend,) = figure.legends
     entries = [text.get_text() for text in legend.get_texts()]
