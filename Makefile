@@ -7,7 +7,7 @@ PARALLEL := --numprocesses auto --dist worksteal
 
 demo: $(INSTALLED)
 	$(VENV)/bin/warpimpact run campaigns/slotted_plate.toml -o slotted.nc --overwrite
-	$(VENV)/bin/warpimpact plot slotted.nc
+	$(VENV)/bin/warpimpact plot slotted.nc --overwrite
 
 gallery: $(INSTALLED)
 	$(VENV)/bin/python campaigns/gallery.py

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .analysis.comparison import Comparison, compare
+    from .analysis.hit_map import hit_map
     from .campaign.campaign import Campaign, Output
     from .campaign.plates import read_plates
     from .campaign.replay import replay
@@ -91,6 +92,7 @@ __all__ = [
     "__version__",
     "cluster_team",
     "compare",
+    "hit_map",
     "limit_thickness",
     "limit_velocity",
     "make_shots",
@@ -121,6 +123,7 @@ _HOMES = {
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
     "replay": ".campaign.replay",
+    "hit_map": ".analysis.hit_map",
     "run": ".campaign.run",
     "run_to_file": ".campaign.run",
     "simulate": ".solver.simulate",

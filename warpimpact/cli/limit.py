@@ -57,7 +57,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
     picture = output.with_suffix(".png")
     check_place(output)
-    check_picture(picture)
+    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
     job = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments))
     if told := told_of(campaign, arguments.quantity):
         warn(told)

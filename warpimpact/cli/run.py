@@ -9,7 +9,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
-from .paths import check_place
+from .paths import check_place, check_suffix
 from .plain import say
 from .progress import show_standing, warn
 
@@ -46,6 +46,7 @@ def _run(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
+    check_suffix(output, "a result", ".nc")
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
