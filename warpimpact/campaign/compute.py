@@ -100,14 +100,18 @@ def compute(
     if solid.thickness is not None:
         solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
     reference = scene.model_copy(update={"target": thinner})
-    return dataset.merge(solid_dataset(_outcomes(reference, solid, numerics, device, threads)[0]))
+    follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
+    return dataset.merge(solid_dataset(_outcomes(reference, solid, numerics, device, threads, follow)[0]))
 
 
-def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
+def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Promise | None:
     """The promise that a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
 
     The pilot takes the first hits of a Sobol or random sampling. It takes hits at even distances from a grid or a list.
     So it depends on the campaign alone.
+
+    Args:
+        device, progress: as in `simulate`.
 
     Raises:
         DeviceError: the device is absent.
@@ -122,7 +126,7 @@ def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
     else:
         places = np.linspace(0, hits, count, endpoint=False).astype(int)
         pilot = Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
-    return keep(campaign.scene, campaign.numerics, pilot, device=device)
+    return keep(campaign.scene, campaign.numerics, pilot, device=device, progress=progress)
 
 
 def _promised(promise: Promise) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpimpact.results import attributes as attr
-from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
@@ -52,7 +51,7 @@ def _run(arguments: argparse.Namespace) -> int:
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
-    with memory_told(arguments.campaign), terminated_as_interrupted(), show_standing() as progress:
+    with memory_told(arguments.campaign), show_standing() as progress:
         run_to_file(
             campaign,
             output,
