@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from typing import Any
@@ -21,7 +21,7 @@ from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PILOT, Promise, keep
-from warpimpact.solver.refinement import LEVELS, Estimates, simulate_to_tolerance
+from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
 from warpimpact.solver.unfold import unfolded, unfolded_estimates
@@ -36,6 +36,7 @@ def compute(
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
+    refining: Callable[[Refining], None] | None = None,
 ) -> xarray.Dataset:
     """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
@@ -44,6 +45,7 @@ def compute(
         promise: the finding of a pilot (`promise_of`); None to compute with the numerics as they are given.
         solid: shots at the solid plate of equal areal density; None for no such shots.
         device, threads, progress: as in `simulate`.
+        refining: as in `simulate_to_tolerance`; not called without a tolerance.
 
     Returns:
         The Dataset of results/dataset.py, one entry per shot; it is a complete result.
@@ -57,7 +59,7 @@ def compute(
     numerics = campaign.numerics if promise is None else promise.fidelity
     _build(scene, computed, numerics, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow)
+    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining)
     elapsed = time.perf_counter() - begin
     period, chosen = campaign.hits.covered(campaign.plate), find_device(device)
     ligament = campaign.plate.ligament
@@ -166,10 +168,19 @@ def _outcomes(
     device: str,
     threads: int | None,
     progress: Progress | None = None,
+    refining: Callable[[Refining], None] | None = None,
 ) -> tuple[Outcomes, Estimates | None]:
     """Outcomes, and estimates of their errors if the numerics have a tolerance."""
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
-        return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
+        return simulate_to_tolerance(
+            scene,
+            shots,
+            numerics=numerics,
+            device=device,
+            threads=threads,
+            progress=progress,
+            refining=refining,
+        )
     return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
 
 

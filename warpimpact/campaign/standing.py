@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from warpimpact.results.measures import Measure
 from warpimpact.solver.promise import Promise
+from warpimpact.solver.refinement import Refining
 from warpimpact.statistics.intervals import Estimate
 
 
@@ -21,6 +22,7 @@ class Standing:
         failed: shots whose computation failed.
         estimates: running estimates of the main quantities, over the shots from the first on without a gap.
         promise: the finding of the pilot; None if the campaign fixes the resolution.
+        refining: how far the hits of a task are on their way to a tolerance; None without one.
     """
 
     done: int
@@ -30,6 +32,7 @@ class Standing:
     failed: int
     estimates: dict[Measure, Estimate]
     promise: Promise | None = None
+    refining: Refining | None = None
 
 
 Follow = Callable[[Standing], None]

@@ -21,6 +21,7 @@ from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
 from warpimpact.solver.promise import Promise
+from warpimpact.solver.refinement import Refining
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
@@ -47,6 +48,7 @@ class Team:
         task: shots per task.
         made_by: versions and kind of device, which decide the bits.
         underway: how many shots of unfinished tasks are done.
+        refining: the task that has the longest way to its tolerance, None if there is none or it is not known.
     """
 
     pilot: Callable[[], Future[Promise | None]]
@@ -55,6 +57,7 @@ class Team:
     task: int
     made_by: dict[str, str]
     underway: Callable[[], int]
+    refining: Callable[[], Refining | None]
 
 
 def awaited(future: Future[Any], every: float, tick: Callable[[], object]) -> Any:
@@ -77,7 +80,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     """
     devices = _devices(device)
     idle, done, stopping = SimpleQueue[str](), dict[int, int](), threading.Event()
-    begun: list[Future[Any]] = []
+    levels, begun = dict[int, Refining](), list[Future[Any]]()
     for chosen in devices:
         idle.put(str(chosen))
 
@@ -89,9 +92,18 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
     def work(promise: Promise | None, shots: Shots, solid: Shots | None) -> xarray.Dataset:
         name = idle.get()
         try:
-            return compute(campaign, shots, promise=promise, solid=solid, device=name, progress=progress)
+            return compute(
+                campaign,
+                shots,
+                promise=promise,
+                solid=solid,
+                device=name,
+                progress=progress,
+                refining=lambda found: levels.update({threading.get_ident(): found}),
+            )
         finally:
             done[threading.get_ident()] = 0
+            levels.pop(threading.get_ident(), None)
             idle.put(name)
 
     def begin(task: Callable[..., Any], *arguments: Any) -> Future[Any]:
@@ -108,6 +120,7 @@ def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
             task=_task_size(kind),
             made_by=kind,
             underway=lambda: sum(done.copy().values()),
+            refining=lambda: max(levels.copy().values(), key=lambda one: one.seconds_left or 0.0, default=None),
         )
     finally:
         stopping.set()
@@ -166,6 +179,7 @@ def cluster_team(
                 task=_task_size(kind),
                 made_by=kind,
                 underway=lambda: 0,
+                refining=lambda: None,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
             raise ClusterError(

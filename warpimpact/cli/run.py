@@ -10,7 +10,7 @@ from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
 from .paths import check_place
 from .plain import say
-from .progress import show_standing, warn
+from .progress import show_standing, tell_tolerance, warn
 
 if TYPE_CHECKING:
     import xarray
@@ -48,6 +48,7 @@ def _run(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
+    tell_tolerance(campaign.numerics)
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
