@@ -13,7 +13,6 @@ from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
     draw_holes,
     draw_values,
-    hit_points,
     limits,
     nearest_hits,
     paint_pixels,
