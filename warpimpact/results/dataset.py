@@ -70,7 +70,7 @@ def to_dataset(
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
     values |= _of_layers(scene, shots)
     values |= _outlines(scene, *((-0.5 * side, 0.5 * side) for side in period))
-    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES, *v.LAYER_SCATTER)
+    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES)
     optional = (name for name in (*v.SCATTER_VARIABLES, *v.BENDING_VARIABLES, *layers) if name in values)
     variables = [*v.VARIABLES, *optional]
     if estimates is not None:

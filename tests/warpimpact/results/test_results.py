@@ -12,9 +12,15 @@ import xarray
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
-from warpimpact.results.variables import BENDING_VARIABLES, OUTCOME_VARIABLES, SCATTER_VARIABLES, SHOT_VARIABLES
+from warpimpact.results.variables import (
+    BENDING_VARIABLES,
+    LAYER_VARIABLES,
+    OUTCOME_VARIABLES,
+    SCATTER_VARIABLES,
+    SHOT_VARIABLES,
+)
 from warpimpact.scene import NoPattern, Shots, SquarePattern
-from warpimpact.solver.simulate import BentOutcomes, Outcomes
+from warpimpact.solver.simulate import BentOutcomes, LayeredOutcomes, Outcomes
 
 MM = 1e-3
 TWO_HOLES = SquarePattern(side=2 * MM, spacing=(16 * MM, 8 * MM), holes=[(2 * MM, 0.0), (-2 * MM, 0.0)])
@@ -215,3 +221,5 @@ def test_every_field_of_shots_and_outcomes_has_a_variable():
     assert {field.name for field in dataclasses.fields(Outcomes)} == set(OUTCOME_VARIABLES)
     bent = {field.name for field in dataclasses.fields(BentOutcomes)}
     assert bent == {*OUTCOME_VARIABLES, *BENDING_VARIABLES}
+    layered = {field.name for field in dataclasses.fields(LayeredOutcomes)}
+    assert layered == {*OUTCOME_VARIABLES, *LAYER_VARIABLES}
