@@ -3,7 +3,7 @@ PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
 PARALLEL := --numprocesses auto --dist worksteal
 
-.PHONY: demo gallery test clean
+.PHONY: demo gallery docs test clean
 
 demo: $(INSTALLED)
 	$(VENV)/bin/warpimpact run campaigns/slotted_plate.toml -o slotted.nc --overwrite
@@ -11,6 +11,11 @@ demo: $(INSTALLED)
 
 gallery: $(INSTALLED)
 	$(VENV)/bin/python campaigns/gallery.py
+
+# Pages in build/docs/index.html; tutorials are executed, examples in pages checked. A warning is an error.
+docs: $(INSTALLED)
+	$(VENV)/bin/sphinx-build -q -W --keep-going -j auto -b html -d build/doctrees docs build/docs
+	$(VENV)/bin/sphinx-build -q -W --keep-going -b doctest -D nb_execution_mode=off -d build/doctest/trees docs build/doctest
 
 # The kernel and verification tests run once more in Warp's debug mode, which checks array bounds.
 test: $(INSTALLED)
@@ -23,9 +28,11 @@ test: $(INSTALLED)
 clean:
 	rm -rf $(VENV) build slotted.nc slotted.nc.parts slotted_*.png
 
-# Editable, so that the modules of kernels/ and campaigns/ are found inside the package from the checkout, too.
+# Editable, so that the modules of kernels/ and campaigns/ are found inside the package from the checkout, too. Its
+# finder serves the interpreter only; type checkers find the package by the path in warpimpact.pth.
 $(INSTALLED): pyproject.toml Makefile
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --upgrade pip
 	$(VENV)/bin/pip install --quiet --editable '.[dev]'
+	echo "$(CURDIR)" > "$$($(VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/warpimpact.pth"
 	touch $@

@@ -11,8 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from PIL import Image
 
-from warpimpact import Campaign, run
-from warpimpact.campaign.replay import replay
+from warpimpact import Campaign, replay, run
 from warpimpact.plotting import dispersion, hit_maps, marginals, overview, trajectory, uncertainty
 from warpimpact.plotting.pressure import pressure
 

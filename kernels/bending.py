@@ -44,12 +44,21 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Bending:
-        """The largest bending moment [N m] and nominal stress [Pa] so far, and where behind the nose [m]."""
+        """The largest bending moment [N m] and nominal stress [Pa] so far, and where behind the nose [m].
+
+        A core is broken from the first step on in which the stress is above its `strength` [Pa]: the middle of that
+        step [s], the most stressed section then behind the nose [m], and that section ahead of the hit point along x.
+        """
 
         moment: real
         moment_station: real
         stress: real
         stress_station: real
+        strength: real
+        broken: wp.int32
+        broken_time: real
+        broken_station: real
+        broken_x: real
 
     @wp.func
     def mean_force(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
@@ -83,9 +92,10 @@ def build(variant: Variant) -> SimpleNamespace:
         load: Load,
         foreseen: Change,
         dt: real,
+        time: real,
     ):
         """The larger of `before` and the bending in one step, whose load changes the velocities in `state`. The loads
-        on the rings are those at half of the foreseen change.
+        on the rings are those at half of the foreseen change. `time` is that of the middle of the step.
 
         A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per
         rotary inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for
@@ -99,9 +109,16 @@ def build(variant: Variant) -> SimpleNamespace:
         turning = (share / dt) * dw + gyration
         push = across((share / dt) * dv)
         force, moment = vec3(), vec3()
+        ahead = zero
         for index in range(surface.rings):
             here = slot * surface.rings + index
-            if index >= found.first_ring and index <= found.last_ring and touches.ring_area[here] > zero:
+            area = zero
+            if index >= found.first_ring and index <= found.last_ring:
+                if wp.static(variant.layered):
+                    area = touches.total_area[here]
+                else:
+                    area = touches.ring_area[here]
+            if area > zero:
                 ring = surfaces.ring_at(surface, pose, index)
                 sums = touches.sums[here]
                 force += share * mean_force(ring, sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
@@ -119,6 +136,12 @@ def build(variant: Variant) -> SimpleNamespace:
             if size * sections.stress[index] > worst.stress:
                 worst.stress = size * sections.stress[index]
                 worst.stress_station = sections.station[index]
+                ahead = sections.ahead[index]
+        if worst.broken == 0 and worst.stress > worst.strength:
+            worst.broken = 1
+            worst.broken_time = time
+            worst.broken_station = worst.stress_station
+            worst.broken_x = state.position[0] + ahead * pose.axis[0]
         return worst
 
     return SimpleNamespace(Sections=Sections, Bending=Bending, bent=bent)

@@ -26,7 +26,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Arrays of shape [1] or [shots], SI and radians.
 
         Hit point, velocity and attitude on impact (docs/model.md §1); the thickness of the plate [m]; the members of
-        Body and Law, and the members of Pace that follow from them.
+        Body and Law, the strength of the core [Pa], and the members of Pace that follow from them.
         """
 
         hit_y: wp.array(dtype=wp.float64)
@@ -44,6 +44,7 @@ def build(variant: Variant) -> SimpleNamespace:
         a0: wp.array(dtype=real)
         a1: wp.array(dtype=real)
         friction: wp.array(dtype=real)
+        strength: wp.array(dtype=real)
         decay_rate: wp.array(dtype=real)
         degradation: wp.array(dtype=real)
         onset_jump: wp.array(dtype=real)

@@ -56,7 +56,19 @@ def bend(
     footprint.first_ring = struck
     footprint.last_ring = struck
     found[0] = bent(
-        Bending(), surface, sections, body, touches, 0, footprint, pose, state, load, Change(), wp.float64(1.0e-9)
+        Bending(),
+        surface,
+        sections,
+        body,
+        touches,
+        0,
+        footprint,
+        pose,
+        state,
+        load,
+        Change(),
+        wp.float64(1.0e-9),
+        wp.float64(0.0),
     )
 
 

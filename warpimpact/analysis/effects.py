@@ -20,7 +20,7 @@ from warpimpact.scene import AnyCore, Core
 
 Array = NDArray[np.float64]
 
-_NEEDED = (v.STATUS, v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS)
+_NEEDED = (v.STATUS, v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.BROKEN)
 
 
 @dataclass(frozen=True)
@@ -114,6 +114,35 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
         kind="share",
         values=lambda part: np.where(failed(part), np.nan, ~passed(part)),
     )
+    if v.BROKEN not in dataset:
+        return
+    yield Effect(
+        name="broken_share",
+        label="P(broken)",
+        units="1",
+        definition="Share of the shots whose nominal bending stress passed the strength of the core.",
+        source="beam theory for a rigid core; a bound, not a prediction of fragments",
+        higher_is_better=True,
+        kind="share",
+        values=_is_broken,
+    )
+    yield Effect(
+        name="stopped_or_broken_share",
+        label="P(stopped, or broken)",
+        units="1",
+        definition="Share of the shots that do not pass the plate, or pass it with a broken core.",
+        source="partial penetration as in MIL-STD-662F, V50 Ballistic Test for Armor; a broken core counts as stopped",
+        higher_is_better=True,
+        kind="share",
+        values=lambda part: np.where(passed(part), _is_broken(part), np.where(failed(part), np.nan, 1.0)),
+    )
+
+
+def _is_broken(part: xarray.Dataset) -> Array:
+    """1 for a broken core, NaN where that was not computed: of a failed shot, and of the solid reference."""
+    if v.BROKEN not in part:
+        return np.full(part.sizes["hit"], np.nan)
+    return np.asarray(part[v.BROKEN].values, dtype=np.float64)
 
 
 def _at_standoff(dataset: xarray.Dataset, standoff: float | None) -> float:
@@ -141,7 +170,7 @@ def _energy_fraction(part: xarray.Dataset) -> Array:
 def _inclination(part: xarray.Dataset, standoff: float) -> Array:
     """Between axis and line of fire, nose or base first alike [degree], shape [hits]."""
     tilt = part[v.TILT].sel(standoff=standoff, method="nearest").values.astype(float)
-    return np.minimum(tilt, 180.0 - tilt)
+    return np.asarray(np.minimum(tilt, 180.0 - tilt))
 
 
 def _energy_density(core: Core, standoff: float) -> Callable[[xarray.Dataset], Array]:

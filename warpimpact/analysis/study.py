@@ -175,7 +175,7 @@ def label(campaign: Campaign, numerics: Numerics) -> str:
 
 def _time_step(campaign: Campaign, resolution: Resolution) -> float:
     """Time step at the campaign's impact velocity [s]."""
-    return resolution.step_of(campaign.impact, campaign.plate)
+    return resolution.step_in(campaign.impact, campaign.target)
 
 
 def extrapolated(double: Answer, single: Answer) -> Answer:
@@ -223,7 +223,8 @@ class _Bench:
     def __init__(self, campaign: Campaign, hits: int, device: str, progress: Progress) -> None:
         self.campaign, self.device = campaign, find_device(device)
         plain = campaign.scene.record.model_copy(update={"bending": False})  # the literal scheme computes no bending
-        self.scene = campaign.scene.model_copy(update={"record": plain})
+        core = campaign.core if campaign.core.strength is None else campaign.core.model_copy(update={"strength": None})
+        self.scene = campaign.scene.model_copy(update={"core": core, "record": plain})
         self.progress, self.work, self.total = progress, 0.0, 0.0
         spread = Hits(count=hits, seed=campaign.hits.seed, replicates=1)
         self.shots = make_shots(campaign.impact, spread, campaign.plate, campaign.scatter)

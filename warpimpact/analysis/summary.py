@@ -56,7 +56,7 @@ class Summary:
 def promise_text(dataset: xarray.Dataset) -> str | None:
     """What the errors of the numerics are, and whether the fidelity keeps its promise; None of an older result."""
     told = dataset.attrs
-    if attr.NUMERICS_GIVEN not in told:
+    if attr.NUMERICS_GIVEN not in told or attr.LIMIT in told:
         return None
     given = json.loads(told[attr.NUMERICS_GIVEN])
     if attr.PROMISE_KEPT not in told:

@@ -55,6 +55,19 @@ def pressed(history: xarray.Dataset, step: int) -> Surface:
     return Surface(point, normal, area, np.where(touching, _left(history, step, point), 0.0))
 
 
+def largest_in_plate(history: xarray.Dataset) -> int:
+    """The step of the largest force; with layers behind the plate, of those in which the core reaches none of them.
+
+    A history holds what is left of the resistance of the plate alone.
+    """
+    force = np.linalg.norm(history[v.FORCE], axis=1)
+    if v.LAYER_FRONT in history:
+        centre = history[v.PLATE_POSITION].values[:, 0]
+        foremost = centre + np.abs(history[v.STATION].values).max()
+        force = np.where(foremost < float(history[v.LAYER_FRONT][1]), force, -1.0)
+    return int(force.argmax())
+
+
 def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     """Points relative to the centre of mass and normals, both in body axes, and areas; shapes as in `Surface`."""
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values
@@ -65,7 +78,7 @@ def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     middle, wide = (station[1:] + station[:-1]) / 2, (radius[1:] + radius[:-1]) / 2
 
     def combined(axial: Array, radial: Array) -> Array:
-        return axial[:, None, None] * np.array([1.0, 0.0, 0.0]) + radial[:, None, None] * ring
+        return np.asarray(axial[:, None, None] * np.array([1.0, 0.0, 0.0]) + radial[:, None, None] * ring)
 
     area = np.broadcast_to((slant * wide * 2.0 * np.pi / AROUND)[:, None], (len(middle), AROUND))
     return combined(middle, wide), combined(outward / slant, along / slant), area
@@ -77,10 +90,10 @@ def _left(history: xarray.Dataset, step: int, point: Array) -> Array:
     Between snapshots the logarithm is interpolated, because it is proportional to the exposure.
     """
     share = history[v.RESISTANCE_SHARE]
-    spent = xarray.where(share > _SPENT, share, _SPENT)
+    spent = share.where(share > _SPENT, _SPENT)
     now = np.exp(xarray.apply_ufunc(np.log, spent).interp(snapshot=history[v.TIME][step]))
     cells = {v.CELL[axis]: (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
-    return np.nan_to_num(now.interp(cells).values)
+    return np.asarray(np.nan_to_num(now.interp(cells).values))
 
 
 def _turned(turn: Rotation, vectors: Array) -> Array:

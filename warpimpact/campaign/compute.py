@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PILOT, Promise, keep
-from warpimpact.solver.refinement import LEVELS, Estimates, simulate_to_tolerance
+from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
 from warpimpact.solver.unfold import unfolded, unfolded_estimates
@@ -38,6 +39,7 @@ def compute(
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
+    refining: Callable[[Refining], None] | None = None,
 ) -> xarray.Dataset:
     """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
@@ -46,6 +48,7 @@ def compute(
         promise: the finding of a pilot (`promise_of`); None to compute with the numerics as they are given.
         solid: shots at the solid plate of equal areal density; None for no such shots.
         device, threads, progress: as in `simulate`.
+        refining: as in `simulate_to_tolerance`; not called without a tolerance.
 
     Returns:
         The Dataset of results/dataset.py, one entry per shot; it is a complete result.
@@ -59,15 +62,53 @@ def compute(
     numerics = campaign.numerics if promise is None else promise.fidelity
     _build(scene, computed, numerics, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow)
+    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining)
     elapsed = time.perf_counter() - begin
-    period, chosen = campaign.hits.covered(campaign.plate), find_device(device)
-    ligament = campaign.plate.ligament
+    dataset = described(
+        campaign,
+        shots,
+        outcomes,
+        numerics=numerics,
+        device=device,
+        elapsed=elapsed,
+        attributes={} if promise is None else _promised(promise),
+        estimates=estimates,
+    )
+    if solid is None:
+        return dataset
+    solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
+    follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
+    outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow)
+    return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
+
+
+def described(
+    campaign: Campaign,
+    shots: Shots,
+    outcomes: Outcomes,
+    *,
+    numerics: Numerics | Fidelity,
+    device: str,
+    elapsed: float,
+    attributes: Mapping[str, Any],
+    estimates: Estimates | None = None,
+) -> xarray.Dataset:
+    """The Dataset of some shots of a campaign.
+
+    Args:
+        shots: whole groups of images.
+        outcomes: of the first shot of every group; the estimates likewise.
+        numerics: with which they were computed.
+        elapsed: time that this took [s].
+        attributes: global attributes beside those of any campaign.
+    """
+    scene, group, chosen = campaign.scene, campaign.symmetries, find_device(device)
+    computed, ligament = len(shots) // len(group), campaign.plate.ligament
     dataset = to_dataset(
         scene,
         shots,
         unfolded(outcomes, group),
-        period=period,
+        period=campaign.hits.covered(campaign.plate),
         attributes={
             attr.TITLE: campaign.title,
             attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
@@ -81,7 +122,7 @@ def compute(
             attr.REPLICATES: campaign.replicates,
             attr.STANDOFF_POINT: campaign.output.standoff_point,
             attr.OPEN_AREA: campaign.plate.open_area,
-            attr.AREAL_DENSITY: campaign.plate.areal_density,
+            attr.AREAL_DENSITY: campaign.target.areal_density,
             attr.CORE: campaign.core.model_dump_json(),
             attr.PLATE: _plate(campaign),
             attr.IMPACT: _impact(campaign),
@@ -91,25 +132,42 @@ def compute(
             attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             attr.FAILED_SHARE: campaign.output.failed_share,
             attr.COMPUTE_TIME: elapsed,
-            attr.HITS_PER_SECOND: len(computed) / elapsed,
+            attr.HITS_PER_SECOND: computed / elapsed,
         }
         | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
-        | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {})
-        | ({} if promise is None else _promised(promise)),
+        | (_symmetry(group, computed) if campaign.hits.irreducible else {})
+        | dict(attributes),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
         double=is_double(campaign),
     )
-    if not campaign.output.exit_state:
-        dataset = dataset.drop_vars(v.EXIT_VARIABLES)
-    if solid is None:
-        return dataset
-    thinner = campaign.plate.solid
-    if solid.thickness is not None:
-        solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
-    reference = scene.model_copy(update={"target": thinner})
-    outcomes, _ = _outcomes(reference, solid, numerics, device, threads)
-    return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
+    return dataset if campaign.output.exit_state else dataset.drop_vars(v.EXIT_VARIABLES)
+
+
+class HitMap:
+    """What a run computes of every hit of a campaign: how it ends. Another kind of run derives from it.
+
+    Attributes:
+        content: what decides the bits of a result, beside the campaign, the versions and the device.
+        measures: whose running estimates are told; those of a hit map where there are none.
+        takes_solid: whether the solid plate of equal areal density is computed, too.
+    """
+
+    content: Mapping[str, str] = MappingProxyType({})
+    measures: Sequence[str] = ()
+    takes_solid = True
+
+    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> xarray.Dataset:
+        """Compute some shots; the arguments are those of `compute`."""
+        return compute(campaign, shots, **how)
+
+    def promise_of(self, campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Any:
+        """What a pilot of the campaign finds; None if the campaign fixes the resolution itself."""
+        return promise_of(campaign, device, progress)
+
+    def promise_in(self, dataset: xarray.Dataset) -> Any:
+        """What was found by the pilot of a result."""
+        return promise_in(dataset)
 
 
 def is_double(campaign: Campaign) -> bool:
@@ -117,26 +175,45 @@ def is_double(campaign: Campaign) -> bool:
     return campaign.numerics.precision == "double"
 
 
-def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
+def _at_solid(campaign: Campaign, shots: Shots) -> Shots:
+    """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
+    target, plate = campaign.target, campaign.plate
+    own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}
+    if shots.thickness is None and shots.layer_thickness is None:
+        return replace(shots, **own)
+    thickness = shots.own("thickness", plate.thickness) * (plate.solid.thickness / plate.thickness)
+    for k, layer in enumerate(target.layers):
+        share = layer.areal_density / layer.thickness / plate.density
+        thickness = thickness + share * shots.own_of_layer("thickness", k, layer.thickness)
+    return replace(shots, **own, thickness=np.broadcast_to(thickness, len(shots)).copy())
+
+
+def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Promise | None:
     """The promise that a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
 
     The pilot takes the first hits of a Sobol or random sampling. It takes hits at even distances from a grid or a list.
     So it depends on the campaign alone.
+
+    Args:
+        device, progress: as in `simulate`.
 
     Raises:
         DeviceError: the device is absent.
     """
     if campaign.numerics.explicit is not None:
         return None
+    return keep(campaign.scene, campaign.numerics, pilot_of(campaign, PILOT), device=device, progress=progress)
+
+
+def pilot_of(campaign: Campaign, most: int) -> Shots:
+    """Some of the hits of a campaign, no two of them images of each other."""
     sampler, group = campaign.sampler(), len(campaign.symmetries)
     hits = len(sampler) // group
-    count = min(PILOT, hits)
+    count = min(most, hits)
     if campaign.hits.sampling in ("sobol", "random"):
-        pilot = sampler.shots(0, count * group)[::group]
-    else:
-        places = np.linspace(0, hits, count, endpoint=False).astype(int)
-        pilot = Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
-    return keep(campaign.scene, campaign.numerics, pilot, device=device)
+        return sampler.shots(0, count * group)[::group]
+    places = np.linspace(0, hits, count, endpoint=False).astype(int)
+    return Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
 
 
 def _promised(promise: Promise) -> dict[str, Any]:
@@ -176,10 +253,19 @@ def _outcomes(
     device: str,
     threads: int | None,
     progress: Progress | None = None,
+    refining: Callable[[Refining], None] | None = None,
 ) -> tuple[Outcomes, Estimates | None]:
     """Outcomes, and estimates of their errors if the numerics have a tolerance."""
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
-        return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
+        return simulate_to_tolerance(
+            scene,
+            shots,
+            numerics=numerics,
+            device=device,
+            threads=threads,
+            progress=progress,
+            refining=refining,
+        )
     return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
 
 
@@ -232,7 +318,7 @@ def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
-        f"time_step {resolution.step_of(impact, campaign.plate):.4g} s, "
+        f"time_step {resolution.step_in(impact, campaign.target):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
     )

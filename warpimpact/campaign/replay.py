@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -15,7 +17,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
 from warpimpact.results.files import ResultError
-from warpimpact.scene import Numerics
+from warpimpact.scene import Numerics, Shots
 from warpimpact.solver import simulate
 from warpimpact.solver.resolution import Fidelity, level
 from warpimpact.solver.unfold import image_of
@@ -26,7 +28,7 @@ ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 _OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES)
 
 
-def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
+def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xarray.Dataset:
     """Compute one hit of a result again, on the CPU, from the campaign that the result contains.
 
     If symmetry unfolded the hit, the computed hit of its group is computed again and its history is unfolded.
@@ -34,7 +36,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     Args:
         result: the Dataset of `run`.
         hit: its number, which in a choice of the hits is still that of the whole result.
-        folder: folder of the files that the campaign names.
+        folder: folder of the files that the campaign names, if it names any.
 
     Returns:
         The Dataset of `results.history_dataset`. Its attribute `agreement` compares its end with the stored
@@ -50,13 +52,13 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         choice = "hits" if numbers.max() - numbers.min() + 1 == hits else f"{hits} of the hits"
         raise ResultError(f"hit: got {hit}, but the result has {choice} {numbers.min()} to {numbers.max()}")
     place = int(places[0])
-    campaign = _campaign(result, folder)
+    campaign = _campaign(result, Path(folder))
     sampler = campaign.sampler()
     if hit >= len(sampler):
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
     scene, group = campaign.scene, campaign.symmetries
     image = hit % len(group)
-    images = sampler.shots(hit - image, len(group))
+    images = _at_their_limit(sampler.shots(hit - image, len(group)), result, place)
     computed, shot = images[:1], images[image:][:1]
     again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place))
     home, away = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
@@ -81,10 +83,21 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     return history_dataset(scene, end, again, attributes=attributes)
 
 
+def _at_their_limit(shots: Shots, result: xarray.Dataset, place: int) -> Shots:
+    """In a result of limits: the images of a hit as they just perforate."""
+    if attr.LIMIT not in result.attrs:
+        return shots
+    quantity = result.attrs[attr.LIMIT]
+    stored = v.IMPACT_VELOCITY if quantity == "velocity" else v.THICKNESS
+    return replace(shots, **{quantity: np.full(len(shots), float(result[stored][place]))})
+
+
 def _numerics(campaign: Campaign, result: xarray.Dataset, place: int) -> Numerics | Fidelity:
     """What the hit was computed with: of a run to a tolerance, the level that it ended on."""
     if campaign.numerics.tolerance is not None:
         return level(int(result[v.LEVEL][place]), campaign.numerics)
+    if attr.LIMIT_RESOLUTION in result.attrs:
+        return Fidelity(**json.loads(result.attrs[attr.LIMIT_RESOLUTION]))
     promise = promise_in(result)
     return campaign.numerics if promise is None else promise.fidelity
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
@@ -15,48 +15,22 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import promise_in
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
-from warpimpact.campaign.team import Team, local_team
+from warpimpact.campaign.standing import Follow, Standing
+from warpimpact.campaign.team import Team, awaited, local_team
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
+from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Shots
-from warpimpact.solver.promise import Promise
-from warpimpact.statistics.intervals import Estimate
 from warpimpact.statistics.stopping import looks
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""
 _MOST_SOLID = 2**12
 """Shots at most at the solid plate of equal areal density."""
-
-
-@dataclass(frozen=True)
-class Standing:
-    """How far a run is.
-
-    Attributes:
-        done, total: shots; `total` is the most that a stop rule allows.
-        saved: shots of whole shards, which no interrupt loses; `done` counts those of unfinished ones too.
-        resumed: shots that an earlier run had done.
-        failed: shots whose computation failed.
-        estimates: running estimates of the main quantities, over the shots from the first on without a gap.
-        promise: the finding of the pilot; None if the campaign fixes the resolution.
-    """
-
-    done: int
-    total: int
-    saved: int
-    resumed: int
-    failed: int
-    estimates: dict[Measure, Estimate]
-    promise: Promise | None = None
-
-
-Follow = Callable[[Standing], None]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -188,11 +162,14 @@ class _End:
 def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End:
     """Compute the shards that the store lacks, until all are there or the stop rule is met."""
     sampler = campaign.sampler()
-    watch = _Watch(campaign, len(sampler), store)
+    watch = _Watch(campaign, len(sampler), store, team.job.measures)
     for index in sorted(store.saved):
         watch.add(index, store.load(index))
     watch.resumed = watch.done
-    watch.promise = promise = promise_in(store.load(min(store.saved))) if store.saved else team.pilot()
+    if store.saved:
+        watch.promise = team.job.promise_in(store.load(min(store.saved)))
+    else:
+        watch.promise = awaited(team.pilot(), _REPORT_EVERY, lambda: follow(watch.standing(0)))
     tasks = _tasks(store, len(sampler), team.task)
     waiting: dict[Future[xarray.Dataset], range] = {}
     try:
@@ -200,15 +177,17 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
             width = team.width()
             while len(waiting) < width and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
-                solid = _solid_shots(campaign, shots[: store.extent]) if task.start == 0 else None
-                waiting[team.submit(promise, shots, solid)] = task
+                first = team.job.takes_solid and task.start == 0
+                solid = _solid_shots(campaign, shots[: store.extent]) if first else None
+                waiting[team.submit(watch.promise, shots, solid)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
+            stop_if_asked()
             for future in finished:
                 task = waiting.pop(future)
                 for index, shard in _split(future.result(), task, store.extent):
                     store.save(index, shard)
                     watch.add(index, shard)
-            follow(watch.standing(team.underway()))
+            follow(replace(watch.standing(team.underway()), refining=team.refining()))
     finally:
         for future in waiting:
             future.cancel()
@@ -220,10 +199,11 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
     """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
     differ but in where they hit."""
     plate = campaign.plate
-    if not campaign.output.solid_reference or plate.solid == plate:
+    if not campaign.output.solid_reference or campaign.target.solid == plate:
         return None
-    conditions = [values for name, values in shots.columns.items() if name not in (v.HIT_Y, v.HIT_Z)]
-    alike = plate.size is None and not any(np.ptp(values) for values in conditions)
+    elsewhere = (v.HIT_Y, v.HIT_Z, "layer_offset_y", "layer_offset_z")
+    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
+    alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     return shots[: 1 if alike else _MOST_SOLID]
 
 
@@ -244,12 +224,12 @@ def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
 
 def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[int, xarray.Dataset]]:
     """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
-    the solid reference."""
-    hits = dataset.sizes["hit"]
+    what is said once."""
+    hits, of_the_campaign = dataset.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
     for place, index in enumerate(task):
         shard = numbered(dataset.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
         if index:
-            shard = shard.drop_dims("solid_hit", errors="ignore")
+            shard = shard.drop_vars(of_the_campaign, errors="ignore")
         time = dataset.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
         yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | _computed(dataset, shard.sizes["hit"]))
 
@@ -261,13 +241,13 @@ class _Watch:
     same shots however it was computed.
     """
 
-    def __init__(self, campaign: Campaign, total: int, store: _Store) -> None:
+    def __init__(self, campaign: Campaign, total: int, store: _Store, measures: Sequence[str] = ()) -> None:
         self._total, self._shards, self._load = total, -(-total // store.extent), store.load
         self._rule = campaign.stop
         last = campaign.output.standoffs[-1]
-        measures = [Measure.parse("mean(residual_velocity)"), Measure.parse(f"mean(tilt@{last * 1e3:.10g}mm)")]
+        measures = measures or ("mean(residual_velocity)", f"mean(tilt@{last * 1e3:.10g}mm)")
         dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries)}
-        self._tallies = [Tally(measure, **dealt) for measure in measures]
+        self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
         if self._rule is not None:
             rule = self._rule
             self._stop = Tally(rule.measure, **dealt, confidence=rule.confidence)
@@ -277,7 +257,7 @@ class _Watch:
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
         self.end: _End | None = None
-        self.promise: Promise | None = None
+        self.promise: Any = None
 
     def add(self, index: int, shard: xarray.Dataset) -> None:
         """Take in a shard that the store has; one that comes before its turn is loaded when that is."""
@@ -332,7 +312,7 @@ class _Watch:
 def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:
     """Global attributes of a complete result over those of its first shard."""
     return {
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {dataset.attrs[attr.HISTORY].partition(' ')[2]}",
         attr.COMPUTE_TIME: end.compute_time,
         attr.HITS_PER_SECOND: end.hits / images(dataset) / end.compute_time,
         **_computed(dataset, end.hits),

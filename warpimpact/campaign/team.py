@@ -6,7 +6,7 @@ import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -15,14 +15,21 @@ from typing import Any
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import compute, made_by, promise_of
+from warpimpact.campaign.compute import HitMap, made_by
 from warpimpact.results import attributes as attr
+from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
-from warpimpact.solver.promise import Promise
+from warpimpact.solver.refinement import Refining
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
+_HIT_MAP = HitMap()
+
+
+_PATIENCE = 1.0
+"""Seconds for which a team waits for computations that nobody wants any more: what a thread of this machine computes
+can be broken off between two launches of a kernel only."""
 
 
 class ClusterError(RuntimeError):
@@ -34,65 +41,95 @@ class Team:
     """Computes shots in the background.
 
     Attributes:
-        pilot: finds the promise of the campaign, None if it fixes the resolution itself.
+        job: what is computed of every hit.
+        pilot: finds the promise of the campaign in the background, None if it fixes the resolution itself.
         submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Dataset
             comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
-        made_by: versions and kind of device, which decide the bits.
+        made_by: versions, kind of device and the job's content, which decide the bits.
         underway: how many shots of unfinished tasks are done.
+        refining: the task that has the longest way to its tolerance, None if there is none or it is not known.
     """
 
-    pilot: Callable[[], Promise | None]
-    submit: Callable[[Promise | None, Shots, Shots | None], Future[xarray.Dataset]]
+    job: HitMap
+    pilot: Callable[[], Future[Any]]
+    submit: Callable[[Any, Shots, Shots | None], Future[xarray.Dataset]]
     width: Callable[[], int]
     task: int
     made_by: dict[str, str]
     underway: Callable[[], int]
+    refining: Callable[[], Refining | None]
+
+
+def awaited(future: Future[Any], every: float, tick: Callable[[], object]) -> Any:
+    """The result of a future. Meanwhile `tick` is called every so many seconds, and a signal that came stops it all."""
+    while not wait([future], timeout=every).done:
+        stop_if_asked()
+        tick()
+    return future.result()
 
 
 @contextmanager
-def local_team(campaign: Campaign, device: str) -> Iterator[Team]:
+def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Iterator[Team]:
     """The devices of this machine, each computing one task at a time.
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), or names with commas between them.
+        job: what to compute of every hit.
 
     Raises:
         DeviceError: a device is absent, or they are of different kinds, which compute different bits.
     """
     devices = _devices(device)
     idle, done, stopping = SimpleQueue[str](), dict[int, int](), threading.Event()
+    levels, begun = dict[int, Refining](), list[Future[Any]]()
     for chosen in devices:
         idle.put(str(chosen))
 
-    def work(promise: Promise | None, shots: Shots, solid: Shots | None) -> xarray.Dataset:
-        name, thread = idle.get(), threading.get_ident()
+    def progress(finished: int, total: int) -> None:
+        if stopping.is_set():
+            raise InterruptedError
+        done[threading.get_ident()] = finished
 
-        def progress(finished: int, total: int) -> None:
-            if stopping.is_set():
-                raise InterruptedError
-            done[thread] = finished
-
+    def work(promise: Any, shots: Shots, solid: Shots | None) -> xarray.Dataset:
+        name = idle.get()
         try:
-            return compute(campaign, shots, promise=promise, solid=solid, device=name, progress=progress)
+            return job.compute(
+                campaign,
+                shots,
+                promise=promise,
+                solid=solid,
+                device=name,
+                progress=progress,
+                refining=lambda found: levels.update({threading.get_ident(): found}),
+            )
         finally:
-            done[thread] = 0
+            done[threading.get_ident()] = 0
+            levels.pop(threading.get_ident(), None)
             idle.put(name)
+
+    def begin(task: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        begun[:] = [future for future in begun if not future.done()]
+        begun.append(pool.submit(task, *arguments))
+        return begun[-1]
 
     pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
     try:
         yield Team(
-            pilot=lambda: promise_of(campaign, str(devices[0])),
-            submit=lambda *shots: pool.submit(work, *shots),
+            job=job,
+            pilot=lambda: begin(job.promise_of, campaign, str(devices[0]), progress),
+            submit=lambda *shots: begin(work, *shots),
             width=lambda: 2 * len(devices),
             task=_task_size(kind),
-            made_by=kind,
+            made_by=kind | dict(job.content),
             underway=lambda: sum(done.copy().values()),
+            refining=lambda: max(levels.copy().values(), key=lambda one: one.seconds_left or 0.0, default=None),
         )
     finally:
         stopping.set()
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown(wait=False, cancel_futures=True)
+        wait([future for future in begun if not future.cancelled()], timeout=_PATIENCE)
 
 
 def _task_size(kind: dict[str, str]) -> int:
@@ -101,7 +138,12 @@ def _task_size(kind: dict[str, str]) -> int:
 
 @contextmanager
 def cluster_team(
-    campaign: Campaign, *, address: str | None = None, workers: int | None = None, device: str = "auto"
+    campaign: Campaign,
+    *,
+    address: str | None = None,
+    workers: int | None = None,
+    device: str = "auto",
+    job: HitMap = _HIT_MAP,
 ) -> Iterator[Team]:
     """The workers of a Dask cluster; what one that dies was computing goes to another.
 
@@ -109,6 +151,7 @@ def cluster_team(
         address: of a scheduler.
         workers: processes to start on this machine, where there is no address.
         device: that every worker computes on.
+        job: what to compute of every hit.
 
     Raises:
         ClusterError: dask is not installed, the scheduler cannot be reached or is lost, or shots kill one worker after
@@ -140,12 +183,14 @@ def cluster_team(
         executor = client.get_executor(pure=False)
         try:
             yield Team(
-                pilot=lambda: client.submit(promise_of, campaign, device, pure=False).result(),
-                submit=lambda *shots: executor.submit(_compute_alike, campaign, *shots, device, threads, kind),
+                job=job,
+                pilot=lambda: executor.submit(job.promise_of, campaign, device),
+                submit=lambda *shots: executor.submit(_compute_alike, job, campaign, *shots, device, threads, kind),
                 width=lambda: 2 * max(1, sum(client.nthreads().values())),
                 task=_task_size(kind),
-                made_by=kind,
+                made_by=kind | dict(job.content),
                 underway=lambda: 0,
+                refining=lambda: None,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
             raise ClusterError(
@@ -159,7 +204,7 @@ def cluster_team(
 def _ignoring_interrupts(plugin: Any) -> Any:
     """Plugin of workers on this machine, which Ctrl-C reaches, too: this process is the one that ends them."""
 
-    class Ignoring(plugin):
+    class Ignoring(plugin):  # type: ignore[misc]  # imported with Dask only
         def setup(self, worker: Any) -> None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
@@ -167,8 +212,9 @@ def _ignoring_interrupts(plugin: Any) -> Any:
 
 
 def _compute_alike(
+    job: HitMap,
     campaign: Campaign,
-    promise: Promise | None,
+    promise: Any,
     shots: Shots,
     solid: Shots | None,
     device: str,
@@ -182,7 +228,7 @@ def _compute_alike(
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    return compute(campaign, shots, promise=promise, solid=solid, device=device, threads=threads)
+    return job.compute(campaign, shots, promise=promise, solid=solid, device=device, threads=threads)
 
 
 def _devices(names: str) -> list[Any]:

@@ -7,22 +7,31 @@ arguments, messages and progress here; a number is computed in another room. It 
 import argparse
 import os
 import sys
+import threading
 from collections.abc import Sequence
 from contextlib import redirect_stdout
+from typing import NoReturn
 
 from warpimpact import __version__
+from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
+from .limit import add_limit
 from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
+from .progress import told as progress_told
 from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
+from .start import add_completion, add_examples, add_new, add_schema
 
 _COMMANDS = (
+    add_examples,
+    add_new,
     add_run,
+    add_limit,
     add_inspect,
     add_plot,
     add_compare,
@@ -32,19 +41,37 @@ _COMMANDS = (
     add_report,
     add_study,
     add_validate,
+    add_schema,
+    add_completion,
 )
 """In the order of the help."""
 
 
+def command() -> NoReturn:
+    """Run one command as a process of its own.
+
+    A thread that is still computing when the command has ended, after Ctrl-C, has nothing to save: the process does not
+    wait for it.
+    """
+    code = main()
+    if threading.active_count() == 1:
+        sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(code)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 2 after a mistake that the user can correct, 3 when more shots failed
-    than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted.
+    than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted, 141 when who reads its output has read
+    enough.
 
     This is the one boundary for errors: each of them ends here in one sentence, never in a traceback.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = parser().parse_args(argv)
     try:
-        with redirect_stdout(Plain(sys.stdout)), implausible_told():
+        loud = progress_told(verbose=arguments.verbose, quiet=arguments.quiet)
+        with terminated_as_interrupted(), redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
             code: int | None = arguments.command(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
@@ -62,14 +89,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code or 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """The parser of the command line, with all commands; the documentation is made from it."""
+    program = argparse.ArgumentParser(
         prog="warpimpact",
         description="Hit maps of hard bullet cores against perforated armour plates.",
         epilog="example: warpimpact run campaigns/slotted_plate.toml && warpimpact plot slotted_plate.nc",
     )
-    parser.add_argument("--version", action="version", version=f"warpimpact {__version__}")
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    program.add_argument("--version", action="version", version=f"warpimpact {__version__}")
+    commands = program.add_subparsers(metavar="COMMAND", required=True)
     for add in _COMMANDS:
         add(commands)
-    return parser
+    return program

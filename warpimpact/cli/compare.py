@@ -7,8 +7,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from warpimpact.results.interrupts import terminated_as_interrupted
-
 from .mistakes import memory_told
 from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite
 from .paths import check_picture, named
@@ -116,7 +114,7 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     paths = {name: folder / f"{name}.nc" for name in campaigns}
     for name, campaign in campaigns.items():
         print(f"plate {name}", file=sys.stderr)
-        with memory_told(arguments.files[0]), terminated_as_interrupted(), show_standing() as progress:
+        with memory_told(arguments.files[0]), show_standing() as progress:
             run_to_file(
                 campaign,
                 paths[name],

@@ -20,6 +20,9 @@ def add_command(
     """
     parser = commands.add_parser(name, help=summary, description=description, epilog=f"example: warpimpact {example}")
     parser.set_defaults(command=command)
+    told = parser.add_mutually_exclusive_group()
+    told.add_argument("-v", "--verbose", action="count", default=0, help="tell what is done; -vv tells more")
+    told.add_argument("-q", "--quiet", action="store_true", help="show no progress")
     return parser
 
 
@@ -60,6 +63,14 @@ def add_device(parser: argparse.ArgumentParser) -> None:
         metavar="auto|cpu|cuda:0",
         help="where to compute (default: auto, which takes a GPU if there is one); a run takes several: cuda:0,cuda:1",
     )
+
+
+def add_computing(parser: argparse.ArgumentParser) -> None:
+    """Where to compute: a device, or the workers of a cluster."""
+    add_device(parser)
+    cluster = parser.add_mutually_exclusive_group()
+    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
+    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
 
 
 def at_least(least: int) -> Callable[[str], int]:

@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpimpact.results import attributes as attr
-from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
-from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite, at_least
+from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
 from .paths import check_place, check_suffix
 from .plain import say
-from .progress import show_standing, warn
+from .progress import show_standing, tell_tolerance, warn
 
 if TYPE_CHECKING:
     import xarray
@@ -28,10 +27,7 @@ def add_run(commands: Commands) -> None:
     )
     add_campaign(parser)
     add_output(parser, "RESULT.nc", "result file (default: the campaign's name, in this folder)")
-    add_device(parser)
-    cluster = parser.add_mutually_exclusive_group()
-    cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
-    cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
+    add_computing(parser)
     add_count(parser)
     parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; start a new one if there is none"
@@ -50,10 +46,11 @@ def _run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
     check_suffix(output, "a result", ".nc")
+    tell_tolerance(campaign.numerics)
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
-    with memory_told(arguments.campaign), terminated_as_interrupted(), show_standing() as progress:
+    with memory_told(arguments.campaign), show_standing() as progress:
         run_to_file(
             campaign,
             output,

@@ -40,7 +40,7 @@ FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail tha
 WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2
 GREY = "0.62"  # for hits without a value
 # Colours of Okabe and Ito: they differ in every kind of colour blindness.
-STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00")
+STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00", "#0072B2")
 
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW}
 _BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them, too, but in front of the plate

@@ -8,11 +8,11 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
     draw_holes,
     draw_values,
-    hit_points,
     limits,
     nearest_hits,
     paint_pixels,

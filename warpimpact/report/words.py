@@ -168,7 +168,7 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
-    means = means_of(v.shown_by("report"), dataset[v.STANDOFF].values.tolist())
+    means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""

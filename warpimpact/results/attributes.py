@@ -77,6 +77,16 @@ ESTIMATE_INTERVAL = "estimate_interval"
 ESTIMATE_UNITS = "estimate_units"
 CONFIDENCE = "confidence"
 
+# A search of limits
+LIMIT = "limit"
+"""The quantity: "velocity" or "thickness"."""
+LIMIT_TOLERANCE = "limit_tolerance"
+LIMIT_HIGHEST = "limit_highest"
+LIMIT_RESOLUTION = "limit_resolution"
+LIMIT_PROMISE_KEPT = "limit_promise_kept"
+LIMIT_ERROR_P90 = "limit_error_p90"
+LIMIT_ERROR_SHOWN = "limit_error"
+
 # A replayed hit
 HIT = "hit"
 AGREEMENT = "agreement"

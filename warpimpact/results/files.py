@@ -28,25 +28,30 @@ class ResultError(ValueError):
     """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
-def write(dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None) -> None:
+def write(
+    dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None, compressed: bool = True
+) -> None:
     """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
 
     Args:
         named: gives the name of what was written, by its contents, in place of `path`.
+        compressed: smaller, at the cost of some time.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
     with uninterrupted(), aside(path, named=named) as file:
-        _write(dataset, file)
+        _write(dataset, file, compressed=compressed)
 
 
-def _write(dataset: xarray.Dataset, file: Path, *, chunk: int | None = None, **options: Any) -> None:
+def _write(
+    dataset: xarray.Dataset, file: Path, *, chunk: int | None = None, compressed: bool = True, **options: Any
+) -> None:
     """Write a Dataset, with the coordinates that have a group of their own in it."""
     groups = {group: [name for name in names if name in dataset.coords] for group, names in v.GROUPS.items()}
     hits = dataset.drop_vars([name for names in groups.values() for name in names])
     options = {"format": "NETCDF4", "engine": "netcdf4"} | options
-    hits.to_netcdf(file, encoding=_encoding(hits, chunk=chunk), **options)
+    hits.to_netcdf(file, encoding=_encoding(hits, chunk=chunk, compressed=compressed), **options)
     for group, names in groups.items():
         if names:
             inner = dataset[names].reset_coords(names).drop_attrs(deep=False)
@@ -97,12 +102,14 @@ def _append(joined: Any, part: Path, at: int) -> int:
     return end
 
 
-def _encoding(dataset: xarray.Dataset, *, chunk: int | None = None) -> dict[str, dict[str, Any]]:
+def _encoding(
+    dataset: xarray.Dataset, *, chunk: int | None = None, compressed: bool = True
+) -> dict[str, dict[str, Any]]:
     """How variables are stored: compressed, and with `chunk` hits per chunk if that is given."""
     encoding: dict[str, dict[str, Any]] = {
         str(name): {"zlib": True, "complevel": 1}
         for name, array in dataset.variables.items()
-        if array.dtype.kind in "if"  # netCDF compresses no strings
+        if compressed and array.dtype.kind in "if"  # netCDF compresses no strings
     }
     for name in dataset.coords:
         encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
@@ -161,6 +168,23 @@ def read(path: Path) -> xarray.Dataset:
     return dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
 
 
+def open_result(path: str | Path) -> xarray.Dataset:
+    """Open a result file. Only what is used of it is read; ``with open_result(path) as result:`` closes it.
+
+    Args:
+        path: a file of ``warpimpact run``, of `run_to_file`, or of ``to_netcdf`` of a result.
+
+    Returns:
+        The Dataset of `run`, one entry per hit.
+
+    Raises:
+        ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
+    """
+    with opened(Path(path)):
+        pass  # it is a sound result
+    return _opened(Path(path))
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[xarray.Dataset]:
     """A result file of which only what is used is read.
@@ -195,7 +219,8 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 "one, keep its attributes"
             )
         if not is_history(dataset):
-            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES))
+            optional = (*v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES, *v.LAYER_VARIABLES, *v.LAYER_FACES)
+            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
 
 

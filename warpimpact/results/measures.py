@@ -50,14 +50,15 @@ class Measure:
 
     Attributes:
         text: as the user wrote it.
-        kind: "mean", "quantile", "probability" (of a variable beyond a limit) or "share" (of a status).
+        kind: "mean", "quantile", "probability" (of a variable beyond a limit) or "share" (of a status, or of broken
+            cores).
         variable: of the Dataset, or the status of a share.
         standoff: distance behind the rear face [m], if the variable depends on it.
         share: share of the values below a quantile.
         above, limit: side and limit of a probability, in the units of the Dataset.
 
-    A share counts all shots except those whose computation failed. The other kinds count the cores that passed the
-    plate.
+    A share, and what is asked of limits, counts all shots except those whose computation failed. The other kinds count
+    the cores that passed the plate.
     """
 
     text: str
@@ -85,7 +86,7 @@ class Measure:
 
     @classmethod
     def _from(cls, text: str, kind: str, parts: dict[str, str]) -> Self:
-        name, allowed = parts["variable"], tuple(STATUSES) if kind == "share" else MEASURED
+        name, allowed = parts["variable"], (*STATUSES, str(v.BROKEN)) if kind == "share" else MEASURED
         if name not in allowed:
             raise ValueError(f'got "{name}", but it must be one of {", ".join(allowed)}')
         if kind == "share":
@@ -127,12 +128,17 @@ class Measure:
 
     def values(self, dataset: xarray.Dataset) -> Array:
         """The number of every shot, shape [hits]; NaN for a shot that does not count."""
+        if self.kind == "share" and self.variable == v.BROKEN:
+            return np.asarray(dataset[v.BROKEN].values, dtype=np.float64)  # NaN of a failed shot
         if self.kind == "share":
             return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
         column = dataset[self.variable]
         if self.standoff is not None:
             column = column.sel(standoff=self.standoff, method="nearest")
-        values = np.where(passed(dataset), column.values.astype(np.float64), np.nan)
+        counts = ~failed(dataset) if self.variable in v.LIMIT_VARIABLES else passed(dataset)
+        values = np.where(counts, column.values.astype(np.float64), np.nan)
+        if self.kind == "mean":
+            return np.where(np.isinf(values), np.nan, values)  # a limit beyond the largest value tried
         if self.kind != "probability":
             return values
         beyond = values > self.limit if self.above else values < self.limit

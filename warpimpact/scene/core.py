@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from .files import input_file, read_table
 from .model import Array, Model
-from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass
+from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass, PositiveStress
 
 # Gauss–Legendre on 32 nodes is exact to degree 63: r⁴ of any polynomial core up to degree 15.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
@@ -38,8 +38,13 @@ class MassProperties(NamedTuple):
 class Core(Model, ABC):
     """A rigid, homogeneous body of revolution, closed by discs at nose and base.
 
-    Exactly one of `mass` [kg] and `density` [kg/m³] is given. `centre_of_mass` (from the nose tip [m]),
-    `inertia_axial` and `inertia_transverse` [kg m²] follow from the shape; each can be overridden.
+    Attributes:
+        mass: of the core [kg]; exactly one of mass and density is given.
+        density: of its material [kg/m³].
+        centre_of_mass: distance behind the nose tip [m]; it follows from the shape unless it is given.
+        inertia_axial, inertia_transverse: moments of inertia [kg m²] about the axis, and about a line across it through
+            the centre of mass; likewise.
+        strength: nominal bending stress above which the core counts as broken [Pa]; None is a core that never breaks.
     """
 
     mass: PositiveMass | None = None
@@ -47,6 +52,7 @@ class Core(Model, ABC):
     centre_of_mass: Length | None = None
     inertia_axial: PositiveInertia | None = None
     inertia_transverse: PositiveInertia | None = None
+    strength: PositiveStress | None = None
 
     if TYPE_CHECKING:  # a field of the drawn cores, a property of the tabulated one
 
@@ -88,8 +94,7 @@ class Core(Model, ABC):
     def mass_properties(self) -> MassProperties:
         """Integrals over the solid of revolution, with the overrides in place.
 
-        The transverse moment is that of the homogeneous body about its own centroid, also where
-        `centre_of_mass` is overridden.
+        The transverse moment is that about the centroid, also where `centre_of_mass` is overridden.
         """
         s, weight = self._quadrature()
         area = np.pi * self.radius(s) ** 2 * weight
@@ -148,7 +153,13 @@ class Core(Model, ABC):
 
 
 class PolynomialCore(Core):
-    """r(s) = Σ coefficients[i] sⁱ, in metres: the paper's core is [3.0e-4, 0.24, -5.29]."""
+    """r(s) = Σ coefficients[i] sⁱ, in metres: the paper's core is [3.0e-4, 0.24, -5.29].
+
+    Attributes:
+        shape: "polynomial".
+        coefficients: of r(s), the constant first, in metres.
+        length: from nose to base [m].
+    """
 
     shape: Literal["polynomial"] = "polynomial"
     coefficients: tuple[Number, ...] = Field(min_length=1, max_length=16)
@@ -172,7 +183,7 @@ class PolynomialCore(Core):
 
     def radius(self, s: Array) -> Array:
         """Radius [m] at stations `s` [m] within [0, length]; same shape."""
-        return np.maximum(self._polynomial(s), 0.0)
+        return np.asarray(np.maximum(self._polynomial(s), 0.0))
 
     @property
     def _polynomial(self) -> Polynomial:
@@ -185,7 +196,12 @@ class PolynomialCore(Core):
 
 
 class _NosedCore(Core):
-    """A nose up to its shoulder, then a cylindrical shank of `diameter` up to `length`."""
+    """A nose up to its shoulder, then a cylindrical shank of `diameter` up to `length`.
+
+    Attributes:
+        diameter: of the shank [m].
+        length: from nose tip to base [m].
+    """
 
     diameter: PositiveLength
     length: PositiveLength
@@ -216,7 +232,12 @@ class _NosedCore(Core):
 
 
 class OgiveCore(_NosedCore):
-    """Tangent ogive nose of `crh` calibres radius, then a cylindrical shank of `diameter` up to `length`."""
+    """Tangent ogive nose of `crh` calibres radius, then a cylindrical shank of `diameter` up to `length`.
+
+    Attributes:
+        shape: "ogive".
+        crh: radius of the ogive in diameters of the core, "calibre radius head".
+    """
 
     shape: Literal["ogive"] = "ogive"
     crh: Annotated[Number, Field(ge=0.5)]
@@ -235,7 +256,12 @@ class OgiveCore(_NosedCore):
 
 
 class ConeCore(_NosedCore):
-    """Sharp cone of `cone_length` (by default all of `length`), then a cylindrical shank of `diameter`."""
+    """Sharp cone of `cone_length` (by default all of `length`), then a cylindrical shank of `diameter`.
+
+    Attributes:
+        shape: "cone".
+        cone_length: from tip to shoulder [m]; by default all of `length`.
+    """
 
     shape: Literal["cone"] = "cone"
     cone_length: PositiveLength | None = None
@@ -254,6 +280,12 @@ class ProfileCore(Core):
     """Straight lines between tabulated stations `s` and radii `r` [m], from s = 0 at the nose to the base.
 
     Both may come from `file`, a CSV file with the header s,r in metres.
+
+    Attributes:
+        shape: "profile".
+        s: stations from the nose tip, which is 0, to the base, increasing [m].
+        r: radii there [m]; 0 at an end only.
+        file: CSV file with the header s,r in metres, instead of s and r.
     """
 
     shape: Literal["profile"] = "profile"

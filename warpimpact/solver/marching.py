@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from functools import partial
 from queue import SimpleQueue
 from typing import Any, TypeVar
@@ -18,8 +19,10 @@ from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
+from warpimpact.solver.bending import bending_columns
 from warpimpact.solver.device import cores, free_memory, load
 from warpimpact.solver.inputs import Inputs
+from warpimpact.solver.layering import Passages, deep_cells
 from warpimpact.solver.resolution import Fidelity
 
 Array = NDArray[np.float64]
@@ -27,8 +30,10 @@ Progress = Callable[[int, int], None]
 Progress1 = Callable[[int], None]
 Scratch = TypeVar("Scratch")
 
-CPU_CHUNK = 32
-"""Most shots per launch on the CPU: few enough for a smooth progress bar and an even load of the threads."""
+CPU_CHUNK = 64
+"""Most shots per launch on the CPU: few enough for an even load of the threads."""
+CPU_LAUNCH = 0.25
+"""Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
 CUDA_CHUNK = 65536
 WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
 """Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
@@ -63,6 +68,7 @@ class March:
         self.variant, self.stage = self.arrays.variant, self.inputs.stage
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
+        self.passages = Passages(self.stage, len(shots), len(self.inputs.plates), self.variant, device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -86,16 +92,21 @@ class March:
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
-        """Share of the resistance that is left after some steps of the first shot on the CPU, in the window of its
-        march."""
+        """Share of the plate's resistance that is left after some steps of the first shot on the CPU, in the window of
+        its march."""
         scratch = self._scratch(1, *self.cells)
+        for name in self._fields():  # the window of a layer that is not reached stays closed
+            getattr(scratch[0], name).zero_()
         self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
         first = self.inputs.put(np.zeros(1), wp.int32)
         self._launch(first, self._empty(self.stage.Outcomes, (1,)), scratch, 1, 0, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
-        exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
-        return self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure)
+        exposure = np.zeros(math.prod(self.cells))
+        if self.variant.degrades and self.arrays.materials[0].weakens:
+            exposure = _host(scratch[0].exposure)[: exposure.size]
+        decayed = np.exp(self.arrays.shots["decay_rate"][0] * exposure.reshape(self.cells))
+        return np.asarray(self._material() * decayed)
 
     def body(self) -> MassProperties:
         """Mass properties of the first shot."""
@@ -134,20 +145,14 @@ class March:
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
         status = contact.status.numpy().astype(np.int8)
         values |= _exits(contact, status)
-        return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
+        bent = self._bending(status) if self.variant.bends else {}
+        return {"status": status} | values | bent | self.passages.columns()
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
-        """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is
-        0."""
-        found = self.bending.numpy()
-        columns = {
-            "largest_bending_moment": found["moment"],
-            "bending_section": np.where(found["moment"] > 0.0, found["moment_station"], np.nan),
-            "bending_stress": found["stress"],
-            "bending_stress_section": np.where(found["stress"] > 0.0, found["stress_station"], np.nan),
-        }
-        failed = status >= Status.UNFINISHED
-        return {name: np.where(failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
+        """What is known of the bending of every shot."""
+        breaks = self.scene.core.strength is not None or self.shots.strength is not None
+        known = self.variant.bends
+        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks) if known else {}
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""
@@ -174,11 +179,21 @@ class March:
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
 
+    def _windows(self, cells_y: int, cells_z: int) -> list[tuple[int, int]]:
+        """Cells of the windows of all layers, if the plate's has this many."""
+        return [(cells_y, cells_z)] + [
+            deep_cells(self.arrays, layer, cells_y) for layer in range(1, len(self.inputs.plates))
+        ]
+
+    def _nodes(self, cells_y: int, cells_z: int) -> int:
+        """Nodes of a slot in all its windows."""
+        return sum(y * z for y, z in self._windows(cells_y, cells_z))
+
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        per_ring = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        rings = self.inputs.surface.rings * per_ring
-        return len(self._fields()) * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
+        per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        rings: int = self.inputs.surface.rings * per_ring
+        return len(self._fields()) * self._nodes(cells_y, cells_z) * size + self._patches() * (6 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
@@ -186,7 +201,7 @@ class March:
 
     @property
     def _keeps_fields(self) -> bool:
-        return self.variant.nodal or self.variant.degrades
+        return bool(self.variant.nodal or self.variant.degrades)
 
     def _patches(self) -> int:
         """Patches of a slot's touches."""
@@ -197,18 +212,18 @@ class March:
         free = free_memory() if self.device.is_cpu else self.device.free_memory
         wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
-        return min(wanted, affordable, (2**31 - 1) // (cells_y * cells_z))
+        return min(wanted, affordable, (2**31 - 1) // self._nodes(cells_y, cells_z))
 
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
 
-    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, Any]:
-        """Fields and touches of some slots."""
+    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, ...]:
+        """Fields, touches and layers of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         scratch, touches = self.stage.Fields(), self.stage.Touches()
         scratch.cells_y, scratch.cells_z = cells_y, cells_z
         for name in self._fields():
-            setattr(scratch, name, empty(slots * cells_y * cells_z))
+            setattr(scratch, name, empty(slots * self._nodes(cells_y, cells_z)))
         patches = slots * self._patches()
         for name in ("area", "slope", "shift", "gain", "y", "z"):
             setattr(touches, name, empty(patches))
@@ -218,13 +233,14 @@ class March:
         touches.ring_area = empty(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
-        return scratch, touches
+            touches.total_area = empty(rings)
+        return scratch, touches, self.passages.stack(slots)
 
     def _launch(
         self,
         order: Any,
         outcomes: Any,
-        scratch: tuple[Any, Any],
+        scratch: tuple[Any, ...],
         slots: int,
         first: int,
         count: int,
@@ -244,9 +260,10 @@ class March:
                 inputs.law,
                 inputs.shots,
                 inputs.pace,
+                inputs.target,
                 *scratch,
             ],
-            outputs=[outcomes, self.bending, self.history],
+            outputs=[outcomes, self.passages.filled, self.bending, self.history],
             device=self.device,
         )
         return count
@@ -254,6 +271,8 @@ class March:
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
         load(self.stage.kernel, self.device)
+        if self.variant.layered:
+            self.inputs.place_windows(self._windows(*self.cells))
         launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
         if self.device.is_cpu:
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)
@@ -276,18 +295,31 @@ class March:
         for scratch in slots:
             idle.put(scratch)
 
-        def work(chunk: tuple[int, int]) -> int:
-            scratch = idle.get()
+        def work(first: int, count: int) -> tuple[int, float]:
+            scratch, begin = idle.get(), time.perf_counter()
             try:
-                return launch(scratch, 1, *chunk)
+                return launch(scratch, 1, first, count), time.perf_counter() - begin
             finally:
                 idle.put(scratch)
 
-        done = 0
+        # The first launches are of one shot each: some scenes take seconds per shot.
+        most, count, begun, done = max(1, min(CPU_CHUNK, total // (4 * len(slots)))), 1, 0, 0
+        waiting: set[Future[tuple[int, float]]] = set()
         with ThreadPoolExecutor(len(slots)) as pool:
-            for count in pool.map(work, _chunks(total, max(1, min(CPU_CHUNK, total // (4 * len(slots)))))):
-                done += count
-                progress(done)
+            try:
+                while done < total:
+                    while begun < total and len(waiting) < 2 * len(slots):
+                        count = min(count, total - begun)
+                        waiting.add(pool.submit(work, begun, count))
+                        begun += count
+                    ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                    for shots, seconds in (future.result() for future in ended):
+                        done += shots
+                        count = min(most, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
+                    progress(done)
+            finally:
+                for future in waiting:
+                    future.cancel()
 
 
 def _exits(contact: Any, status: NDArray[np.int8]) -> dict[str, Array]:

@@ -7,6 +7,7 @@ one: a high order statistic of the pilot's shots, times a margin for the error o
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -15,9 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Numerics, Scene, Shots, Tolerance
+from warpimpact.solver.marching import Progress
 from warpimpact.solver.refinement import Change
 from warpimpact.solver.resolution import LADDER, Fidelity, level
 from warpimpact.solver.simulate import Outcomes, simulate
+
+_logger = logging.getLogger(__name__)
 
 PILOT = 32
 """Shots of a pilot."""
@@ -60,13 +64,23 @@ class Promise:
     residual_velocity_error: float
     tilt_error: float
 
+    @property
+    def phrase(self) -> str:
+        """The errors, for a line of progress."""
+        errors = f"{self.residual_velocity_error:.2g} m/s and {math.degrees(self.tilt_error):.2g} deg"
+        return f"accuracy {errors} for 90 % of the hits{'' if self.kept else ', not as promised'}"
 
-def keep(scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto") -> Promise:
+
+def keep(
+    scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto", progress: Progress | None = None
+) -> Promise:
     """Find the coarsest level of resolution that keeps the promise of a named fidelity.
 
     Args:
         numerics: its fidelity and precision count; single settings would promise nothing (`Numerics.explicit`).
         pilot: shots like those that are to be computed, some PILOT of them.
+        device: as in `simulate`.
+        progress: called with (0, shots) while a level is computed; an exception that it raises ends the search.
 
     Returns:
         The promise, kept; or if no level keeps it, the finest level that has a finer one to compare with.
@@ -76,18 +90,23 @@ def keep(scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto"
     """
     tolerance, first = PROMISES[numerics.fidelity]
     known: dict[int, Outcomes] = {}
+    follow = progress and (lambda _, total: progress(0, total))
     found = Promise(level(first, numerics), False, math.inf, math.inf)
     for index in range(first, len(LADDER) - 1):
         finer = min(index + 2, len(LADDER) - 1)
         try:
             for needed in (index, finer):
                 if needed not in known:
-                    known[needed] = simulate(scene, pilot, numerics=level(needed, numerics), device=device)
+                    known[needed] = simulate(
+                        scene, pilot, numerics=level(needed, numerics), device=device, progress=follow
+                    )
         except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
             break
         errors = MARGIN[finer - index] * _errors(known[index], known[finer])
         kept = errors[0] <= tolerance.residual_velocity and errors[1] <= tolerance.tilt
         found = Promise(level(index, numerics), bool(kept), float(errors[0]), float(errors[1]))
+        told = (index, float(errors[0]), math.degrees(errors[1]), "kept" if kept else "not kept")
+        _logger.info("pilot at level %d: errors of %.2g m/s and %.2g deg, the promise is %s", *told)
         if kept:
             break
     return found

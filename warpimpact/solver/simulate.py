@@ -72,6 +72,56 @@ class BentOutcomes(Outcomes):
 
 
 @dataclass(frozen=True)
+class BrokenOutcomes(BentOutcomes):
+    """Outcomes of cores that have a strength; arrays of shape [shots]. A broken core goes on as one rigid body.
+
+    Attributes:
+        broken: 1 where the nominal bending stress passed the strength, else 0.
+        broken_time: when it first did, since the first touch of the front face [s]; the middle of a step.
+        broken_x: where its most stressed section was then, behind the front face [m].
+        broken_section: distance of this section behind the nose tip [m].
+    """
+
+    broken: Array
+    broken_time: Array
+    broken_x: Array
+    broken_section: Array
+
+
+@dataclass(frozen=True)
+class LayeredOutcomes(Outcomes):
+    """Outcomes with how each core left each layer; layer 0 is the plate. The others are those of the whole target.
+
+    A core leaves a layer at the instant when its last point passes the rear face. NaN where it does not.
+
+    Attributes:
+        layer_status: codes of `LayerStatus`, shape [shots, layers].
+        layer_residual_velocity: speed at that instant [m/s], shape [shots, layers].
+        layer_tilt: angle between core axis and line of fire at that instant [rad], shape [shots, layers].
+        layer_time: that instant, from the first touch of the front face on [s], shape [shots, layers].
+        stopped_in: the deepest layer that the core rests in, −1 for a core that does not rest in one, shape [shots].
+        depth: how far behind the front face of this layer any point of the core came [m], shape [shots]; else NaN.
+    """
+
+    layer_status: NDArray[np.int8]
+    layer_residual_velocity: Array
+    layer_tilt: Array
+    layer_time: Array
+    stopped_in: NDArray[np.int8]
+    depth: Array
+
+
+@dataclass(frozen=True)
+class LayeredBentOutcomes(BentOutcomes, LayeredOutcomes):
+    """Outcomes with both."""
+
+
+@dataclass(frozen=True)
+class LayeredBrokenOutcomes(BrokenOutcomes, LayeredOutcomes):
+    """Outcomes with both, of cores that have a strength."""
+
+
+@dataclass(frozen=True)
 class Replay:
     """One shot with its full history: SI, float64.
 
@@ -79,8 +129,8 @@ class Replay:
         outcomes: how it ended, each of shape [1] or [1, …].
         history: the core at every step, and at the end.
         plate_time: instants at which the plate is shown [s], shape [snapshots]; 0 is the first touch.
-        resistance_share: resistance left, as a share of Y, in the cells that the core may reach: 0 in holes,
-            shape [snapshots, cells_y, cells_z].
+        resistance_share: resistance left, as a share of Y, in the cells of the plate that the core may reach: 0 in
+            holes, shape [snapshots, cells_y, cells_z].
         cell_y, cell_z: centres of those cells in the plate [m], shapes [cells_y] and [cells_z].
     """
 
@@ -110,7 +160,8 @@ def simulate(
         progress: called repeatedly with (shots done, all shots); an exception that it raises ends the computation.
 
     Returns:
-        The outcomes at the stand-offs that the scene records; `BentOutcomes` where it records the bending moment.
+        The outcomes at the stand-offs that the scene records; `BentOutcomes` where it records the bending moment,
+        `LayeredOutcomes` where the target has layers behind its plate, `LayeredBentOutcomes` where both.
 
     Raises:
         DeviceError: the device is absent.
@@ -130,7 +181,15 @@ def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
 
 def _outcomes(march: March, contact: Any) -> Outcomes:
     report = march.report(contact)
-    return BentOutcomes(**report) if march.variant.bends else Outcomes(**report)
+    kinds: dict[tuple[bool, bool, bool], type[Outcomes]] = {
+        (False, False, False): Outcomes,
+        (True, False, False): BentOutcomes,
+        (True, True, False): BrokenOutcomes,
+        (False, False, True): LayeredOutcomes,
+        (True, False, True): LayeredBentOutcomes,
+        (True, True, True): LayeredBrokenOutcomes,
+    }
+    return kinds[march.variant.bends, "broken" in report, march.variant.layered](**report)
 
 
 def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None) -> list[Array]:
@@ -156,7 +215,7 @@ def replay(scene: Scene, shot: Shots, *, numerics: Numerics | Fidelity | None = 
     return Replay(
         outcomes=_outcomes(march, contact),
         history=History.from_trace(trace, march.body()),
-        plate_time=steps * time_step,
+        plate_time=trace[steps, 0] - 0.5 * time_step if march.variant.layered else steps * time_step,
         resistance_share=np.stack([march.plate_after(count, time_step) for count in steps]),
         cell_y=cell_y,
         cell_z=cell_z,

@@ -1,0 +1,144 @@
+"""Cores that break: when, where, by how much strength, and what is told of them (docs/model.md §8)."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign, run
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.campaign.text import CampaignError
+from warpimpact.results.measures import Measure, Tally
+from warpimpact.scene import Record, Scatter, Scene, Shots, make_shots
+from warpimpact.solver.simulate import BrokenOutcomes, simulate
+
+from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at
+
+TEXT = """\
+title = "broken"
+core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g", strength = STRENGTH }
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[impact]
+velocity = "600 m/s"
+[hits]
+count = 256
+[numerics]
+fidelity = "draft"
+patches_axial = 14
+[output]
+bending = true
+"""
+WEIBULL = '{ distribution = "weibull", shape = 8, scale = "2 GPa" }'
+
+
+def outcomes(strength: float, shots: Shots, **scene: Any) -> BrokenOutcomes:
+    core = PAPER_CORE.model_copy(update={"strength": strength})
+    record = Record(standoffs=(0.05,), bending=True)
+    ended = simulate(Scene(core=core, target=paper_plate(), record=record, **scene), shots, device="cpu")
+    assert isinstance(ended, BrokenOutcomes)
+    return ended
+
+
+@pytest.fixture(scope="module")
+def hits() -> Shots:
+    return shots_at(*scattered_hits(48))
+
+
+def test_a_core_is_broken_where_its_stress_passes_its_strength(hits: Shots) -> None:
+    ended = outcomes(2.5e9, hits)
+    assert 0.1 < ended.broken.mean() < 0.9
+    assert np.array_equal(ended.broken == 1.0, ended.bending_stress > 2.5e9)
+    whole = ended.broken == 0.0
+    for place in (ended.broken_time, ended.broken_x, ended.broken_section):
+        assert np.array_equal(np.isnan(place), whole)
+    assert (ended.broken_section[~whole] > 0.0).all()
+    assert (ended.broken_section[~whole] < PAPER_CORE.length).all()
+    # The section lies in the core, whose nose has gone v t at most since it touched the front face.
+    assert (ended.broken_x[~whole] <= 825.0 * ended.broken_time[~whole] - 0.9 * ended.broken_section[~whole]).all()
+
+
+def test_a_stronger_core_breaks_later(hits: Shots) -> None:
+    weak, strong = outcomes(2.0e9, hits), outcomes(3.0e9, hits)
+    both = strong.broken == 1.0
+    assert both.any()
+    assert (weak.broken[both] == 1.0).all()
+    assert (weak.broken_time[both] <= strong.broken_time[both]).all()
+    assert (weak.broken_time[both] < strong.broken_time[both]).any()
+
+
+def test_a_strength_at_the_largest_stress_is_passed_when_that_is_reached(hits: Shots) -> None:
+    largest = outcomes(2.0e9, hits).bending_stress
+    own = dict(hits.columns)
+    just = outcomes(2.0e9, Shots(**own, strength=0.9999 * largest))
+    never = outcomes(2.0e9, Shots(**own, strength=1.0001 * largest))
+    assert (just.broken == 1.0).all()
+    assert just.broken_section == pytest.approx(just.bending_stress_section)
+    assert (never.broken == 0.0).all()
+
+
+def test_a_broken_core_goes_on_as_it_would_have(hits: Shots) -> None:
+    weak, strong = outcomes(1.0, hits), outcomes(1e12, hits)
+    for name in ("status", "residual_velocity", "tilt", "bending_stress"):
+        assert np.array_equal(getattr(weak, name), getattr(strong, name), equal_nan=True), name
+
+
+def campaign(strength: str) -> Campaign:
+    return Campaign.from_text(TEXT.replace("STRENGTH", strength), name="text", folder=Path())
+
+
+def test_strength_may_scatter_as_a_weibull_distribution() -> None:
+    given = campaign(WEIBULL)
+    strength = make_shots(given.impact, given.hits, given.plate, given.scatter).strength
+    assert strength is not None
+    # P(X < x) = 1 − exp(−(x/scale)^shape)
+    for x in (1.6e9, 2.0e9):
+        assert np.mean(strength < x) == pytest.approx(1.0 - np.exp(-((x / 2e9) ** 8)), abs=0.02)
+    # Its draws are its own: another scattering quantity does not move them.
+    both = Scatter.model_validate(
+        {"strength": given.scatter.strength, "yaw": {"distribution": "uniform", "low": -1, "high": 1}}
+    )
+    assert np.array_equal(make_shots(given.impact, given.hits, given.plate, both).strength, strength)
+
+
+def test_effectiveness_tells_of_broken_cores() -> None:
+    dataset = run(campaign(WEIBULL), device="cpu")
+    assert {"strength", "broken", "broken_time", "broken_x", "broken_section"} <= set(dataset.variables)
+    share = float(dataset["broken"].mean())
+    assert 0.0 < share < 1.0
+    measures = {measure.name: measure for measure in effectiveness(dataset)}
+    assert measures["broken_share"].value == pytest.approx(share)
+    stopped, either = measures["stopped_share"].value, measures["stopped_or_broken_share"].value
+    assert max(stopped, share) <= either <= stopped + share
+    tally = Tally(Measure.parse("P(broken)"))
+    tally.add(dataset)
+    assert tally.estimate().value == pytest.approx(share)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("bending = true", "bending = false"), "got core.strength without output.bending = true"),
+        (('"2 GPa"', '"2 mm"'), "which is not a stress"),
+        (("shape = 8", "shape = 0"), "greater than 0"),
+        (("strength = ", 'strength = "-1 GPa" # '), "greater than 0"),
+    ],
+)
+def test_bad_strengths_are_refused_in_a_sentence(change: tuple[str, str], sentence: str) -> None:
+    with pytest.raises(CampaignError, match=sentence):
+        Campaign.from_text(_tables().replace(*change), name="text", folder=Path())
+
+
+def _tables() -> str:
+    core = '[core]\nshape = "cone"\ndiameter = "6 mm"\nlength = "20 mm"\nmass = "4 g"\nstrength = '
+    return TEXT.replace(TEXT[TEXT.index("core = {") : TEXT.index("[plate]")], f"{core}{WEIBULL}\n")
+
+
+def test_stopping_on_broken_cores_needs_a_strength() -> None:
+    rule = '[stop]\nquantity = "P(broken)"\nhalf_width = 0.05\nmax_count = 256\n'
+    text = TEXT.replace(", strength = STRENGTH", "") + rule
+    with pytest.raises(CampaignError, match=r"needs core\.strength"):
+        Campaign.from_text(text, name="text", folder=Path())

@@ -1,0 +1,199 @@
+"""Limits of a campaign: the command, its file, its figure, resuming it, and what it refuses."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import Interrupted, Standing, run_to_file
+from warpimpact.campaign.team import local_team
+from warpimpact.campaign.text import CampaignError
+from warpimpact.cli import main
+from warpimpact.kernels.status import Status
+from warpimpact.optimisation.limit import LimitMap, limits_text, quantiles, told_of
+from warpimpact.plotting.limit import limit_figure
+from warpimpact.results import files
+from warpimpact.scene import make_shots
+from warpimpact.solver.limit import MOST_RUNS, limit_velocity
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+TEXT = """\
+title = "limits"
+core = { shape = "ogive", diameter = "6.17 mm", length = "27 mm", crh = 3.0, mass = "5.25 g" }
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+shear_coefficient = 0.05
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[impact]
+velocity = "500 m/s"
+[hits]
+count = 64
+[numerics]
+fidelity = "draft"
+"""
+GIVEN = '[numerics]\npatches_axial = 14\npatches_around = 16\ntime_step = "0.5 us"\n'
+
+
+def campaign(text: str = TEXT) -> Campaign:
+    return Campaign.from_text(text, name="text", folder=Path())
+
+
+def search(of: Campaign, path: Path, **how: object) -> xarray.Dataset:
+    job = LimitMap.of(of, str(how.pop("quantity", "velocity")))
+    run_to_file(of, path, team=local_team(of, "cpu", job), **how)
+    return files.read(path)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
+    return search(campaign(), tmp_path_factory.mktemp("limit") / "limit.nc")
+
+
+def test_the_dataset_is_that_of_shots_that_just_perforate(result: xarray.Dataset) -> None:
+    assert (result["limit_velocity_upper"] - result["limit_velocity_lower"] <= 1.0).all()
+    assert (result["limit_velocity"] >= result["limit_velocity_lower"]).all()
+    assert (result["limit_velocity"] <= result["limit_velocity_upper"]).all()
+    assert (result["impact_velocity"] == result["limit_velocity_upper"]).all()
+    assert (result["status"] == Status.PERFORATED).all()
+    assert (result["limit_converged"] == 1).all()
+    assert int(result["limit_runs"].max()) <= MOST_RUNS
+    assert result["limit_velocity"].attrs["units"] == "m s-1"
+
+
+def test_it_tells_its_error_against_a_finer_level(result: xarray.Dataset) -> None:
+    told = result.attrs
+    assert told["limit_promise_kept"] == 1
+    assert 0.0 < told["limit_error_p90"] < 0.02 * float(result["limit_velocity"].median())
+    # The error holds: a finer level, whose own error is smaller, gives limits within it.
+    scene, shots = campaign().scene, make_shots(campaign().impact, campaign().hits, campaign().plate)
+    fine = limit_velocity(scene, shots, device="cpu", tolerance=0.5)
+    change = np.abs(fine.value - result["limit_velocity"].values)
+    assert np.quantile(change, 0.9) <= told["limit_error_p90"]
+
+
+def test_v50_and_v05_are_quantiles_over_the_hits(result: xarray.Dataset) -> None:
+    found = quantiles(result)
+    value = result["limit_velocity"].values
+    assert np.mean(value <= found["V50"].value) == pytest.approx(0.5, abs=0.02)
+    assert np.mean(value <= found["V05"].value) == pytest.approx(0.05, abs=0.02)
+    assert found["V50"].low < found["V50"].value < found["V50"].high
+    assert "V50 = " in limits_text(result)
+
+
+def test_a_limit_beyond_reach_makes_a_quantile_infinite_and_no_mean(result: xarray.Dataset) -> None:
+    beyond = result.copy(deep=True)
+    beyond["limit_velocity"][:40] = np.inf
+    assert quantiles(beyond)["V50"].value == np.inf
+    assert np.isfinite(quantiles(beyond)["V05"].value)
+    assert "40 hits have no limit velocity up to 3000 m/s" in limits_text(beyond)
+    limit_figure(beyond)
+
+
+class StopsAfter:
+    def __init__(self, hits: int) -> None:
+        self.hits = hits
+
+    def __call__(self, standing: Standing) -> None:
+        if standing.saved >= self.hits:
+            raise KeyboardInterrupt
+
+
+def test_a_resumed_search_has_the_bits_of_a_straight_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpimpact.campaign.parts.FEWEST", 16)
+    text = TEXT.replace('[numerics]\nfidelity = "draft"\n', GIVEN)
+    straight = search(campaign(text), tmp_path / "straight.nc")
+    with pytest.raises(Interrupted, match=r"shards are saved in .*--resume"):
+        search(campaign(text), tmp_path / "broken.nc", progress=StopsAfter(32))
+    resumed = search(campaign(text), tmp_path / "broken.nc", resume=True)
+    for name in straight.variables:
+        assert np.array_equal(straight[name], resumed[name], equal_nan=straight[name].dtype.kind == "f"), name
+
+
+def test_another_quantity_is_not_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpimpact.campaign.parts.FEWEST", 16)
+    text = TEXT.replace('[numerics]\nfidelity = "draft"\n', GIVEN)
+    with pytest.raises(Interrupted):
+        search(campaign(text), tmp_path / "broken.nc", progress=StopsAfter(16))
+    with pytest.raises(OSError, match=r"limit was .*velocity.* and is .*thickness"):
+        search(campaign(text), tmp_path / "broken.nc", resume=True, quantity="thickness")
+
+
+def test_images_share_the_limit_of_their_hit(tmp_path: Path) -> None:
+    folded = campaign(TEXT.replace("count = 64", "count = 64\nirreducible = true"))
+    found = search(folded, tmp_path / "folded.nc")
+    groups = found["limit_velocity"].values.reshape(-1, len(folded.symmetries))
+    assert groups.shape[1] > 1
+    assert (groups == groups[:, :1]).all()
+
+
+def test_a_hit_can_be_replayed(result: xarray.Dataset) -> None:
+    assert replay(result, 5, folder=Path()).attrs["agreement"] == "bit-identical"
+
+
+def test_thickness_of_a_campaign(tmp_path: Path) -> None:
+    solid = TEXT.replace('pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }', "")
+    found = search(campaign(solid.replace("count = 64", "count = 4")), tmp_path / "thickness.nc", quantity="thickness")
+    assert (found["thickness"] == found["limit_thickness_lower"]).all()
+    assert (found["limit_thickness"] > 4e-3).all()
+    assert "mm" in limits_text(found)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("shear_coefficient", "degradation = 0.8\nshear_coefficient"), "give degradation_distance in its place"),
+        (("fidelity = \"draft\"", 'tolerance = { residual_velocity = "1 m/s" }'), "got numerics.tolerance"),
+        (
+            ("count = 64", 'count = 64\n[stop]\nquantity = "P(perforated)"\nhalf_width = 0.1\nmax_count = 64'),
+            r"leave out the table \[stop\]",
+        ),
+    ],
+)  # fmt: skip
+def test_what_has_no_limits_is_refused_in_a_sentence(change: tuple[str, str], sentence: str) -> None:
+    with pytest.raises(CampaignError, match=sentence):
+        LimitMap.of(campaign(TEXT.replace(*change)))
+
+
+def test_scatter_of_the_quantity_itself_is_told() -> None:
+    scattered = campaign(TEXT.replace('"500 m/s"', '{ distribution = "normal", mean = "500 m/s", std = "9 m/s" }'))
+    assert "the velocity scatters" in str(told_of(scattered, "velocity"))
+    assert told_of(scattered, "thickness") is None
+    assert told_of(campaign(), "velocity") is None
+
+
+def test_the_command_writes_a_result_and_a_figure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu"]) == 0
+    told = capsys.readouterr().out
+    assert "limit velocity" in told
+    assert "written to limit_velocity_limit.nc, figure in limit_velocity_limit.png" in told
+    assert (tmp_path / "limit_velocity_limit.png").stat().st_size > 10_000
+    found = files.read(tmp_path / "limit_velocity_limit.nc")
+    # Published for the bare core at 0, 15, 30, 45 deg: 514, 535, 597, 723 m/s; the resistance is fitted to the first.
+    assert found["limit_velocity"].values == pytest.approx([514.0, 535.0, 597.0, 723.0], rel=0.06)
+    assert found["limit_velocity"].values[0] == pytest.approx(514.0, abs=1.5)
+    assert main(["inspect", "limit_velocity_limit.nc"]) == 0
+    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), "--device", "cpu"]) == 2
+    assert "exists already; name another file or give --overwrite" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--tolerance", "0 m/s"], "must be greater than 0"),
+        (["--tolerance", "1 mm"], "which is not a speed"),
+        (["--quantity", "thickness", "--tolerance", "1 m/s"], "which is not a length"),
+    ],
+)
+def test_bad_tolerances(
+    arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = ["-o", str(tmp_path / "limit.nc"), *arguments]
+    assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), *out]) == 2
+    assert sentence in capsys.readouterr().err

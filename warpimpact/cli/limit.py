@@ -1,0 +1,99 @@
+"""The command limit: the impact velocity, or the thickness of plate, that every hit of a campaign just perforates."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from .mistakes import memory_told
+from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
+from .paths import check_picture, check_place
+from .progress import show_standing, warn
+from .run import failure_code
+
+
+def add_limit(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "limit",
+        _limit,
+        summary="find the limit velocity of every hit of a campaign, V50 and V05",
+        description="Find for every hit the impact velocity at which the core just perforates, with at most 14 runs of "
+        "a hit. Write one netCDF file and a figure: the map of the limits, and the share of the hits that perforate "
+        "against velocity, with V50 and V05. The plate must not weaken by time: give degradation_distance.",
+        example="limit campaigns/limit_velocity.toml -o limit.nc",
+    )
+    add_campaign(parser)
+    add_output(parser, "LIMIT.nc", "result file (default: the campaign's name and _limit.nc); the figure is LIMIT.png")
+    parser.add_argument(
+        "--quantity",
+        choices=("velocity", "thickness"),
+        default="velocity",
+        help="what to find: the impact velocity, or the thickness of the plate (default: velocity)",
+    )
+    parser.add_argument(
+        "--tolerance",
+        metavar="TOLERANCE",
+        help='how far the two ends of a limit may lie apart, such as "0.5 m/s" or "0.02 mm" (default: 1 m/s, 0.01 mm)',
+    )
+    add_computing(parser)
+    add_count(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="continue an interrupted search; start a new one if there is none"
+    )
+    add_overwrite(parser, "an existing result or an interrupted search")
+
+
+def _limit(arguments: argparse.Namespace) -> int:
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.campaign.run import run_to_file
+    from warpimpact.campaign.team import cluster_team, local_team
+    from warpimpact.optimisation.limit import LimitMap, limits_text, told_of
+    from warpimpact.plotting.limit import limit_figure
+    from warpimpact.results import files
+
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
+    output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
+    picture = output.with_suffix(".png")
+    check_place(output)
+    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
+    job = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments))
+    if told := told_of(campaign, arguments.quantity):
+        warn(told)
+    if arguments.scheduler or arguments.workers:
+        team = cluster_team(
+            campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device, job=job
+        )
+    else:
+        team = local_team(campaign, arguments.device, job)
+    with memory_told(arguments.campaign), show_standing() as progress:
+        run_to_file(
+            campaign,
+            output,
+            team=team,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=progress,
+            tell=warn,
+        )
+    dataset = files.read(output)
+    print(limits_text(dataset))
+    limit_figure(dataset).savefig(picture, dpi=150)
+    print(f"written to {output}, figure in {picture}")
+    return failure_code(dataset, output)
+
+
+def _tolerance(arguments: argparse.Namespace) -> float | None:
+    """The tolerance in SI; None where none is given."""
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
+
+    if arguments.tolerance is None:
+        return None
+    kind: Any = PositiveSpeed if arguments.quantity == "velocity" else PositiveLength
+    try:
+        tolerance = float(quantity(kind)(arguments.tolerance))
+    except ValueError as error:
+        raise CampaignError(f"--tolerance: {error}") from None
+    if not tolerance > 0.0:
+        raise CampaignError(f'--tolerance: got "{arguments.tolerance}", but it must be greater than 0')
+    return tolerance

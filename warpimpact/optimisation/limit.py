@@ -1,0 +1,241 @@
+"""The limits of a campaign: for every hit the impact velocity, or the thickness of plate, that it just perforates."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.compute import HitMap, described, pilot_of
+from warpimpact.campaign.text import CampaignError
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import failed, with_limits
+from warpimpact.results.measures import dealing
+from warpimpact.scene import Shots
+from warpimpact.solver.limit import (
+    HIGHEST_VELOCITY,
+    MOST_RUNS,
+    THICKEST,
+    THICKNESS_TOLERANCE,
+    VELOCITY_TOLERANCE,
+    Limits,
+    check_arrests,
+    limit_thickness,
+    limit_velocity,
+)
+from warpimpact.solver.limit_promise import PILOT, LimitPromise, keep_limits
+from warpimpact.solver.marching import Progress
+from warpimpact.solver.resolution import Fidelity
+from warpimpact.statistics.intervals import Estimate, estimate_of
+
+QUANTILES = {"V50": 0.5, "V05": 0.05}
+"""Names of the velocities at which half and a twentieth of the hits perforate."""
+_SEARCHES = {"velocity": limit_velocity, "thickness": limit_thickness}
+_UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
+
+
+@dataclass(frozen=True)
+class LimitMap(HitMap):
+    """What `warpimpact limit` computes of every hit.
+
+    Attributes:
+        quantity: "velocity" or "thickness".
+        tolerance: how far the ends of a limit may lie apart [m/s] or [m].
+        highest: largest value tried [m/s] or [m].
+    """
+
+    quantity: str
+    tolerance: float
+    highest: float
+    takes_solid = False
+
+    @classmethod
+    def of(cls, campaign: Campaign, quantity: str = "velocity", tolerance: float | None = None) -> LimitMap:
+        """The job for a campaign, with the usual tolerance where none is given.
+
+        Raises:
+            CampaignError: the campaign has no limits, or this search cannot find them.
+        """
+        if campaign.stop is not None:
+            raise CampaignError("got a stop rule, but limits are searched for every hit: leave out the table [stop]")
+        if campaign.numerics.tolerance is not None:
+            raise CampaignError(
+                "got numerics.tolerance, but limits take a fidelity; warpimpact limit has a --tolerance of its own"
+            )
+        try:
+            check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
+        except ValueError as error:
+            raise CampaignError(str(error)) from None
+        if quantity == "velocity":
+            return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+        return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * campaign.plate.thickness)
+
+    @property
+    def content(self) -> Mapping[str, str]:  # type: ignore[override]
+        """What decides the bits beside the campaign."""
+        return {"limit": f"{self.quantity} within {self.tolerance:g}, at most {self.highest:g}"}
+
+    @property
+    def measures(self) -> tuple[str, ...]:  # type: ignore[override]
+        """The running estimates: the mean limit."""
+        return (f"mean({v.LIMITS[self.quantity].value})",)
+
+    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> xarray.Dataset:
+        """Search the limits of some shots. The Dataset is that of the shots as they just perforate, with their limits.
+
+        Args:
+            shots: whole groups of images, as the campaign's sampler gives them.
+            how: promise, device, threads and progress as in `campaign.compute.compute`.
+        """
+        promise: LimitPromise | None = how["promise"]
+        device, images = how.get("device", "auto"), len(campaign.symmetries)
+        begin = time.perf_counter()
+        limits = self._search(
+            campaign,
+            shots[::images],
+            campaign.numerics if promise is None else promise.fidelity,
+            device=device,
+            threads=how.get("threads"),
+            progress=_of_images(how.get("progress"), images),
+        )
+        own = {self.quantity: np.repeat(limits.shots.columns[self.quantity], images)}
+        dataset = described(
+            campaign,
+            replace(shots, **own),
+            limits.outcomes,
+            numerics=campaign.numerics if promise is None else promise.fidelity,
+            device=device,
+            elapsed=time.perf_counter() - begin,
+            attributes={
+                attr.LIMIT: self.quantity,
+                attr.LIMIT_TOLERANCE: self.tolerance,
+                attr.LIMIT_HIGHEST: self.highest,
+            }
+            | ({} if promise is None else _promised(promise)),
+        )
+        begun, *_ = dataset.attrs[attr.HISTORY].split()
+        dataset.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {self.quantity}"
+        return with_limits(dataset, self.quantity, limits, images)
+
+    def promise_of(
+        self, campaign: Campaign, device: str = "auto", progress: Progress | None = None
+    ) -> LimitPromise | None:
+        """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
+        if campaign.numerics.explicit is not None:
+            return None
+        pilot = pilot_of(campaign, PILOT)
+        follow = progress and (lambda done, total: progress(0, len(pilot)))  # nothing new, but a place to stop
+
+        def search(fidelity: Fidelity) -> Limits:
+            return self._search(campaign, pilot, fidelity, device=device, progress=follow)
+
+        return keep_limits(search, campaign.numerics, squared=self.quantity == "thickness")
+
+    def promise_in(self, dataset: xarray.Dataset) -> LimitPromise | None:
+        """The promise with which a result was computed."""
+        told = dataset.attrs
+        if attr.LIMIT_RESOLUTION not in told:
+            return None
+        return LimitPromise(
+            fidelity=Fidelity(**json.loads(told[attr.LIMIT_RESOLUTION])),
+            kept=bool(told[attr.LIMIT_PROMISE_KEPT]),
+            error=float(told[attr.LIMIT_ERROR_P90]),
+            shown=told[attr.LIMIT_ERROR_SHOWN],
+        )
+
+    def _search(self, campaign: Campaign, shots: Shots, numerics: Any, **how: Any) -> Limits:
+        search = _SEARCHES[self.quantity]
+        return search(campaign.scene, shots, numerics=numerics, tolerance=self.tolerance, highest=self.highest, **how)
+
+
+def _of_images(progress: Progress | None, images: int) -> Progress | None:
+    return progress and (lambda done, total: progress(done * images, total * images))
+
+
+def _promised(promise: LimitPromise) -> dict[str, Any]:
+    """What is told of a promise."""
+    return {
+        attr.LIMIT_RESOLUTION: json.dumps(asdict(promise.fidelity)),
+        attr.LIMIT_PROMISE_KEPT: int(promise.kept),
+        attr.LIMIT_ERROR_P90: promise.error,
+        attr.LIMIT_ERROR_SHOWN: promise.shown,
+    }
+
+
+def told_of(campaign: Campaign, quantity: str) -> str | None:
+    """What a user should know of a campaign whose limits are asked for."""
+    if getattr(campaign.scatter, quantity) is None:
+        return None
+    return (
+        f"the {quantity} scatters in this campaign, but a limit {quantity} does not depend on that: the scatter only "
+        "says where the searches begin"
+    )
+
+
+def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
+    """V50 and V05 (of a thickness H50 and H05) with their 95 % intervals over the hits; infinite where so many hits
+    have a limit beyond the largest value tried."""
+    quantity, highest = dataset.attrs[attr.LIMIT], dataset.attrs[attr.LIMIT_HIGHEST]
+    value = dataset[v.LIMITS[quantity].value].values
+    counted = np.where(failed(dataset), np.nan, np.minimum(value, highest))
+    found = {}
+    for name, share in QUANTILES.items():
+        estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
+        ends = (estimate.value, estimate.low, estimate.high)
+        value_, low, high = (math.inf if end >= highest else end for end in ends)
+        found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
+    return found
+
+
+_MOST_LISTED = 12
+
+
+def limits_text(dataset: xarray.Dataset) -> str:
+    """What a search found, as a short table: V50 and V05, and every hit of a short list."""
+    told = dataset.attrs
+    quantity = told[attr.LIMIT]
+    unit, factor = _UNITS[quantity]
+    value, lower, upper, runs, converged = (dataset[name].values for name in v.LIMITS[quantity])
+    rows = []
+    if len(value) <= _MOST_LISTED:
+        rows.append(f"{'hit':>4} {'obliquity':>10} {f'limit {quantity}':>16}   between")
+        for hit, obliquity in enumerate(dataset[v.OBLIQUITY].values):
+            ends = f"{factor * lower[hit]:.5g} and {factor * upper[hit]:.5g} {unit}"
+            rows.append(f"{hit:>4} {obliquity:>9.4g}° {factor * value[hit]:>11.5g} {unit:<4}   {ends}")
+    else:
+        for name, estimate in quantiles(dataset).items():
+            ends = f"{factor * estimate.low:.5g} to {factor * estimate.high:.5g}"
+            what = "perforate" if quantity == "velocity" else "have a smaller limit"
+            share = f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"
+            rows.append(f"{name} = {factor * estimate.value:.5g} {unit}   95 % interval {ends}   ({share})")
+    beyond, missed = int(np.isposinf(value).sum()), int((value == 0.0).sum())
+    if beyond:
+        rows.append(f"{beyond} hits have no limit {quantity} up to {factor * told[attr.LIMIT_HIGHEST]:g} {unit}")
+    if missed:
+        rows.append(f"{missed} hits touch no material")
+    if open_ := int((converged == 0).sum()) - int(np.isnan(value).sum()):
+        rows.append(
+            f"{open_} hits were not found to {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
+        )
+    rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
+    rows.append(promise_line(dataset))
+    return "\n".join(rows)
+
+
+def promise_line(dataset: xarray.Dataset) -> str:
+    """How far off the limits are estimated to be."""
+    told = dataset.attrs
+    unit, factor = _UNITS[told[attr.LIMIT]]
+    ends = f"ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
+    if attr.LIMIT_ERROR_SHOWN not in told:
+        return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
+    kept = "" if told[attr.LIMIT_PROMISE_KEPT] else ", more than the fidelity promises"
+    return f"{ends}; against a finer level 90 % of the hits are within {told[attr.LIMIT_ERROR_SHOWN]}{kept}"

@@ -1,0 +1,104 @@
+"""Figure of limits: their map, and the share of the hits that perforate."""
+
+from __future__ import annotations
+
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray
+from matplotlib.figure import Figure
+
+from warpimpact.analysis.hit_map import hit_points
+from warpimpact.optimisation.limit import QUANTILES, promise_line, quantiles
+from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
+_UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
+_CURVE = {
+    "velocity": ("impact velocity", "share of the hits that perforate"),
+    "thickness": ("thickness of the plate", "share of the hits whose limit is thinner"),
+}
+_LONGER_SIDE = 4.2  # of the map on paper [inch]
+
+
+def limit_figure(dataset: xarray.Dataset) -> Figure:
+    """The map of the limits beside their cumulative distribution, with V50 and V05 and their 95 % intervals; of hits at
+    one place the limits against the obliquity.
+
+    Args:
+        dataset: the result of `warpimpact limit`.
+    """
+    quantity = dataset.attrs[attr.LIMIT]
+    if len(dataset[v.OBLIQUITY]) > 1 and not np.ptp(hit_points(dataset), axis=0).any():
+        return _over_obliquity(dataset, quantity)
+    column = shown(dataset, v.LIMITS[quantity].value)
+    values = np.where(np.isinf(column.values), np.nan, column.values)
+    extent = np.ptp(limits(dataset), axis=1)
+    width, height = _LONGER_SIDE * extent / extent.max()
+    figure = Figure(figsize=(width + 7.6, max(height + 2.2, 5.2)), layout="constrained")
+    at, curve = figure.subplots(1, 2, width_ratios=[width + 1.4, 5.2])
+    artist = draw_values(at, dataset, values, scale_of([values], signed=False))
+    figure.colorbar(artist, ax=at, label=column.label)
+    _draw_curve(curve, dataset, quantity)
+    _inscribe(figure, dataset)
+    return figure
+
+
+def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
+    note = fill(f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", 110)
+    figure.suptitle(f"{dataset.attrs[attr.TITLE]}\n{note}", fontsize=10)
+
+
+def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
+    """Limits of hits at one place, with the secant of the obliquity from the least oblique one on."""
+    unit, factor = _UNITS[quantity]
+    figure = Figure(figsize=(7.4, 5.2), layout="constrained")
+    axes = figure.subplots()
+    value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
+    axes.plot(obliquity, factor * value, "o", color=_BLUE, label=f"limit {quantity}")
+    first = int(np.argmin(obliquity))
+    if np.ptp(obliquity) > 0.0 and np.isfinite(value[first]):
+        angles = np.linspace(obliquity.min(), obliquity.max())
+        growth = np.cos(np.radians(obliquity[first])) / np.cos(np.radians(angles))
+        law = growth if quantity == "velocity" else 1.0 / growth
+        label = "as 1/cos(obliquity)" if quantity == "velocity" else "as cos(obliquity)"
+        axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=label)
+    axes.set(xlabel="obliquity [°]", ylabel=f"limit {quantity} [{unit}]")
+    axes.grid(color="0.9")
+    axes.set_axisbelow(True)
+    axes.legend(frameon=False)
+    _inscribe(figure, dataset)
+    return figure
+
+
+def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
+    """The share of the limits up to every value; those beyond the largest value tried keep it below 1."""
+    unit, factor = _UNITS[quantity]
+    found = dataset[v.LIMITS[quantity].value].values
+    found = np.sort(found[~np.isnan(found)])
+    share = np.arange(1, len(found) + 1) / len(found)
+    finite = np.isfinite(found)
+    if finite.any():
+        margin = 0.05 * max(np.ptp(found[finite]), 0.02 * found[finite].max())
+        ends = found[finite][0] - margin, found[finite][-1] + margin
+        steps = [ends[0], *found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
+        axes.step(factor * np.array(steps[0]), steps[1], where="post", color=_BLUE, linewidth=1.5)
+        axes.set_xlim(*(factor * np.array(ends)))
+    for name, estimate in quantiles(dataset).items():
+        level = QUANTILES[f"V{name[1:]}"]
+        if np.isfinite(estimate.value):
+            low, high = factor * np.array([estimate.low, estimate.high])
+            axes.plot([low, high], [level, level], color=_VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
+            axes.plot(factor * estimate.value, level, "o", color=_VERMILION, markersize=5)
+            text = f" {name} = {factor * estimate.value:.4g} {unit}"
+            axes.annotate(text, (factor * estimate.value, level), xytext=(8, -12), textcoords="offset points")
+    label, share_label = _CURVE[quantity]
+    axes.set(xlabel=f"{label} [{unit}]", ylabel=share_label, ylim=(0.0, 1.02))
+    axes.grid(color="0.9")
+    axes.set_axisbelow(True)
