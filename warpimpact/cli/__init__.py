@@ -15,6 +15,7 @@ from warpimpact import __version__
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
+from .identify import add_identify
 from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
 from .replay import add_replay
@@ -32,6 +33,7 @@ _COMMANDS = (
     add_report,
     add_study,
     add_validate,
+    add_identify,
 )
 """In the order of the help."""
 

@@ -257,7 +257,7 @@ class Scatter(Model):
             return value
         assert info.field_name is not None
         read = quantity(QUANTITIES[info.field_name].type)
-        return {name: part if name in _PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
+        return in_si(read, value)
 
     @field_validator("*", mode="after")
     @classmethod
@@ -284,6 +284,11 @@ class Scatter(Model):
     def given(self) -> dict[str, Distribution]:
         """The distributions that are given, by name."""
         return {name: value for name, value in self if value is not None}
+
+
+def in_si(read: Any, distribution: dict[str, Any]) -> dict[str, Any]:
+    """The table of a distribution with its parameters in SI, as the reader of its quantity takes them."""
+    return {name: part if name in _PURE_NUMBERS else _read(read, name, part) for name, part in distribution.items()}
 
 
 def _marked(value: Any, mark: Callable[[float], Any]) -> Any:
