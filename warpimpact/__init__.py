@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         TrianglePattern,
         make_shots,
     )
+    from .solver.limit import limit_thickness, limit_velocity
     from .solver.simulate import simulate
 
     __version__: str
@@ -66,6 +67,8 @@ __all__ = [
     "Target",
     "TrianglePattern",
     "__version__",
+    "limit_thickness",
+    "limit_velocity",
     "make_shots",
     "run",
     "simulate",
@@ -74,6 +77,8 @@ __all__ = [
 
 _HOMES = {
     "Campaign": ".campaign.campaign",
+    "limit_thickness": ".solver.limit",
+    "limit_velocity": ".solver.limit",
     "run": ".campaign.run",
     "simulate": ".solver.simulate",
     "to_dataframe": ".export.table",

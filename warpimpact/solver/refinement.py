@@ -87,15 +87,15 @@ def simulate_to_tolerance(
         level=np.zeros(len(shots), dtype=np.int8),
     )
     for index in LEVELS[1:]:
-        finer, last = on(index, pending), _picked(outcomes, pending)
-        change, since_before = Change.between(last, finer), Change.between(_picked(before, pending), finer)
+        finer, last = on(index, pending), picked(outcomes, pending)
+        change, since_before = Change.between(last, finer), Change.between(picked(before, pending), finer)
         near, far = change.in_tolerances(tolerance), since_before.in_tolerances(tolerance)
         three_agree = (near <= 1.0) & (far <= FAR) if index > LEVELS[1] else False
         estimates.residual_velocity_error[pending] = change.residual_velocity
         estimates.tilt_error[pending] = change.tilt
         estimates.converged[pending] = (near <= CLOSE) | three_agree
         estimates.level[pending] = index
-        before, outcomes = _with(before, pending, last), _with(outcomes, pending, finer)
+        before, outcomes = with_rows(before, pending, last), with_rows(outcomes, pending, finer)
         pending = np.flatnonzero(~estimates.converged)
         show(len(shots) - len(pending))
         if not len(pending):
@@ -131,12 +131,12 @@ def _apart(coarse: Array, fine: Array) -> Array:
     return np.where(np.isnan(change), np.inf, change)
 
 
-def _picked(outcomes: Outcomes, which: NDArray[np.int64]) -> Outcomes:
+def picked(outcomes: Outcomes, which: NDArray[np.int64]) -> Outcomes:
     """The rows of some shots."""
     return replace(outcomes, **{field.name: getattr(outcomes, field.name)[which] for field in fields(outcomes)})
 
 
-def _with(outcomes: Outcomes, which: NDArray[np.int64], other: Outcomes) -> Outcomes:
+def with_rows(outcomes: Outcomes, which: NDArray[np.int64], other: Outcomes) -> Outcomes:
     """Copies of the columns, with those of some shots from other outcomes."""
     columns = {field.name: getattr(outcomes, field.name).copy() for field in fields(outcomes)}
     for name, column in columns.items():

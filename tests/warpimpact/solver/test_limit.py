@@ -1,0 +1,105 @@
+"""The search for limits: its cost, its ends, shots with parameters of their own, and what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpimpact.scene import CirclePattern, OgiveCore, Plate, Scene, Shots
+from warpimpact.solver.limit import MOST_RUNS, limit_thickness, limit_velocity
+
+CORE = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
+PLATE = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05)
+
+
+def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
+    zero = np.zeros(count)
+    return Shots(zero, zero, zero + velocity, zero, zero, zero, zero, zero, **own)
+
+
+def test_parameters_of_a_shot_count() -> None:
+    own = {
+        "resistance": np.array([2.6e9, 2.6e9 / 4.0, 2.6e9]),
+        "thickness": np.array([4e-3, 4e-3, 1e-3]),
+        "shear_coefficient": np.full(3, 0.05),
+    }
+    value = limit_velocity(Scene(core=CORE, target=PLATE), shots(3, **own), tolerance=0.5, device="cpu").value
+    # ½ m v² ∝ Y h in a solid plate; the standard fidelity is within 2 % of that.
+    assert value / value[0] == pytest.approx([1.0, 0.5, 0.5], rel=0.02)
+
+
+@pytest.mark.parametrize("velocity", [10.0, 300.0, 3000.0])
+def test_at_most_fourteen_runs_from_any_start(velocity: float) -> None:
+    scene = Scene(core=CORE, target=PLATE)
+    limits = limit_velocity(scene, shots(2, velocity), device="cpu")
+    assert (limits.runs <= MOST_RUNS).all()
+    assert limits.converged.all()
+    assert limits.value == pytest.approx(limit_velocity(scene, shots(2), device="cpu").value, abs=1.0)
+
+
+def test_a_tolerance_beyond_reach_ends_after_fourteen_runs() -> None:
+    limits = limit_velocity(Scene(core=CORE, target=PLATE), shots(1), tolerance=1e-9, device="cpu")
+    assert limits.runs.tolist() == [MOST_RUNS]
+    assert not limits.converged.any()
+    assert limits.lower < limits.value < limits.upper
+
+
+def test_what_touches_nothing_has_no_limit_to_search() -> None:
+    holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))})
+    scene = Scene(core=CORE, target=holes)
+    velocity, thickness = (search(scene, shots(1), device="cpu") for search in (limit_velocity, limit_thickness))
+    assert (velocity.value.item(), velocity.lower.item(), velocity.upper.item()) == (0.0, 0.0, 0.0)
+    assert thickness.value.item() == thickness.lower.item() == np.inf
+    for limits in (velocity, thickness):
+        assert limits.runs.item() == 1
+        assert limits.converged.item()
+
+
+def test_a_limit_beyond_the_largest_value_tried_is_infinite() -> None:
+    strong = PLATE.model_copy(update={"thickness": 0.2})
+    velocity = limit_velocity(Scene(core=CORE, target=strong), shots(1), highest=1000.0, device="cpu")
+    assert (velocity.value.item(), velocity.lower.item(), velocity.upper.item()) == (np.inf, 1000.0, np.inf)
+    thickness = limit_thickness(Scene(core=CORE, target=PLATE), shots(1), highest=5e-3, device="cpu")
+    assert (thickness.value.item(), thickness.lower.item(), thickness.upper.item()) == (np.inf, 5e-3, np.inf)
+    assert velocity.converged.item()
+    assert thickness.converged.item()
+
+
+def test_a_plate_without_resistance_is_passed_at_any_velocity() -> None:
+    weak = PLATE.model_copy(update={"resistance": 0.0})
+    limits = limit_velocity(Scene(core=CORE, target=weak), shots(1), device="cpu")
+    assert limits.value.item() < 1.0
+    assert limits.converged.item()
+
+
+def test_a_shot_does_not_depend_on_its_neighbours() -> None:
+    plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
+    scene, rng = Scene(core=CORE, target=plate), np.random.default_rng(1)
+    many = replace(shots(40), hit_y=rng.uniform(-4e-3, 4e-3, 40), hit_z=rng.uniform(-4e-3, 4e-3, 40))
+    together = limit_velocity(scene, many, device="cpu", threads=2)
+    alone = limit_velocity(scene, many[np.arange(30, 40)], device="cpu", threads=1)
+    assert np.array_equal(together.value[30:], alone.value)
+    assert np.array_equal(together.outcomes.tilt[30:], alone.outcomes.tilt, equal_nan=True)
+    assert np.array_equal(together.shots.velocity[30:], alone.shots.velocity)
+
+
+@pytest.mark.parametrize("search", [limit_velocity, limit_thickness])
+def test_a_plate_that_weakens_by_time_is_refused(search: object) -> None:
+    weakening = PLATE.model_copy(update={"degradation": 0.8})
+    with pytest.raises(ValueError, match=r"stops no core.*give degradation_distance in its place"):
+        search(Scene(core=CORE, target=weakening), shots(1))
+    with pytest.raises(ValueError, match="degradation_distance"):
+        search(Scene(core=CORE, target=PLATE), shots(2, degradation=np.array([1.0, 0.9])))
+
+
+def test_progress_counts_the_searches_that_have_ended_and_may_end_the_computation() -> None:
+    told: list[tuple[int, int]] = []
+    limit_velocity(Scene(core=CORE, target=PLATE), shots(3), device="cpu", progress=lambda *done: told.append(done))
+    assert told[-1] == (3, 3)
+    assert told == sorted(told)
+
+    def end(done: int, total: int) -> None:
+        raise InterruptedError
+
+    with pytest.raises(InterruptedError):
+        limit_velocity(Scene(core=CORE, target=PLATE), shots(3), device="cpu", progress=end)
