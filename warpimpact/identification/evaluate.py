@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.hits import Aim, Place, aim
 from warpimpact.identification.likelihood import Data, Score, score
+from warpimpact.identification.measured import WithLimit
 from warpimpact.identification.parameters import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.scene import Scene, Shots
+from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.simulate import Outcomes, simulate
 from warpimpact.solver.unfold import unfolded
 
@@ -40,10 +42,10 @@ class Run:
     """Outcomes of a bench at some sets of parameters.
 
     Attributes:
-        which: the sets, shape [sets].
+        which: the sets, shape [computed sets, sets alike]: those in a row differ in the scales of discrepancy alone.
         scene: what was shot at what; quantities that differ from set to set are at their medians.
         aim: the points, without a class.
-        outcomes: images included, shape [sets · points].
+        outcomes: images included, shape [computed sets · points].
     """
 
     which: NDArray[np.int64]
@@ -68,20 +70,43 @@ def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iter
     Args:
         points: standard normal numbers, one column per parameter of the fit, shape [sets, parameters].
     """
-    values = {one.path: one.at(points[:, column]) for column, one in enumerate(fit.parameters)}
+    alike = _alike(points[:, [one.path[0] != "discrepancy" for one in fit.parameters]])
+    values = {one.path: one.at(points[alike[:, 0], column]) for column, one in enumerate(fit.parameters)}
     own = {one.path: values[one.path] for one in fit.scene_parameters if one.path not in bench.shot.own}
     columns = _as_columns(fit, own)
     of_scene = {path: column for path, column in own.items() if path not in columns}
-    for sets in _alike(of_scene, len(points)):
-        scene = fit.scene_of(bench.shot, {path: float(column[sets[0]]) for path, column in of_scene.items()})
+    for rows in _of_one_scene(of_scene, len(alike)):
+        scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in of_scene.items()})
         targets = aim(bench.shot, scene.target.plate, scene.core, fit.sampling)
         per_call = max(1, AT_A_TIME // len(targets.computed))
-        for first in range(0, len(sets), per_call):
-            some = sets[first : first + per_call]
+        for first in range(0, len(rows), per_call):
+            some = rows[first : first + per_call]
             of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.plate)
             shots = repeated(targets.computed, of_sets, len(some))
-            outcomes = simulate(scene, shots, numerics=fit.numerics, device=device)
-            yield Run(some, scene, targets, unfolded(outcomes, targets.group))
+            outcomes = _outcomes(fit, bench, scene, shots, device)
+            yield Run(alike[some], scene, targets, unfolded(outcomes, targets.group))
+
+
+def _alike(points: Array) -> NDArray[np.int64]:
+    """Sets of equal numbers, shape [different sets, sets alike]; each on its own where they are not equally many."""
+    _, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    if (counts != counts[0]).any():
+        return np.arange(len(points))[:, None]
+    rows: NDArray[np.int64] = np.argsort(which.reshape(-1), kind="stable").reshape(-1, counts[0])
+    return rows
+
+
+def _outcomes(fit: Fit, bench: Bench, scene: Scene, shots: Shots, device: str) -> Outcomes:
+    """What the observations of a bench need: outcomes at impact velocity, limit velocities, or both."""
+    measured = [fit.shots[place] for place in bench.which]
+    observations = [one for shot in measured for one in shot.observations]
+    if not any(one.is_limit for one in observations):
+        return simulate(scene, shots, numerics=fit.numerics, device=device)
+    limits = limit_velocity(scene, shots, numerics=fit.numerics, device=device)
+    other = fit.selection or any(shot.status for shot in measured) or not all(one.is_limit for one in observations)
+    outcomes = simulate(scene, shots, numerics=fit.numerics, device=device) if other else limits.outcomes
+    plain = {one.name: getattr(outcomes, one.name) for one in fields(Outcomes)}
+    return WithLimit(**plain, limit_velocity=limits.value)
 
 
 def _as_columns(fit: Fit, own: Mapping[Path, Array]) -> dict[Path, Array]:
@@ -90,8 +115,8 @@ def _as_columns(fit: Fit, own: Mapping[Path, Array]) -> dict[Path, Array]:
     return {path: own[path] for path in own if path in COLUMNS or (path in UNITS_OF_EXPOSURE and not nodal)}
 
 
-def _alike(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:
-    """Sets that share one scene."""
+def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:
+    """Rows that share one scene."""
     if not of_scene:
         yield np.arange(count)
         return
@@ -143,8 +168,9 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
             for place in bench.which:
                 shot = fit.shots[place]
                 own = run.aim.of(shot.hit, run.scene.target.plate, run.scene.core)
-                some = {kind: scale[run.which] for kind, scale in scales.items()}
-                scored[place].append((run.which, score(data_of(fit, shot), own, run.outcomes, some, rng)))
+                for which in run.which.T:
+                    some = {kind: scale[which] for kind, scale in scales.items()}
+                    scored[place].append((which, score(data_of(fit, shot), own, run.outcomes, some, rng)))
     return [_in_order(parts) for parts in scored.values()]
 
 

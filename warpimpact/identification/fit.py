@@ -34,6 +34,7 @@ from warpimpact.scene.model import Model
 from warpimpact.scene.scatter import QUANTITIES, Distribution
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.bending import check_bending
+from warpimpact.solver.limit import check_arrests
 
 _TABLES = ("core", "plate", "interaction")
 _KEYS = ("title", *_TABLES, "record", "numerics", "prior", "discrepancy", "selection", "sampling", "shot")
@@ -230,6 +231,9 @@ def _shot(given: Any, tables: Mapping[str, Any], record: Record, place: str, par
         median = float(read_distribution(quantity(kind), value, f"{place}: impact.{key}").quantile(np.array(0.5)))
         impact[key] = quantity(kind).as_read(median)
     observations, status = read_measured(given.get("measured"), record.standoffs, f"{place}: measured")
+    limits = [one.value for one in observations if one.is_limit]
+    if limits:  # at which its search begins
+        impact.setdefault("velocity", limits[0])
     own = {table: given[table] for table in _TABLES if table in given}
     return MeasuredShot(
         name=str(given.get("name", place.partition(": ")[2])),
@@ -318,18 +322,24 @@ def _check_scenes(fit: Fit, name: str) -> None:
         try:
             scene = fit.scene_of(shot)
             check_bending(fit.record, fit.numerics)
-        except (ValidationError, ValueError) as error:
+        except ValueError as error:
             told = _sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
             raise FitError(f"{where}: {told}") from None
         _check_hit(shot, scene, where)
+        has_limit = any(one.is_limit for one in shot.observations)
+        if has_limit and fit.record.bending:
+            raise FitError(f"{where}: got limit_velocity beside a selection by bending_stress, which it does not have")
         for values in corners(fit.scene_parameters):
             try:
-                fit.scene_of(shot, values)
-            except ValidationError as error:
+                reached = fit.scene_of(shot, values)
+                if has_limit:
+                    check_arrests(reached)
+            except ValueError as error:
+                told = _sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
                 at = ", ".join(f"{dotted(path)} = {value:.4g}" for path, value in values.items())
                 raise FitError(
-                    f"{where}: the priors reach {at} (SI), where no scene is possible: "
-                    f"{_sentence(error, dict(shot.tables))}; bound them, as uniform or truncated_normal do"
+                    f"{where}: the priors reach {at} (SI), which is not possible: {told}; bound them, as uniform or "
+                    "truncated_normal do"
                 ) from None
 
 

@@ -13,7 +13,7 @@ from warpimpact.campaign.compute import made_by
 from warpimpact.campaign.parts import claimed
 from warpimpact.campaign.run import Interrupted
 from warpimpact.identification.evaluate import evaluate
-from warpimpact.identification.fit import Fit
+from warpimpact.identification.fit import Fit, Sampling
 from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 FIRST_SHARE, ROUNDS = 0.25, 8
 """Share of the sets that is drawn from the prior, and how many rounds draw the others."""
+DISCREPANCIES = 4
+"""Scales of discrepancy per set of parameters: they need no runs of their own."""
 BATCH = 32
 """Sets per file on the disk."""
 FARTHEST = 5.0
@@ -90,26 +92,34 @@ def identify_to_file(
 def sample(fit: Fit, *, device: str = "auto", store: Store | None = None, progress: Follow | None = None) -> Sampled:
     """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn."""
     plan, follow = fit.sampling, progress or (lambda standing: None)
-    shared = sum(not one.is_column for one in fit.parameters)
-    sampler = Sampler(len(fit.parameters), shared, plan.shared if shared else 1, plan.seed)
+    sampler = Sampler(len(fit.parameters), shared(fit), plan.seed)
     work = _Work(fit, device, store, follow)
-    for count in rounds(plan.sets):
+    for count in rounds(plan):
         points = sampler.propose(count)
         sampler.tell(work.round(points))
         weights = sampler.weighed()
-        if work.done == count:
+        if len(sampler.points) == count:
             _check_reach(fit, work.scores())
-        work.tell(weights.effective, weights.pareto_k)
-        if weights.effective >= plan.effective and weights.pareto_k <= LARGEST_K:
+        effective = weights.effective(DISCREPANCIES)
+        work.tell(effective, weights.pareto_k)
+        if effective >= plan.effective and weights.pareto_k <= LARGEST_K:
             break
-    return Sampled(sampler.points, work.scores(), sampler.weighed())
+    return Sampled(sampler.points, work.scores(), sampler.weighed(), DISCREPANCIES)
 
 
-def rounds(sets: int) -> list[int]:
-    """Sets of the first round, from the prior, and of the others."""
-    first = 1 << (max(1, int(FIRST_SHARE * sets)).bit_length() - 1)
-    each = max(1, (sets - first) // ROUNDS)
-    return [first, *[each] * ROUNDS]
+def shared(fit: Fit) -> list[tuple[int, int]]:
+    """How many numbers blocks of draws share: those that make a scene of their own, then all that need runs."""
+    scenes = sum(not one.is_column for one in fit.parameters)
+    return [(scenes, fit.sampling.shared * DISCREPANCIES), (len(fit.scene_parameters), DISCREPANCIES)]
+
+
+def rounds(plan: Sampling) -> list[int]:
+    """Draws of the first round, from the prior, and of the others; whole blocks."""
+    block = plan.shared * DISCREPANCIES
+    blocks = plan.sets // plan.shared
+    first = max(1, int(FIRST_SHARE * blocks))
+    each = max(1, (blocks - first) // ROUNDS)
+    return [first * block, *[each * block] * ROUNDS]
 
 
 class _Work:
@@ -117,7 +127,7 @@ class _Work:
 
     def __init__(self, fit: Fit, device: str, store: Store | None, follow: Follow) -> None:
         self._fit, self._device, self._store, self._follow = fit, device, store, follow
-        self._total = sum(rounds(fit.sampling.sets))
+        self._total = sum(rounds(fit.sampling)) // DISCREPANCIES
         self._parts: list[list[Score]] = []
         self._batch, self._resumed, self.done = 0, 0, 0
         self._effective, self._pareto_k, self._misfit = np.nan, np.nan, np.inf
@@ -125,11 +135,11 @@ class _Work:
     def round(self, points: Array) -> Array:
         """Score the sets of one round; ln of their likelihood, shape [sets]."""
         found: list[Array] = []
-        for first in range(0, len(points), BATCH):
-            some = points[first : first + BATCH]
+        for first in range(0, len(points), BATCH * DISCREPANCIES):
+            some = points[first : first + BATCH * DISCREPANCIES]
             scores = self._scores_of(some)
             self._parts.append(scores)
-            self.done += len(some)
+            self.done += len(some) // DISCREPANCIES
             self._misfit = min(self._misfit, float(sum(one.misfit for one in scores).min()))  # type: ignore[union-attr]
             found.append(np.sum([one.log_likelihood for one in scores], axis=0))
             self._say()
@@ -139,7 +149,7 @@ class _Work:
         batch, self._batch = self._batch, self._batch + 1
         stored = None if self._store is None else self._store.load(batch)
         if stored is not None and np.array_equal(stored["points"], points):
-            self._resumed += len(points)
+            self._resumed += len(points) // DISCREPANCIES
             return [
                 Score(**{f.name: stored[f"{f.name}_{place}"] for f in fields(Score)})
                 for place in range(len(self._fit.shots))

@@ -110,6 +110,8 @@ def score(
     computed = np.empty((sets, points, len(data.observations)))
     for place, one in enumerate(data.observations):
         computed[:, :, place] = one.of(outcomes).reshape(sets, points)
+        if one.is_limit:
+            computed[:, :, place] = _median(computed[:, :, place], aim.weight)
     status = outcomes.status.reshape(sets, points)
     counts = aim.weight * _counted(data, outcomes).reshape(sets, points)
     miss, spread = data.miss(computed), data.spread(discrepancy)[:, None, :]
@@ -156,6 +158,12 @@ def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) ->
     (variable,) = (one for one in v.HIT_NUMBERS if one == condition.variable)
     shown = np.degrees(values) if variable.units == "degree" else values
     return np.asarray(shown > condition.limit if condition.above else shown < condition.limit)
+
+
+def _median(values: Array, weight: Array) -> Array:
+    """Median over the points of the class, shape [sets, 1]; NaN without such a point."""
+    inside = values[:, weight > 0.0]
+    return np.median(inside, axis=1, keepdims=True) if inside.size else np.full((len(values), 1), np.nan)
 
 
 def _integrated(log: Array, counts: Array, aim: Aim) -> tuple[Array, Array]:

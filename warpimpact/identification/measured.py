@@ -9,17 +9,30 @@ from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpimpact.identification.parameters import FitError
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES
-from warpimpact.scene.model import Array
 from warpimpact.scene.units import Angle, Speed, quantity, quoted
 from warpimpact.solver.simulate import Outcomes
 
+Array = NDArray[np.float64]
+
 KINDS = {"m s-1": ("velocity", Speed), "degree": ("angle", Angle)}
 """Kind of discrepancy and type of a number, by the units of its variable."""
-MEASURABLE = {str(one): one for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW)}
+LIMIT_VELOCITY = v.Variable("limit_velocity", ("hit",), "m s-1", "impact velocity at which the core just perforates")
+"""It is a property of plate and core, not of one shot: of the hits of a class it is the median."""
+MEASURABLE = {
+    str(one): one for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW, LIMIT_VELOCITY)
+}
+
+
+@dataclass(frozen=True)
+class WithLimit(Outcomes):
+    """Outcomes with the limit velocity of every shot [m/s], shape [shots]; infinite where no velocity is enough."""
+
+    limit_velocity: Array
 
 
 @dataclass(frozen=True)
@@ -57,6 +70,11 @@ class Observation:
     def shown(self, value: Any) -> Any:
         """Values in the units of the Dataset."""
         return np.degrees(value) if self.kind == "angle" else value
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether it is a limit velocity."""
+        return self.name == LIMIT_VELOCITY
 
     def of(self, outcomes: Outcomes) -> Array:
         """The computed number of every shot, shape [shots]; NaN where there is none."""

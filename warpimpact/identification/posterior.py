@@ -40,11 +40,17 @@ class Sampled:
     Attributes:
         points: standard normal numbers, shape [sets, parameters].
         scores: one per shot.
+        block: sets in a row that differ in the scales of discrepancy alone.
     """
 
     points: Array
     scores: list[Score]
     weights: Weights
+    block: int = 1
+
+    @property
+    def effective(self) -> float:
+        return self.weights.effective(self.block)
 
 
 def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.DataTree:
@@ -203,10 +209,10 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         files.FIT: fit.text,
         **made,
         attr.SEED: fit.sampling.seed,
-        files.EFFECTIVE: weights.effective,
+        files.EFFECTIVE: sampled.effective,
         files.PARETO_K: weights.pareto_k,
         files.HIT_NOISE: hit_noise,
-        files.CONVERGED: int(is_converged(fit, weights, hit_noise)),
+        files.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
         files.EVIDENCE: weights.log_evidence,
         "wanted_sample_size": fit.sampling.effective,
         "hits": fit.sampling.hits,
@@ -215,9 +221,10 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
     }
 
 
-def is_converged(fit: Fit, weights: Weights, noise: float) -> bool:
+def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:
     """Whether weights and hits can be trusted."""
-    return weights.effective >= fit.sampling.effective and weights.pareto_k <= LARGEST_K and noise <= LARGEST_NOISE
+    trusted = sampled.weights.pareto_k <= LARGEST_K and noise <= LARGEST_NOISE
+    return trusted and sampled.effective >= fit.sampling.effective
 
 
 def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:

@@ -1,14 +1,16 @@
 """Adaptive importance sampling of a posterior whose prior is standard normal, and how far its weights can be trusted.
 
-Rounds of draws: the first from the prior, later ones from a mixture of Student's t kernels around the draws of largest
-weight. All draws of all rounds count, weighted by prior · likelihood over the mixture of all proposals (Cornuet, Marin,
-Mira and Robert, "Adaptive multiple importance sampling", 2012). The largest weights are smoothed; their Pareto index k
-says whether they can be trusted (Vehtari, Simpson, Gelman, Yao and Gabry, "Pareto smoothed importance sampling", 2024).
+Rounds of draws: the first from the prior, later ones from a Student's t distribution with mean and covariance of the
+weighted draws so far. All draws of all rounds count, weighted by prior · likelihood over the mixture of all proposals
+(Cornuet, Marin, Mira and Robert, "Adaptive multiple importance sampling", 2012). The largest weights are smoothed, and
+their Pareto index k says whether they can be trusted (Vehtari, Simpson, Gelman, Yao and Gabry, "Pareto smoothed
+importance sampling", 2024).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 FREEDOM = 5.0
-"""Degrees of freedom of the kernels: tails heavier than a posterior's, so that no weight is without bound."""
+"""Degrees of freedom of a proposal: its tails are heavier than a posterior's, so that no weight is without bound."""
 FROM_PRIOR = 0.1
 """Share of later rounds that is drawn from the prior."""
 FEWEST_PER_DIMENSION = 10
@@ -28,56 +30,65 @@ LARGEST_K = 0.7
 _FEWEST_TAIL = 5
 
 
+Shared = Sequence[tuple[int, int]]
+"""How many of the first numbers are the same within blocks of how many draws, such as ((3, 16), (6, 4))."""
+
+
+def _with_shared(numbers: Array, shared: Shared) -> Array:
+    """Draws whose first numbers are those of the first draw of their block."""
+    numbers = numbers.copy()
+    for first, block in sorted(shared, reverse=True):  # blocks that share less are larger
+        of = np.arange(len(numbers)) // block * block
+        numbers[:, :first] = numbers[of, :first]
+    return numbers
+
+
 @dataclass(frozen=True)
-class Kernels:
-    """A mixture of Student's t kernels of one shape, with FROM_PRIOR of the prior.
+class Student:
+    """Student's t distribution, mixed with FROM_PRIOR of the prior.
+
+    One with the whole covariance was measured to give more effective draws than mixtures of narrower kernels about the
+    draws of large weight: these are few at first, and a mixture of few is rough.
 
     Attributes:
-        centres: shape [kernels, dimensions].
-        factor: lower Cholesky factor of the shape, shape [dimensions, dimensions].
+        centre: shape [dimensions].
+        factor: lower Cholesky factor of its scale matrix, shape [dimensions, dimensions].
     """
 
-    centres: Array
+    centre: Array
     factor: Array
 
-    def draw(self, rng: np.random.Generator, count: int, shared: int, block: int) -> Array:
-        """Draws in blocks that share their first `shared` numbers, shape [count, dimensions].
+    def draw(self, rng: np.random.Generator, count: int, shared: Shared) -> Array:
+        """Draws in blocks that share their first numbers, shape [count, dimensions].
 
-        Within a block kernel, scale and the first normal numbers are the same. As the factor is triangular, so are the
-        first numbers of the draws; each draw alone still has the distribution of the mixture.
+        Within a block the scale and the first normal numbers are the same. As the factor is triangular, so are the
+        first numbers of the draws; each draw alone still has the whole distribution.
         """
-        dimensions = self.centres.shape[1]
-        blocks = -(-count // block)
-        of = np.repeat(np.arange(blocks), block)[:count]
-        normal = rng.standard_normal((count, dimensions))
-        normal[:, :shared] = rng.standard_normal((blocks, shared))[of]
+        largest = max((block for _, block in shared), default=1)
+        blocks = -(-count // largest)
+        of = np.repeat(np.arange(blocks), largest)[:count]
+        normal = _with_shared(rng.standard_normal((count, len(self.centre))), shared)
         scale = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, blocks))[of]
-        which = rng.integers(len(self.centres), size=blocks)[of]
         from_prior = (rng.random(blocks) < FROM_PRIOR)[of]
-        kernel = self.centres[which] + scale[:, None] * (normal @ self.factor.T)
-        return np.where(from_prior[:, None], normal, kernel)
+        own = self.centre + scale[:, None] * (normal @ self.factor.T)
+        return np.where(from_prior[:, None], normal, own)
 
     def log_density(self, points: Array) -> Array:
         """Logarithm of the density at points, shape [points]."""
         from scipy.linalg import solve_triangular
-        from scipy.special import gammaln, logsumexp
+        from scipy.special import gammaln
 
         dimensions = points.shape[1]
-        here, there = (solve_triangular(self.factor, of.T, lower=True).T for of in (points, self.centres))
-        constant = (
+        square = (solve_triangular(self.factor, (points - self.centre).T, lower=True) ** 2).sum(axis=0)
+        own = (
             gammaln(0.5 * (FREEDOM + dimensions))
             - gammaln(0.5 * FREEDOM)
             - 0.5 * dimensions * math.log(FREEDOM * math.pi)
             - np.log(np.diag(self.factor)).sum()
+            - 0.5 * (FREEDOM + dimensions) * np.log1p(square / FREEDOM)
         )
-        of_kernels = np.empty(len(points))
-        for first in range(0, len(points), 1024):
-            part = here[first : first + 1024]
-            square = (part**2).sum(axis=1)[:, None] + (there**2).sum(axis=1) - 2.0 * part @ there.T
-            log = -0.5 * (FREEDOM + dimensions) * np.log1p(np.maximum(square, 0.0) / FREEDOM)
-            of_kernels[first : first + 1024] = constant + logsumexp(log, axis=1) - math.log(len(self.centres))
-        own = math.log1p(-FROM_PRIOR) + of_kernels
-        return np.logaddexp(own, math.log(FROM_PRIOR) + log_prior(points))
+        density: Array = np.logaddexp(math.log1p(-FROM_PRIOR) + own, math.log(FROM_PRIOR) + log_prior(points))
+        return density
 
 
 def log_prior(points: Array) -> Array:
@@ -91,18 +102,18 @@ class Sampler:
 
     Args:
         dimensions: of the parameters; their prior is standard normal.
-        shared: the first of them that a block of `block` draws shares.
+        shared: which of them blocks of draws share, for what is costly to change.
         seed: draws are a function of it and of what was told.
     """
 
     dimensions: int
-    shared: int
-    block: int
+    shared: Shared
     seed: int
     points: Array = field(init=False)
     log_likelihood: Array = field(init=False)
-    _proposals: list[tuple[int, Kernels | None]] = field(init=False, default_factory=list)
-    _told: int = field(init=False, default=0)
+    _proposals: list[tuple[int, Student | None]] = field(init=False, default_factory=list)
+    _densities: list[Array] = field(init=False, default_factory=list)
+    """Logarithm of every proposal's density at the points, as many of them as were there when it was last asked."""
 
     def __post_init__(self) -> None:
         self.points = np.empty((0, self.dimensions))
@@ -112,9 +123,9 @@ class Sampler:
         """The points of the next round, shape [count, dimensions]."""
         sequence = np.random.SeedSequence(self.seed, spawn_key=(len(self._proposals),))
         rng = np.random.default_rng(sequence)
-        kernels = self._kernels(rng) if len(self.points) else None
-        new = self._from_prior(rng, count) if kernels is None else kernels.draw(rng, count, self.shared, self.block)
-        self._proposals.append((count, kernels))
+        student = self._student() if len(self.points) else None
+        new = self._from_prior(rng, count) if student is None else student.draw(rng, count, self.shared)
+        self._proposals.append((count, student))
         self.points = np.concatenate([self.points, new])
         return new
 
@@ -127,33 +138,35 @@ class Sampler:
         from scipy.stats.qmc import Sobol
 
         uniform = Sobol(self.dimensions, rng=rng).random(1 << (count - 1).bit_length())[:count]
-        first = np.arange(count) // self.block * self.block
-        uniform[:, : self.shared] = uniform[first, : self.shared]
+        uniform = _with_shared(uniform, self.shared)
         normal: Array = ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31))
         return normal
 
-    def _kernels(self, rng: np.random.Generator) -> Kernels | None:
-        """Kernels around the draws of large weight; None where no draw has a likelihood."""
+    def _student(self) -> Student | None:
+        """The proposal of the next round; None where no draw has a likelihood."""
         raw = self._raw()
         if not np.isfinite(raw).any():
             return None
         weights = _tempered(raw, FEWEST_PER_DIMENSION * self.dimensions)
-        effective = effective_size(weights)
-        mean = weights @ self.points
-        apart = self.points - mean
+        centre = weights @ self.points
+        apart = self.points - centre
         covariance = (weights[:, None] * apart).T @ apart + 1e-6 * np.eye(self.dimensions)
-        width = (4.0 / ((self.dimensions + 2.0) * max(effective, 2.0))) ** (1.0 / (self.dimensions + 4.0))
-        centres = self.points[resampled(weights, min(len(weights), 512), rng)]
-        return Kernels(centres, np.linalg.cholesky(width**2 * covariance))
+        factor: Array = np.linalg.cholesky(covariance).astype(np.float64)
+        return Student(centre, factor)
 
     def _raw(self) -> Array:
         """Logarithms of the weights, not normalised."""
         from scipy.special import logsumexp
 
         total = sum(count for count, _ in self._proposals)
+        for place, (_, student) in enumerate(self._proposals):
+            known = self._densities[place] if place < len(self._densities) else np.empty(0)
+            new = self.points[len(known) :]
+            at_new = log_prior(new) if student is None else student.log_density(new)
+            self._densities[place : place + 1] = [np.concatenate([known, at_new])]
         terms = [
-            math.log(count / total) + (log_prior(self.points) if kernels is None else kernels.log_density(self.points))
-            for count, kernels in self._proposals
+            math.log(count / total) + density
+            for (count, _), density in zip(self._proposals, self._densities, strict=True)
         ]
         raw: Array = log_prior(self.points) + self.log_likelihood - logsumexp(np.stack(terms), axis=0)
         return raw
@@ -182,10 +195,9 @@ class Weights:
         values, k = _smoothed(np.exp(raw - raw.max()))
         return cls(values / values.sum(), k, evidence)
 
-    @property
-    def effective(self) -> float:
-        """Effective sample size."""
-        return effective_size(self.values)
+    def effective(self, block: int = 1) -> float:
+        """Effective sample size; draws of a block count as one, since they share most of their numbers."""
+        return effective_size(np.add.reduceat(self.values, np.arange(0, len(self.values), block)))
 
 
 def effective_size(weights: Array) -> float:
@@ -251,7 +263,8 @@ def pareto_fit(beyond: Any) -> tuple[float, float]:
     places = np.where(places == 0.0, 1e-12 / x[-1], places)
     k = np.log1p(-places[:, None] * x).mean(axis=1)
     profile = count * (np.log(-places / k) - k - 1.0)
-    weights = 1.0 / np.exp(profile - profile[:, None]).sum(axis=1)
+    with np.errstate(over="ignore"):
+        weights = 1.0 / np.exp(profile - profile[:, None]).sum(axis=1)
     theta = float((places * weights).sum() / weights.sum())
     shape = float(np.log1p(-theta * x).mean())
     return (count * shape + 5.0) / (count + 10.0), -shape / theta
