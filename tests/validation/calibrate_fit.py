@@ -11,10 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from warpimpact.identification.calibration import BINS, Calibration, calibrate
-from warpimpact.identification.fit import fit_from
+from warpimpact.identification.reading import fit_from
 
 HERE = Path(__file__).parent
-DATA_SETS, LIBRARY = 300, 4096
+DATA_SETS, LIBRARY = 300, 2048
 FIT = (HERE / "calibration.toml").read_text(encoding="utf-8")
 
 

@@ -43,8 +43,8 @@ def add_identify(commands: Commands) -> None:
 
 
 def _identify(arguments: argparse.Namespace) -> int:
-    from warpimpact.identification.fit import read_fit
     from warpimpact.identification.identify import identify_to_file
+    from warpimpact.identification.reading import read_fit
     from warpimpact.identification.text import posterior_text
     from warpimpact.plotting.posterior import save_posterior
     from warpimpact.results import posterior as files

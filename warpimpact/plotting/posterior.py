@@ -10,8 +10,8 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.identification.fit import fit_from
 from warpimpact.identification.posterior import learnt, parameters_of
+from warpimpact.identification.reading import fit_from
 from warpimpact.identification.text import unit_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior as files

@@ -11,9 +11,10 @@ from warpimpact.campaign.run import Interrupted
 from warpimpact.cli import main
 from warpimpact.identification import identify
 from warpimpact.identification.calibration import calibrate
-from warpimpact.identification.fit import Fit, fit_from
+from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import Standing, identify_to_file, rounds
 from warpimpact.identification.posterior import learnt, parameters_of
+from warpimpact.identification.reading import fit_from
 from warpimpact.identification.text import posterior_text
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior as files
