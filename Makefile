@@ -23,9 +23,11 @@ test: $(INSTALLED)
 clean:
 	rm -rf $(VENV) build slotted.nc slotted.nc.parts slotted_*.png
 
-# Editable, so that the modules of kernels/ and campaigns/ are found inside the package from the checkout, too.
+# Editable, so that the modules of kernels/ and campaigns/ are found inside the package from the checkout, too. Its
+# finder serves the interpreter only; type checkers find the package by the path in warpimpact.pth.
 $(INSTALLED): pyproject.toml Makefile
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --upgrade pip
 	$(VENV)/bin/pip install --quiet --editable '.[dev]'
+	echo "$(CURDIR)" > "$$($(VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/warpimpact.pth"
 	touch $@

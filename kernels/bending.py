@@ -101,7 +101,13 @@ def build(variant: Variant) -> SimpleNamespace:
         force, moment = vec3(), vec3()
         for index in range(surface.rings):
             here = slot * surface.rings + index
-            if index >= found.first_ring and index <= found.last_ring and touches.ring_area[here] > zero:
+            area = zero
+            if index >= found.first_ring and index <= found.last_ring:
+                if wp.static(variant.layered):
+                    area = touches.total_area[here]
+                else:
+                    area = touches.ring_area[here]
+            if area > zero:
                 ring = surfaces.ring_at(surface, pose, index)
                 sums = touches.sums[here]
                 force += share * mean_force(ring, sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)

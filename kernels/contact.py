@@ -7,6 +7,7 @@ of a ring without a branch, so a CPU computes several patches at once.
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
@@ -36,7 +37,8 @@ def build(variant: Variant) -> SimpleNamespace:
         `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
         that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
         of the tile and of the grid; `y` and `z` are its place in the grid's cell. `ring_area` is the area of all
-        patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded.
+        patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
+        `total_area` is the area of a ring in all layers of a target.
         """
 
         area: wp.array(dtype=real)
@@ -49,6 +51,7 @@ def build(variant: Variant) -> SimpleNamespace:
         z: wp.array(dtype=real)
         ring_area: wp.array(dtype=real)
         sums: wp.array(dtype=Sums)
+        total_area: wp.array(dtype=real)
 
     @wp.func
     def open_window(
@@ -112,64 +115,98 @@ def build(variant: Variant) -> SimpleNamespace:
                 memories.scatter(fields.gain, fields.cells_z, cell, y, z, read(touches.gain, i))
             j += 1
 
+    def summing(weakened: bool) -> Any:
+        """The second pass over a ring, in a layer that weakens or in one that does not: without a branch inside."""
+
+        @wp.func(name="sum_ring_weakened" if weakened else "sum_ring_sound")
+        def sum_ring(
+            surface: Surface, law: Law, fields: Fields, touches: Touches, pose: Pose, ring: Ring, first: wp.int32
+        ):
+            """Sum tractions and their slopes over a ring's touches."""
+            axial, right, up, around = real(0.0), real(0.0), real(0.0), real(0.0)
+            axial_c, axial_s = real(0.0), real(0.0)
+            slopes, slopes_c, slopes_s, slopes_cc, slopes_cs = real(0.0), real(0.0), real(0.0), real(0.0), real(0.0)
+            j = int(0)
+            while j < surface.around:
+                cosine, sine = read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j)
+                patch = patch_at(pose, ring, cosine, sine)
+                face = grips.face_of(ring, patch, read(touches.shift, first + j))
+                left = one
+                if wp.static(weakened):
+                    cell = read_index(touches.cell, first + j)
+                    y, z = read(touches.y, first + j), read(touches.z, first + j)
+                    left = laws.remaining(law, memories.gather(fields.exposure, fields.cells_z, cell, y, z))
+                area = left * read(touches.area, first + j)
+                stress = laws.normal_stress(law, face.closing)
+                slope = left * read(touches.slope, first + j) * stress
+                if wp.static(variant.rate_dependent):
+                    slope += area * laws.stress_slope(law, face.closing)
+                # Traction = stress × (−n + η t), t against the sliding velocity.
+                f_axial, f_outward, f_around = -face.axial, -face.outward, -face.around
+                if wp.static(variant.rubs):
+                    s_axial = patch.velocity_axial - face.closing * face.axial
+                    s_outward = patch.velocity_outward - face.closing * face.outward
+                    s_around = patch.velocity_around - face.closing * face.around
+                    sliding = wp.sqrt(s_axial * s_axial + s_outward * s_outward + s_around * s_around)
+                    rubbing = laws.friction_per_speed(law, sliding, pose.speed)
+                    f_axial -= rubbing * s_axial
+                    f_outward -= rubbing * s_outward
+                    f_around -= rubbing * s_around
+                force = area * stress
+                axial += force * f_axial
+                axial_c += force * f_axial * cosine
+                axial_s += force * f_axial * sine
+                right += force * (f_outward * cosine - f_around * sine)
+                up += force * (f_outward * sine + f_around * cosine)
+                around += force * f_around
+                slopes += slope
+                slopes_c += slope * cosine
+                slopes_s += slope * sine
+                slopes_cc += slope * cosine * cosine
+                slopes_cs += slope * cosine * sine
+                j += 1
+            sums = Sums()
+            sums.force = vec3(axial, right, up)
+            sums.moment = vec3(
+                ring.radius * around,
+                ring.radius * axial_s - ring.station * up,
+                ring.station * right - ring.radius * axial_c,
+            )
+            sums.slopes = slopes
+            sums.slopes_c = slopes_c
+            sums.slopes_s = slopes_s
+            sums.slopes_cc = slopes_cc
+            sums.slopes_cs = slopes_cs
+            return sums
+
+        return sum_ring
+
+    sum_ring, sum_sound = summing(variant.degrades), summing(False)
+    mixed = variant.layered and variant.degrades  # layers that weaken beside layers that do not
+
     @wp.func
-    def sum_ring(surface: Surface, law: Law, fields: Fields, touches: Touches, pose: Pose, ring: Ring, first: wp.int32):
-        """Sum tractions and their slopes over a ring's touches."""
-        axial, right, up, around = real(0.0), real(0.0), real(0.0), real(0.0)
-        axial_c, axial_s = real(0.0), real(0.0)
-        slopes, slopes_c, slopes_s, slopes_cc, slopes_cs = real(0.0), real(0.0), real(0.0), real(0.0), real(0.0)
-        j = int(0)
-        while j < surface.around:
-            cosine, sine = read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j)
-            patch = patch_at(pose, ring, cosine, sine)
-            face = grips.face_of(ring, patch, read(touches.shift, first + j))
-            left = one
-            if wp.static(variant.degrades):
-                cell = read_index(touches.cell, first + j)
-                y, z = read(touches.y, first + j), read(touches.z, first + j)
-                left = laws.remaining(law, memories.gather(fields.exposure, fields.cells_z, cell, y, z))
-            area = left * read(touches.area, first + j)
-            stress = laws.normal_stress(law, face.closing)
-            slope = left * read(touches.slope, first + j) * stress
-            if wp.static(variant.rate_dependent):
-                slope += area * laws.stress_slope(law, face.closing)
-            # Traction = stress × (−n + η t), t against the sliding velocity.
-            f_axial, f_outward, f_around = -face.axial, -face.outward, -face.around
-            if wp.static(variant.rubs):
-                s_axial = patch.velocity_axial - face.closing * face.axial
-                s_outward = patch.velocity_outward - face.closing * face.outward
-                s_around = patch.velocity_around - face.closing * face.around
-                sliding = wp.sqrt(s_axial * s_axial + s_outward * s_outward + s_around * s_around)
-                rubbing = laws.friction_per_speed(law, sliding, pose.speed)
-                f_axial -= rubbing * s_axial
-                f_outward -= rubbing * s_outward
-                f_around -= rubbing * s_around
-            force = area * stress
-            axial += force * f_axial
-            axial_c += force * f_axial * cosine
-            axial_s += force * f_axial * sine
-            right += force * (f_outward * cosine - f_around * sine)
-            up += force * (f_outward * sine + f_around * cosine)
-            around += force * f_around
-            slopes += slope
-            slopes_c += slope * cosine
-            slopes_s += slope * sine
-            slopes_cc += slope * cosine * cosine
-            slopes_cs += slope * cosine * sine
-            j += 1
-        sums = Sums()
-        sums.force = vec3(axial, right, up)
-        sums.moment = vec3(
-            ring.radius * around,
-            ring.radius * axial_s - ring.station * up,
-            ring.station * right - ring.radius * axial_c,
-        )
-        sums.slopes = slopes
-        sums.slopes_c = slopes_c
-        sums.slopes_s = slopes_s
-        sums.slopes_cc = slopes_cc
-        sums.slopes_cs = slopes_cs
-        return sums
+    def weakens(window: Window):
+        """Whether a plate, or this layer of a target, weakens."""
+        kept = wp.static(variant.degrades)
+        if wp.static(mixed):
+            kept = window.weakens
+        return kept
+
+    @wp.func
+    def clear_sums(surface: Surface, touches: Touches, slot: wp.int32):
+        """No layer has touched yet."""
+        for index in range(slot * surface.rings, (slot + 1) * surface.rings):
+            touches.total_area[index] = zero
+            touches.sums[index] = Sums()
+
+    @wp.func
+    def keep_sums(touches: Touches, index: wp.int32, sums: Sums):
+        """Keep what the second pass sums over a ring, of all layers together."""
+        if wp.static(variant.layered):
+            touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
+            touches.sums[index] = resistances.joined(touches.sums[index], sums)
+        else:
+            touches.sums[index] = sums
 
     @wp.func
     def load_on(
@@ -201,19 +238,28 @@ def build(variant: Variant) -> SimpleNamespace:
             load.touching = load.touching or area > zero
         if load.touching:
             if wp.static(variant.degrades):
-                # After all rings are found: a CPU has to wait before it reads single values that it has just stored as
-                # vectors.
-                for index in range(found.first_ring, found.last_ring + 1):
-                    if touches.ring_area[slot * surface.rings + index] > zero:
-                        expose(surface, fields, touches, base + index * surface.around)
-                memories.spread(plate, fields, window, found.box)
+                if weakens(window):
+                    # After all rings are found: a CPU has to wait before it reads single values that it has just
+                    # stored as vectors.
+                    for index in range(found.first_ring, found.last_ring + 1):
+                        if touches.ring_area[slot * surface.rings + index] > zero:
+                            expose(surface, fields, touches, base + index * surface.around)
+                    memories.spread(plate, fields, window, found.box)
             slopes = Slopes()
             for index in range(found.first_ring, found.last_ring + 1):
                 if touches.ring_area[slot * surface.rings + index] > zero:
                     ring = ring_at(surface, pose, index)
-                    sums = sum_ring(surface, law, fields, touches, pose, ring, base + index * surface.around)
+                    first = base + index * surface.around
+                    sums = Sums()
+                    if wp.static(mixed):
+                        if window.weakens:
+                            sums = sum_ring(surface, law, fields, touches, pose, ring, first)
+                        else:
+                            sums = sum_sound(surface, law, fields, touches, pose, ring, first)
+                    else:
+                        sums = sum_ring(surface, law, fields, touches, pose, ring, first)
                     if wp.static(variant.bends):
-                        touches.sums[slot * surface.rings + index] = sums
+                        keep_sums(touches, slot * surface.rings + index, sums)
                     load.force += sums.force
                     load.moment += sums.moment
                     load.damped = load.damped or sums.slopes > zero
@@ -222,7 +268,10 @@ def build(variant: Variant) -> SimpleNamespace:
             load.damping_vw = half * resistances.damping_vw(slopes)
             load.damping_ww = half * resistances.damping_ww(slopes)
             if wp.static(variant.degrades):
-                memories.settle(plate, fields, window, found.box)
+                if weakens(window):
+                    memories.settle(plate, fields, window, found.box)
         return load
 
-    return SimpleNamespace(Fields=Fields, Touches=Touches, open_window=open_window, load_on=load_on)
+    return SimpleNamespace(
+        Fields=Fields, Touches=Touches, open_window=open_window, clear_sums=clear_sums, load_on=load_on
+    )

@@ -95,11 +95,24 @@ def build(variant: Variant) -> SimpleNamespace:
         a.ll += b.ll
         return a
 
+    @wp.func
+    def joined(a: Sums, b: Sums):
+        """Sums over a ring in two layers."""
+        a.force += b.force
+        a.moment += b.moment
+        a.slopes += b.slopes
+        a.slopes_c += b.slopes_c
+        a.slopes_s += b.slopes_s
+        a.slopes_cc += b.slopes_cc
+        a.slopes_cs += b.slopes_cs
+        return a
+
     return SimpleNamespace(
         Sums=Sums,
         Slopes=Slopes,
         slopes_of=slopes_of,
         added=added,
+        joined=joined,
         damping_vv=damping_vv,
         damping_vw=damping_vw,
         damping_ww=damping_ww,

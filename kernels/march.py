@@ -1,11 +1,11 @@
-"""The march of a core through the plate, from the first touch of the front face to the end of contact."""
+"""The march of a core through the target, from the first touch of the front face to the end of contact."""
 
 from functools import cache
 from types import SimpleNamespace
 
 import warp as wp
 
-from . import bending, contact, core_surface, damping, footprint, interaction, nodal, plate_grid, rigid_body
+from . import bending, contact, core_surface, damping, footprint, interaction, layers, nodal, plate_grid, rigid_body
 from . import shots as conditions
 from . import trace as tracing
 from .status import Status
@@ -21,12 +21,14 @@ def build(variant: Variant) -> SimpleNamespace:
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
+    stacked = layers.build(variant)
     scheme = (nodal if variant.nodal else contact).build(variant)
     Surface, Pose, Plate, Law = surfaces.Surface, surfaces.Pose, grid.Plate, laws.Law
     Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Fields, Footprint, Touches = scheme.Fields, prints.Footprint, contact.build(variant).Touches
     Sections, Bending = bends.Sections, bends.Bending
     Shots, Pace, own = launch.Shots, launch.Pace, launch.own
+    Layers, Stack, Passage, Reached = stacked.Layers, stacked.Stack, stacked.Passage, stacked.Reached
     PERFORATED, ARRESTED, RICOCHETED = (
         wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
     )
@@ -107,11 +109,14 @@ def build(variant: Variant) -> SimpleNamespace:
         law: Law,
         shots: Shots,
         pace: Pace,
+        target: Layers,
         # scratch
         fields: Fields,
         touches: Touches,
+        stack: Stack,
         # outputs
         outcomes: Outcomes,
+        passage: Passage,
         bending: wp.array(dtype=Bending),
         trace: wp.array2d(dtype=real),
     ):
@@ -125,19 +130,27 @@ def build(variant: Variant) -> SimpleNamespace:
         max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
         slot = wp.tid() % slots
         thickness = real(own(shots.thickness, shot))
-        window = scheme.open_window(plate, thickness, fields, slot, own(shots.hit_y, shot), own(shots.hit_z, shot))
+        if wp.static(variant.layered):
+            stacked.begin(target, stack, passage, slot, shot)
+            reached = Reached()
+            straight = launch.line_of_flight(shots, shot)
+            flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
+        else:
+            window = scheme.open_window(plate, thickness, fields, slot, own(shots.hit_y, shot), own(shots.hit_z, shot))
         state = launch.launch_state(surface, body, shots, shot)
         axis = motion.axis_of(state.attitude)
         initial_energy = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
         # Positions are those of mid-step from here on: kicks at mid-step, exact drifts between them.
         state = motion.drift(body, state, half * dt)
         status = int(RUNNING)
-        if grid.clearance(plate, window) > reach_of(surface, thickness, state):
-            status = int(MISSED)
+        if wp.static(not variant.layered):
+            if grid.clearance(plate, window) > reach_of(surface, thickness, state):
+                status = int(MISSED)
         touched = bool(False)
         if wp.static(variant.bends):
             worst = Bending()
         contact_steps = int(0)
+        skipped = real(0.0)  # time between layers that no step counts
         last = Change()
         before_last = Change()
         step = int(0)
@@ -147,16 +160,43 @@ def build(variant: Variant) -> SimpleNamespace:
             # The closing speeds are those at mid-step, if this step changes the velocities as much as the last one did.
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
-            found = prints.footprint_of(surface, plate, window, pose, dt)
-            status = ended(surface, body, state, pose, found, touched, initial_energy, window.thickness)
+            if wp.static(variant.layered):
+                found, reached = stacked.reach(
+                    surface,
+                    body,
+                    target,
+                    fields,
+                    stack,
+                    passage,
+                    shots,
+                    slot,
+                    shot,
+                    state,
+                    pose,
+                    reached,
+                    (real(step) + half) * dt + skipped,
+                    flight,
+                    dt,
+                )
+            else:
+                found = prints.footprint_of(surface, plate, window, pose, dt)
+            status = ended(surface, body, state, pose, found, touched, initial_energy, thickness)
             if status == RUNNING:
+                if wp.static(variant.layered):
+                    law.onset_jump = stacked.jump_of(target, shot, reached)
                 law.onset = laws.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
                 law.steadied = wp.where(motion.swings(body, before_last, last), steadied * law.onset, zero)
                 before_last = last
                 load = Load()
                 before = state
+                free = real(0.0)
                 if found.last_ring >= 0:
-                    load = scheme.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
+                    if wp.static(variant.layered):
+                        load = stacked.load_on(
+                            surface, target, law, fields, stack, touches, passage, slot, shot, reached, pose, dt
+                        )
+                    else:
+                        load = scheme.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
                 if load.touching:
                     touched = True
                     contact_steps += 1
@@ -173,13 +213,20 @@ def build(variant: Variant) -> SimpleNamespace:
                     last = Change()
                 if pace.rows > 0:
                     force, moment = motion.mean_load(body, before, load, dt)
-                    traces.record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, force, moment)
-                state = motion.drift(body, state, dt)
+                    now = (real(step) + half) * dt + skipped
+                    traces.record(trace, shot * pace.rows + step, now, state, force, moment)
+                if wp.static(variant.layered):
+                    if found.last_ring < 0:
+                        free = stacked.free_time(surface, target, shot, state, pose, reached, dt)
+                        skipped += free
+                state = motion.drift(body, state, dt + free)
                 step += 1
         if pace.rows > 0:
-            traces.record(trace, shot * pace.rows + step, (real(step) + half) * dt, state, vec3(), vec3())
+            traces.record(trace, shot * pace.rows + step, (real(step) + half) * dt + skipped, state, vec3(), vec3())
         if status == RUNNING:
             status = UNFINISHED
+        if wp.static(variant.layered):
+            stacked.conclude(target, passage, shot, status, reached)
         axis = motion.axis_of(state.attitude)
         outcomes.status[shot] = status
         outcomes.steps[shot] = step
@@ -208,4 +255,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Shots=Shots,
         Outcomes=Outcomes,
         Pace=Pace,
+        Layers=Layers,
+        Stack=Stack,
+        Passage=Passage,
     )

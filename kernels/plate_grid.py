@@ -49,7 +49,8 @@ def build(variant: Variant) -> SimpleNamespace:
         in a window of any size. `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds
         the hit, `tile_y` and `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the
         tile per metre. `thickness` is that of the plate; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative
-        to the hit [m]. (y0, z0) is the place of the node `home` in the literal scheme [m].
+        to the hit [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the
+        fields hold this window, if the target has several layers.
         """
 
         first: wp.int32
@@ -70,6 +71,7 @@ def build(variant: Variant) -> SimpleNamespace:
         high_z: real
         y0: real
         z0: real
+        weakens: wp.bool
 
     @wp.struct
     class Cell:

@@ -25,12 +25,25 @@ class Status(IntEnum):
         return self >= Status.UNFINISHED
 
 
+class LayerStatus(IntEnum):
+    """How a core ended in one layer of a target; codes as in `Status`, and one for a layer that it did not reach."""
+
+    PERFORATED = 0
+    ARRESTED = 1
+    RICOCHETED = 2
+    MISSED = 3
+    UNFINISHED = 4
+    LEFT_WINDOW = 5
+    NOT_FINITE = 6
+    NOT_REACHED = 7
+
+
 _SENTENCES = {
-    Status.PERFORATED: "The core touched the plate and left it through the rear face.",
-    Status.ARRESTED: "The core came to rest in the plate.",
-    Status.RICOCHETED: "The core touched the plate and left it through the front face.",
+    Status.PERFORATED: "The core touched the target and left it through the rear face.",
+    Status.ARRESTED: "The core came to rest in the target.",
+    Status.RICOCHETED: "The core touched the target and left it through the front face.",
     Status.MISSED: "The core passed without touching material.",
-    Status.UNFINISHED: "The core was still in the plate when the step limit was reached.",
+    Status.UNFINISHED: "The core was still in the target when the step limit was reached.",
     Status.LEFT_WINDOW: "The core left the largest window of the plate that memory allows.",
     Status.NOT_FINITE: "The motion became infinite or undefined.",
 }

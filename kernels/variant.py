@@ -26,6 +26,7 @@ class Variant:
         rate_dependent: the normal stress depends on the normal velocity (a1 or a2 > 0).
         rimmed: the plate is finite.
         bends: the core's largest bending moment is recorded.
+        layered: the target has several layers.
     """
 
     double: bool = False
@@ -35,6 +36,7 @@ class Variant:
     rate_dependent: bool = False
     rimmed: bool = False
     bends: bool = False
+    layered: bool = False
 
     @property
     def real(self) -> Any:

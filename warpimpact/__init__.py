@@ -1,5 +1,6 @@
 """Hit maps of hard bullet cores against perforated armour plates.
 
+Everything that a program needs is imported from here, and figures from `warpimpact.plotting`; other modules may change.
 A name is imported at its first use. This keeps ``import warpimpact`` and ``warpimpact --help`` quick.
 """
 
@@ -7,9 +8,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .campaign.campaign import Campaign
-    from .campaign.run import run
+    from .analysis.comparison import Comparison, compare
+    from .campaign.campaign import Campaign, Output
+    from .campaign.plates import read_plates
+    from .campaign.replay import replay
+    from .campaign.run import run, run_to_file
+    from .campaign.stop import Stop
+    from .campaign.team import ClusterError
+    from .campaign.text import CampaignError
     from .export.table import to_dataframe
+    from .results.files import OutputError, ResultError, open_result
     from .scene import (
         CirclePattern,
         ConeCore,
@@ -19,6 +27,7 @@ if TYPE_CHECKING:
         Hits,
         Impact,
         Interaction,
+        Layer,
         MaskPattern,
         NoPattern,
         Numerics,
@@ -33,44 +42,62 @@ if TYPE_CHECKING:
         SlotPattern,
         SquarePattern,
         Target,
+        Tolerance,
         TrianglePattern,
         make_shots,
     )
+    from .solver.device import DeviceError
     from .solver.limit import limit_thickness, limit_velocity
-    from .solver.simulate import simulate
+    from .solver.simulate import Outcomes, simulate
 
     __version__: str
 
 __all__ = [
     "Campaign",
+    "CampaignError",
     "CirclePattern",
+    "ClusterError",
+    "Comparison",
     "ConeCore",
     "Core",
+    "DeviceError",
     "EllipsePattern",
     "HexagonPattern",
     "Hits",
     "Impact",
     "Interaction",
+    "Layer",
     "MaskPattern",
     "NoPattern",
     "Numerics",
     "OgiveCore",
+    "Outcomes",
+    "Output",
+    "OutputError",
     "Plate",
     "PolynomialCore",
     "ProfileCore",
     "Record",
+    "ResultError",
     "Scatter",
     "Scene",
     "Shots",
     "SlotPattern",
     "SquarePattern",
+    "Stop",
     "Target",
+    "Tolerance",
     "TrianglePattern",
     "__version__",
+    "compare",
     "limit_thickness",
     "limit_velocity",
     "make_shots",
+    "open_result",
+    "read_plates",
+    "replay",
     "run",
+    "run_to_file",
     "simulate",
     "to_dataframe",
 ]
@@ -79,10 +106,25 @@ _HOMES = {
     "Campaign": ".campaign.campaign",
     "limit_thickness": ".solver.limit",
     "limit_velocity": ".solver.limit",
+    "CampaignError": ".campaign.text",
+    "ClusterError": ".campaign.team",
+    "Comparison": ".analysis.comparison",
+    "DeviceError": ".solver.device",
+    "Outcomes": ".solver.simulate",
+    "Output": ".campaign.campaign",
+    "OutputError": ".results.files",
+    "ResultError": ".results.files",
+    "Stop": ".campaign.stop",
+    "compare": ".analysis.comparison",
+    "open_result": ".results.files",
+    "read_plates": ".campaign.plates",
+    "replay": ".campaign.replay",
     "run": ".campaign.run",
+    "run_to_file": ".campaign.run",
     "simulate": ".solver.simulate",
     "to_dataframe": ".export.table",
 }
+"""Modules of the names that are not in `warpimpact.scene`."""
 
 
 def __getattr__(name: str) -> Any:
@@ -93,3 +135,7 @@ def __getattr__(name: str) -> Any:
     if name in __all__:
         return getattr(import_module(_HOMES.get(name, ".scene"), __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

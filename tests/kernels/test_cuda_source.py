@@ -11,7 +11,9 @@ from warpimpact.kernels.variant import Variant
 
 
 @pytest.mark.parametrize("stage", [march, free_flight])
-@pytest.mark.parametrize("variant", [Variant(bends=True), Variant(double=True, nodal=True)])
+@pytest.mark.parametrize(
+    "variant", [Variant(bends=True), Variant(double=True, nodal=True), Variant(bends=True, layered=True)]
+)
 def test_kernel_compiles_to_ptx(stage: Any, variant: Variant, tmp_path: Path) -> None:
     kernel = stage.build(variant).kernel
     wp.compile_aot_module(kernel.module, arch=90, use_ptx=True, module_dir=tmp_path)

@@ -7,7 +7,7 @@ import pytest
 
 from warpimpact.kernels.status import Status
 from warpimpact.scene import ConeCore, Impact, Interaction, Numerics, OgiveCore, ProfileCore, Scene
-from warpimpact.solver import arrays
+from warpimpact.solver import materials
 from warpimpact.solver.resolution import resolve
 
 from . import references
@@ -36,7 +36,7 @@ def shoulder_tolerance(fidelity: str, shear_coefficient: float, residual: float)
     resolution = resolve(Numerics(fidelity=fidelity), Scene(core=PAPER_CORE, target=plate))
     velocity, curvature = PAPER_SHOT["velocity"], 2 * abs(references.PAPER_COEFFICIENTS[2])
     step = resolution.step_of(Impact(velocity=velocity), plate)
-    onset = step * arrays.onset_jump(PAPER_CORE, plate.thickness, references.PAPER_MASS, plate.resistance)
+    onset = step * materials.onset_jump(PAPER_CORE, plate.thickness, references.PAPER_MASS, plate.resistance)
     ring, ramp = PAPER_CORE.length / resolution.patches_axial, onset / (velocity * curvature)
     length = ring / 2 + ramp / 2
     projected = curvature * ((ring / 2) ** 2 / 2 + ramp**2 / 6)

@@ -62,6 +62,9 @@ def outcomes_of(status: np.ndarray) -> SimpleNamespace:
         pitch=angles - 0.2,
         yaw=0.2 - angles,
         total_yaw=angles,
+        exit_velocity=np.stack([600.0 * ramp, 10.0 * ramp, -20.0 * ramp], axis=-1),
+        exit_axis=np.stack([1.0 + 0.0 * ramp, 0.0 * ramp, 0.0 * ramp], axis=-1),
+        exit_position=np.stack([0.02 + 0.0 * ramp, 1e-3 * ramp, -1e-3 * ramp], axis=-1),
     )
 
 
@@ -69,7 +72,9 @@ def outcomes_of(status: np.ndarray) -> SimpleNamespace:
 def make_result() -> ResultMaker:
     """A function of status (or of a count of perforating hits) that builds the Dataset."""
 
-    def make(status: Any = 4, hits: np.ndarray | None = None, pattern: AnyPattern = SQUARE_HOLE) -> xarray.Dataset:
+    def make(
+        status: Any = 4, hits: np.ndarray | None = None, pattern: AnyPattern = SQUARE_HOLE, double: bool = False
+    ) -> xarray.Dataset:
         status = np.zeros(status, np.int8) if np.ndim(status) == 0 else np.asarray(status)
         hits = scattered_hits(len(status)) if hits is None else hits
         plate = Plate(thickness=4e-3, resistance=2.6e9, pattern=pattern)
@@ -84,6 +89,7 @@ def make_result() -> ResultMaker:
                 "campaign": "[core]\n",
                 "seed": 7,
             },
+            double=double,
         )
 
     return make
@@ -134,6 +140,10 @@ def _assert_same_bits(one: Path, other: Path) -> None:
             assert variable[...].tobytes() == b[name][...].tobytes(), name
             assert variable.dimensions == b[name].dimensions
             assert str(variable.__dict__) == str(b[name].__dict__)
+        assert a.groups.keys() == b.groups.keys()
+        for group in a.groups:
+            for name, variable in a[group].variables.items():
+                np.testing.assert_array_equal(variable[...], b[group][name][...], err_msg=name)
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from warpimpact.analysis.effects import Effect, effects
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_reference
 from warpimpact.results.measures import dealing
 from warpimpact.statistics.comparisons import Ratio
@@ -41,7 +42,7 @@ class Measure:
         low, high: its confidence interval; none of a worst point, as what lies between the hits may be worse.
         solid: the same of the solid plate of equal areal density.
         ratio, ratio_low, ratio_high: the value as a multiple of that.
-        hit: which hit is the worst point; None of anything else.
+        hit: number of the hit that is the worst point; None of anything else.
     """
 
     name: str
@@ -124,7 +125,7 @@ def gather(
             yield _averaged(effect, _MEAN, values, solid, dealt)
             worst = None if solid is None else worst_tenth(solid)
             yield _averaged(effect, _WORST_TENTH, worst_tenth(values), worst, dealt)
-            yield _worst_point(effect, values, solid)
+            yield _worst_point(effect, values, solid, dataset)
 
 
 def _averaged(
@@ -138,11 +139,12 @@ def _averaged(
     return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers, solid)
 
 
-def _worst_point(effect: Effect, values: Array, solid: Array | None) -> Evidence:
+def _worst_point(effect: Effect, values: Array, solid: Array | None, dataset: xarray.Dataset) -> Evidence:
     """The measure that is the largest value."""
     known = ~np.isnan(values)
-    hit = int(np.argmax(np.where(known, values, -math.inf))) if known.any() else None
-    estimate = _without_interval(math.nan if hit is None else float(values[hit]))
+    place = int(np.argmax(np.where(known, values, -math.inf))) if known.any() else None
+    estimate = _without_interval(math.nan if place is None else float(values[place]))
+    hit = None if place is None else int(dataset[v.HIT][place])
     largest = None if solid is None else np.atleast_1d(np.fmax.reduce(solid))
     against = Ratio.of(estimate, values, largest, {})
     return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None, None)

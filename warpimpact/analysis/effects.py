@@ -50,7 +50,7 @@ class Effect:
     def over(self, dataset: xarray.Dataset) -> Array:
         """Values of all shots, shape [hits]; of an open file a slice is in memory at a time."""
         needed = [name for name in _NEEDED if name in dataset]
-        return np.concatenate([self.values(part) for part in slices(dataset[needed])])
+        return np.concatenate([self.values(part) for part in slices(dataset[needed].drop_vars(v.HIT, errors="ignore"))])
 
 
 def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) -> Iterator[Effect]:
@@ -134,14 +134,14 @@ def _of_passed(part: xarray.Dataset, values: Array, otherwise: float) -> Array:
 
 
 def _energy_fraction(part: xarray.Dataset) -> Array:
-    fraction = (part[v.RESIDUAL_VELOCITY].values / part[v.IMPACT_VELOCITY].values) ** 2
+    fraction = (part[v.RESIDUAL_VELOCITY].values.astype(float) / part[v.IMPACT_VELOCITY].values) ** 2
     return _of_passed(part, fraction, 0.0)
 
 
 def _inclination(part: xarray.Dataset, standoff: float) -> Array:
     """Between axis and line of fire, nose or base first alike [degree], shape [hits]."""
-    tilt = part[v.TILT].sel(standoff=standoff, method="nearest").values
-    return np.minimum(tilt, 180.0 - tilt)
+    tilt = part[v.TILT].sel(standoff=standoff, method="nearest").values.astype(float)
+    return np.asarray(np.minimum(tilt, 180.0 - tilt))
 
 
 def _energy_density(core: Core, standoff: float) -> Callable[[xarray.Dataset], Array]:
@@ -151,7 +151,7 @@ def _energy_density(core: Core, standoff: float) -> Callable[[xarray.Dataset], A
 
     def values(part: xarray.Dataset) -> Array:
         mass = part[v.MASS].values if v.MASS in part else core.mass_properties.mass
-        energy = 0.5 * mass * part[v.RESIDUAL_VELOCITY].values ** 2
+        energy = 0.5 * mass * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2
         return _of_passed(part, energy / np.interp(_inclination(part, standoff), table, silhouette), 0.0)
 
     return values

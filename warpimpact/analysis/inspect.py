@@ -24,7 +24,7 @@ from warpimpact.analysis.summary import (
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed
+from warpimpact.results.dataset import failed, hit_numbers
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.statistics.intervals import Estimate
 
@@ -96,13 +96,12 @@ def _unconverged(dataset: xarray.Dataset) -> Iterator[str]:
         return
     names = [v.CONVERGED, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR]
     found: list[tuple[float, float, int]] = []
-    first = 0
     for part in slices(dataset[names]):
         velocity, tilt = part[v.RESIDUAL_VELOCITY_ERROR].values, part[v.TILT_ERROR].values.max(axis=1)
         places = np.flatnonzero(part[v.CONVERGED].values == 0)
-        found += [(float(velocity[place]), float(tilt[place]), first + int(place)) for place in places]
-        first += part.sizes["hit"]
-    yield f"{len(found)} of {first} hits did not reach the tolerance at the finest level"
+        numbers = hit_numbers(part)
+        found += [(float(velocity[place]), float(tilt[place]), int(numbers[place])) for place in places]
+    yield f"{len(found)} of {dataset.sizes['hit']} hits did not reach the tolerance at the finest level"
     for velocity_error, tilt_error, hit in sorted(found, reverse=True)[:_WORST]:
         yield f"  hit {hit}: estimated errors {velocity_error:.2g} m/s and {tilt_error:.2g} deg"
 
@@ -121,7 +120,7 @@ def _row(measure: Measure, estimate: Estimate) -> str:
 def failures(dataset: xarray.Dataset) -> Iterator[str]:
     """Every shot whose computation failed: its number, status and inputs."""
     inputs = [v.HIT_Y, v.HIT_Z, *v.shot_variables(dataset)]
-    first = count = 0
+    count = 0
     for part in slices(dataset[[v.STATUS, *inputs]]):
         for place in np.flatnonzero(failed(part)):
             shot = part.isel(hit=place)
@@ -129,9 +128,8 @@ def failures(dataset: xarray.Dataset) -> Iterator[str]:
                 yield "failed shots: " + ", ".join(["hit", "status", *(_labelled(dataset, name) for name in inputs)])
             count += 1
             values = "".join(f"{float(shot[name]):>14.6g}" for name in inputs)
-            yield f"{first + place:>10d}  {Status(int(shot[v.STATUS])).name.lower():<14}{values}"
-        first += part.sizes["hit"]
-    yield f"{count} of {first} shots failed"
+            yield f"{int(hit_numbers(part)[place]):>10d}  {Status(int(shot[v.STATUS])).name.lower():<14}{values}"
+    yield f"{count} of {dataset.sizes['hit']} shots failed"
 
 
 def _labelled(dataset: xarray.Dataset, name: str) -> str:

@@ -13,7 +13,7 @@ import xarray
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import status_codes
+from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
 from warpimpact.solver.promise import PROMISES
 from warpimpact.statistics.intervals import Estimate
@@ -124,6 +124,11 @@ _SAMPLINGS = {
 def sampling_note(dataset: xarray.Dataset) -> str:
     """What there is to say of the intervals of a result because of its sampling, if anything."""
     told = dataset.attrs
+    if is_choice(dataset):
+        return (
+            f"These are {dataset.sizes['hit']} chosen hits of a larger result. All numbers describe them alone, and "
+            "intervals are those of independent shots."
+        )
     return _SAMPLINGS.get(told.get(attr.SAMPLING, ""), "") if told.get(attr.REPLICATES, 1) == 1 else ""
 
 

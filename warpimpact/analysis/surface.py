@@ -65,7 +65,7 @@ def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     middle, wide = (station[1:] + station[:-1]) / 2, (radius[1:] + radius[:-1]) / 2
 
     def combined(axial: Array, radial: Array) -> Array:
-        return axial[:, None, None] * np.array([1.0, 0.0, 0.0]) + radial[:, None, None] * ring
+        return np.asarray(axial[:, None, None] * np.array([1.0, 0.0, 0.0]) + radial[:, None, None] * ring)
 
     area = np.broadcast_to((slant * wide * 2.0 * np.pi / AROUND)[:, None], (len(middle), AROUND))
     return combined(middle, wide), combined(outward / slant, along / slant), area
@@ -77,10 +77,10 @@ def _left(history: xarray.Dataset, step: int, point: Array) -> Array:
     Between snapshots the logarithm is interpolated, because it is proportional to the exposure.
     """
     share = history[v.RESISTANCE_SHARE]
-    spent = xarray.where(share > _SPENT, share, _SPENT)
+    spent = share.where(share > _SPENT, _SPENT)
     now = np.exp(xarray.apply_ufunc(np.log, spent).interp(snapshot=history[v.TIME][step]))
     cells = {v.CELL[axis]: (("section", "around"), point[..., k]) for k, axis in ((1, "y"), (2, "z"))}
-    return np.nan_to_num(now.interp(cells).values)
+    return np.asarray(np.nan_to_num(now.interp(cells).values))
 
 
 def _turned(turn: Rotation, vectors: Array) -> Array:

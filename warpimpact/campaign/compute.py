@@ -8,6 +8,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import solid_dataset, to_dataset
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import solid_coordinates, to_dataset
 from warpimpact.scene import Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
@@ -72,17 +74,20 @@ def compute(
             attr.CAMPAIGN: campaign.text,
             attr.CAMPAIGN_ANGLES: "degree",
             **attr.versions(),
+            **attr.machine(),
             attr.DEVICE: f"{chosen.alias} ({chosen.name})",
             attr.SAMPLING: campaign.hits.sampling,
             attr.SEED: campaign.hits.seed,
             attr.REPLICATES: campaign.replicates,
             attr.STANDOFF_POINT: campaign.output.standoff_point,
             attr.OPEN_AREA: campaign.plate.open_area,
-            attr.AREAL_DENSITY: campaign.plate.areal_density,
+            attr.AREAL_DENSITY: campaign.target.areal_density,
             attr.CORE: campaign.core.model_dump_json(),
+            attr.PLATE: _plate(campaign),
             attr.IMPACT: _impact(campaign),
             attr.MATERIAL: _material(campaign),
             attr.NUMERICS: _numerics(campaign, numerics, shots),
+            **_numbers_of(campaign, numerics, shots),
             attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
             attr.FAILED_SHARE: campaign.output.failed_share,
             attr.COMPUTE_TIME: elapsed,
@@ -93,14 +98,33 @@ def compute(
         | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {})
         | ({} if promise is None else _promised(promise)),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
+        double=is_double(campaign),
     )
+    if not campaign.output.exit_state:
+        dataset = dataset.drop_vars(v.EXIT_VARIABLES)
     if solid is None:
         return dataset
-    thinner = campaign.plate.solid
-    if solid.thickness is not None:
-        solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
-    reference = scene.model_copy(update={"target": thinner})
-    return dataset.merge(solid_dataset(_outcomes(reference, solid, numerics, device, threads)[0]))
+    solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
+    outcomes, _ = _outcomes(reference, solid, numerics, device, threads)
+    return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
+
+
+def is_double(campaign: Campaign) -> bool:
+    """Whether it is computed, and stored, in double precision."""
+    return campaign.numerics.precision == "double"
+
+
+def _at_solid(campaign: Campaign, shots: Shots) -> Shots:
+    """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
+    target, plate = campaign.target, campaign.plate
+    own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}
+    if shots.thickness is None and shots.layer_thickness is None:
+        return replace(shots, **own)
+    thickness = shots.own("thickness", plate.thickness) * (plate.solid.thickness / plate.thickness)
+    for k, layer in enumerate(target.layers):
+        share = layer.areal_density / layer.thickness / plate.density
+        thickness = thickness + share * shots.own_of_layer("thickness", k, layer.thickness)
+    return replace(shots, **own, thickness=np.broadcast_to(thickness, len(shots)).copy())
 
 
 def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
@@ -183,6 +207,14 @@ def _material(campaign: Campaign) -> str:
     return json.dumps(of_plate | campaign.interaction.model_dump())
 
 
+def _plate(campaign: Campaign) -> str:
+    """The plate as JSON; of a mask, the name of its file."""
+    told = campaign.plate.model_dump(mode="json")
+    if isinstance(file := told["pattern"].get("file"), str):
+        told["pattern"]["file"] = Path(file).name
+    return json.dumps(told)
+
+
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
     """Symmetries by which hits were unfolded, and the number of computed hits."""
     return {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
@@ -210,7 +242,24 @@ def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
-        f"time_step {resolution.step_of(impact, campaign.plate):.4g} s, "
+        f"time_step {resolution.step_in(impact, campaign.target):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
     )
+
+
+def _numbers_of(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -> dict[str, Any]:
+    """The numerics in force as numbers, by the names of attributes."""
+    precision = {attr.PRECISION: "double" if is_double(campaign) else "single"}
+    if (tolerance := campaign.numerics.tolerance) is not None:
+        return precision | {
+            attr.TOLERANCE_RESIDUAL_VELOCITY: tolerance.residual_velocity,
+            attr.TOLERANCE_TILT: math.degrees(tolerance.tilt),
+        }
+    resolution = resolve(numerics, campaign.scene, shots.columns)
+    return precision | {
+        attr.PATCHES_AXIAL: resolution.patches_axial,
+        attr.PATCHES_AROUND: resolution.patches_around,
+        attr.GRID_SPACING: resolution.grid_spacing,
+        attr.TIME_STEP: resolution.step_of(campaign.impact, campaign.plate),
+    }

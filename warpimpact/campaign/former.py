@@ -5,7 +5,7 @@ from typing import Any
 
 from ..results.measures import Measure
 from ..scene.units import in_radians
-from .campaign import parsed
+from .text import parsed
 
 _OF_THE_SHOT = ("obliquity", "azimuth", "pitch", "yaw")
 _PURE_NUMBERS = ("distribution", "sigma", "weights")

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import re
 import shutil
 import warnings
@@ -27,6 +28,8 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
+
+_logger = logging.getLogger(__name__)
 
 _MANIFEST = "manifest.json"
 _SHARDS = "hits_*.nc"
@@ -267,8 +270,9 @@ class Parts:
         def named(written: Path) -> Path:
             return placed.setdefault(index, self._named(index, written))
 
-        files.write(dataset, self.folder / f"{self._stem(index)}.nc", named=named)
+        files.write(dataset, self.folder / f"{self._stem(index)}.nc", named=named, compressed=False)
         self.saved |= placed
+        _logger.info("shard %d of %d saved: %d hits", index + 1, self.count, dataset.sizes["hit"])
 
     def kept(self) -> int:
         """Shards on the disk, one included that an interrupt has kept from being counted."""
@@ -293,6 +297,7 @@ class Parts:
         """
         paths = [self._path(index) for index in range(count)]
         files.join(paths, self.output, {**attributes(self.load(0)), attr.FINGERPRINT: self._fingerprint})
+        _logger.info("%d shards joined into %s", count, self.output)
         self.discard()
 
     def discard(self) -> None:

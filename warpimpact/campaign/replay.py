@@ -9,11 +9,11 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import promise_in
+from warpimpact.campaign.compute import is_double, promise_in
 from warpimpact.campaign.former import in_present_terms
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import history_dataset, to_dataset
+from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
 from warpimpact.results.files import ResultError
 from warpimpact.scene import Numerics
 from warpimpact.solver import simulate
@@ -26,15 +26,15 @@ ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 _OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES)
 
 
-def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
+def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xarray.Dataset:
     """Compute one hit of a result again, on the CPU, from the campaign that the result contains.
 
     If symmetry unfolded the hit, the computed hit of its group is computed again and its history is unfolded.
 
     Args:
         result: the Dataset of `run`.
-        hit: its index in the result.
-        folder: folder of the files that the campaign names.
+        hit: its number, which in a choice of the hits is still that of the whole result.
+        folder: folder of the files that the campaign names, if it names any.
 
     Returns:
         The Dataset of `results.history_dataset`. Its attribute `agreement` compares its end with the stored
@@ -44,24 +44,27 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
         ResultError: there is no such hit, or the campaign and its files now give another one.
         CampaignError: the campaign in the result cannot be read, for example because a file that it names is missing.
     """
-    hits = result.sizes["hit"]
-    if not 0 <= hit < hits:
-        raise ResultError(f"hit: got {hit}, but the result has hits 0 to {hits - 1}")
-    campaign = _campaign(result, folder)
+    hits, numbers = result.sizes["hit"], hit_numbers(result)
+    places = np.flatnonzero(numbers == hit)
+    if not len(places):
+        choice = "hits" if numbers.max() - numbers.min() + 1 == hits else f"{hits} of the hits"
+        raise ResultError(f"hit: got {hit}, but the result has {choice} {numbers.min()} to {numbers.max()}")
+    place = int(places[0])
+    campaign = _campaign(result, Path(folder))
     sampler = campaign.sampler()
-    if len(sampler) != hits and (campaign.stop is None or len(sampler) < hits):
-        raise ResultError(f"got a result with {hits} hits, but its campaign and the files it names give {len(sampler)}")
+    if hit >= len(sampler):
+        raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
     scene, group = campaign.scene, campaign.symmetries
     image = hit % len(group)
     images = sampler.shots(hit - image, len(group))
     computed, shot = images[:1], images[image:][:1]
-    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, hit))
+    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place))
     home, away = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
-    end = to_dataset(scene, shot, again.outcomes, period=campaign.hits.covered(campaign.plate), attributes={}).isel(
-        hit=0
-    )
-    stored = result.isel(hit=hit)
+    period, double = campaign.hits.covered(campaign.plate), is_double(campaign)
+    ended = to_dataset(scene, shot, again.outcomes, period=period, attributes={}, double=double)
+    end = numbered(ended, hit).isel(hit=0)
+    stored = result.isel(hit=place)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
         former = campaign.hits.file is not None and attr.CAMPAIGN_ANGLES not in result.attrs
         why = "; angles in a hit list are degrees now, and were radians when the result was computed" if former else ""
@@ -78,10 +81,10 @@ def replay(result: xarray.Dataset, hit: int, *, folder: Path) -> xarray.Dataset:
     return history_dataset(scene, end, again, attributes=attributes)
 
 
-def _numerics(campaign: Campaign, result: xarray.Dataset, hit: int) -> Numerics | Fidelity:
+def _numerics(campaign: Campaign, result: xarray.Dataset, place: int) -> Numerics | Fidelity:
     """What the hit was computed with: of a run to a tolerance, the level that it ended on."""
     if campaign.numerics.tolerance is not None:
-        return level(int(result[v.LEVEL][hit]), campaign.numerics)
+        return level(int(result[v.LEVEL][place]), campaign.numerics)
     promise = promise_in(result)
     return campaign.numerics if promise is None else promise.fidelity
 
@@ -102,12 +105,12 @@ def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:
-    """Whether variables agree in every bit; NaN equals NaN."""
-    return all(np.array_equal(one[name], other[name], equal_nan=True) for name in names)
+    """Whether variables agree in every bit of the first; NaN equals NaN. Version 0.1.0 stored singles as doubles."""
+    return all(np.array_equal(one[name], other[name].astype(one[name].dtype), equal_nan=True) for name in names)
 
 
 def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:
-    if _same(end, stored, tuple(v.outcome_variables(end))):
+    if _same(end, stored, tuple(name for name in v.outcome_variables(end) if name in stored)):
         return "bit-identical"
     close = all(
         np.allclose(end[name], stored[name], rtol=0.0, atol=tolerance, equal_nan=True)

@@ -20,7 +20,7 @@ from warpimpact.campaign.parts import Parts, claimed, extent, manifest
 from warpimpact.campaign.team import Team, local_team
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images
+from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Shots
@@ -220,10 +220,11 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
     """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
     differ but in where they hit."""
     plate = campaign.plate
-    if not campaign.output.solid_reference or plate.solid == plate:
+    if not campaign.output.solid_reference or campaign.target.solid == plate:
         return None
-    conditions = [values for name, values in shots.columns.items() if name not in (v.HIT_Y, v.HIT_Z)]
-    alike = plate.size is None and not any(np.ptp(values) for values in conditions)
+    elsewhere = (v.HIT_Y, v.HIT_Z, "layer_offset_y", "layer_offset_z")
+    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
+    alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     return shots[: 1 if alike else _MOST_SOLID]
 
 
@@ -244,12 +245,12 @@ def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
 
 def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[int, xarray.Dataset]]:
     """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
-    the solid reference."""
-    hits = dataset.sizes["hit"]
+    what is said once."""
+    hits, of_the_campaign = dataset.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
     for place, index in enumerate(task):
-        shard = dataset.isel(hit=slice(place * size, (place + 1) * size))
+        shard = numbered(dataset.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
         if index:
-            shard = shard.drop_dims("solid_hit", errors="ignore")
+            shard = shard.drop_vars(of_the_campaign, errors="ignore")
         time = dataset.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
         yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | _computed(dataset, shard.sizes["hit"]))
 

@@ -13,7 +13,8 @@ class Stop(Model):
     """When a run ends: as soon as a confidence interval is narrow enough.
 
     Attributes:
-        quantity: see `Measure.parse`.
+        quantity: `mean(v)`, `quantile(v, 0.05)`, `P(v > limit)` or `P(status)`; v is a variable of the result, with
+            its stand-off if it has one, such as `tilt@130mm`.
         half_width: largest half width of the interval, SI; that of an angle is given in degrees or with its unit.
         confidence: of the interval.
         max_count: number of shots after which the run ends in any case.

@@ -159,7 +159,7 @@ def cluster_team(
 def _ignoring_interrupts(plugin: Any) -> Any:
     """Plugin of workers on this machine, which Ctrl-C reaches, too: this process is the one that ends them."""
 
-    class Ignoring(plugin):
+    class Ignoring(plugin):  # type: ignore[misc]  # imported with Dask only
         def setup(self, worker: Any) -> None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 

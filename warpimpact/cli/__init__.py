@@ -18,11 +18,15 @@ from .export import add_export, add_report
 from .identify import add_identify
 from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
+from .progress import told as progress_told
 from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
+from .start import add_completion, add_examples, add_new, add_schema
 
 _COMMANDS = (
+    add_examples,
+    add_new,
     add_run,
     add_inspect,
     add_plot,
@@ -34,6 +38,8 @@ _COMMANDS = (
     add_study,
     add_validate,
     add_identify,
+    add_schema,
+    add_completion,
 )
 """In the order of the help."""
 
@@ -44,9 +50,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     This is the one boundary for errors: each of them ends here in one sentence, never in a traceback.
     """
-    arguments = _parser().parse_args(argv)
+    arguments = parser().parse_args(argv)
     try:
-        with redirect_stdout(Plain(sys.stdout)), implausible_told():
+        loud = progress_told(verbose=arguments.verbose, quiet=arguments.quiet)
+        with redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
             code: int | None = arguments.command(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
@@ -64,14 +71,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code or 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def parser() -> argparse.ArgumentParser:
+    """The parser of the command line, with all commands; the documentation is made from it."""
+    program = argparse.ArgumentParser(
         prog="warpimpact",
         description="Hit maps of hard bullet cores against perforated armour plates.",
         epilog="example: warpimpact run campaigns/slotted_plate.toml && warpimpact plot slotted_plate.nc",
     )
-    parser.add_argument("--version", action="version", version=f"warpimpact {__version__}")
-    commands = parser.add_subparsers(metavar="COMMAND", required=True)
+    program.add_argument("--version", action="version", version=f"warpimpact {__version__}")
+    commands = program.add_subparsers(metavar="COMMAND", required=True)
     for add in _COMMANDS:
         add(commands)
-    return parser
+    return program

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from .plain import say
+from .plain import Plain, say
 
 if TYPE_CHECKING:
     from warpimpact.campaign.run import Standing
@@ -18,6 +18,36 @@ _LONGEST_SILENCE = 600.0
 """Longest time between two lines of a log [s]."""
 
 
+_quiet = False
+
+
+@contextmanager
+def told(*, verbose: int, quiet: bool) -> Iterator[None]:
+    """What a command tells beside its output and its warnings.
+
+    Args:
+        verbose: 1 shows the log of the package from INFO on, 2 from DEBUG on.
+        quiet: whether no progress is shown.
+    """
+    global _quiet
+    _quiet = quiet
+    if not verbose:
+        yield
+        return
+    import logging
+
+    logger, handler = logging.getLogger("warpimpact"), logging.StreamHandler(Plain(sys.stderr))
+    handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s", "%H:%M:%S"))
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO if verbose == 1 else logging.DEBUG)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
+
+
 def warn(sentence: str) -> None:
     """Say on the terminal or in the log what a person should know, though the command goes on."""
     say(f"warning: {sentence}")
@@ -26,6 +56,9 @@ def warn(sentence: str) -> None:
 @contextmanager
 def show_standing() -> "Iterator[Callable[[Standing], None]]":
     """Show the progress of a run, with its running estimates."""
+    if _quiet:
+        yield lambda standing: None
+        return
     if not sys.stderr.isatty():
         yield _log_standing()
         return
@@ -85,6 +118,9 @@ def _running(standing: "Standing") -> str:
 @contextmanager
 def show_count() -> Iterator[Callable[[int, int], None]]:
     """Show how many of the hits are done."""
+    if _quiet:
+        yield lambda done, total: None
+        return
     if not sys.stderr.isatty():
         yield _log_count()
         return

@@ -39,7 +39,7 @@ def _in_a_hole(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
 
 
 def _on_material(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
-    return ~_in_a_hole(plate, core, y, z)
+    return np.logical_not(_in_a_hole(plate, core, y, z))
 
 
 def _on_an_edge(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
@@ -49,7 +49,7 @@ def _on_an_edge(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
         _in_a_hole(plate, core, y + core.max_radius * np.cos(one), z + core.max_radius * np.sin(one)) for one in angles
     ]
     holes = np.sum([*around, _in_a_hole(plate, core, y, z)], axis=0)
-    return (holes > 0) & (holes < len(around) + 1)
+    return np.asarray((holes > 0) & (holes < len(around) + 1))
 
 
 CLASSES: dict[str, Callable[[Plate, Core, Array, Array], BoolArray]] = {

@@ -188,4 +188,4 @@ def _drawn(weights: Array, rng: np.random.Generator) -> NDArray[np.int64]:
     drawn: NDArray[np.int64] = np.stack(
         [np.searchsorted(end, at, side="right") for end, at in zip(ends, places, strict=True)]
     )
-    return np.minimum(drawn, weights.shape[1] - 1)
+    return np.asarray(np.minimum(drawn, weights.shape[1] - 1))

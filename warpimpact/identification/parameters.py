@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene import AnyCore, Interaction, Plate
 from warpimpact.scene.model import Array, Model
-from warpimpact.scene.scatter import EDGE, AnyDistribution, Distribution, in_si
+from warpimpact.scene.scatter import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from warpimpact.scene.units import quoted
 from warpimpact.solver.resolution import decay_rate
 
@@ -103,7 +103,7 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
         FitError: names the place.
     """
     try:
-        return _DISTRIBUTION.validate_python(in_si(read, dict(given)))
+        return _DISTRIBUTION.validate_python({name: _in_si(read, name, part) for name, part in given.items()})
     except ValidationError as error:
         told = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in told["loc"] if part != given.get("distribution"))
@@ -111,6 +111,16 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
         raise FitError(f"{place}{'.' if where else ''}{where}: got {quoted(dict(given))}, but: {complaint}") from None
     except ValueError as error:
         raise FitError(f"{place}.{error}") from None
+
+
+def _in_si(read: Any, name: str, part: Any) -> Any:
+    """A parameter of a distribution, which may have the unit of its quantity."""
+    if name in PURE_NUMBERS:
+        return part
+    try:
+        return [read(one) for one in part] if isinstance(part, list) else read(part)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
 
 
 def is_distribution(value: Any) -> bool:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from warpimpact.campaign.campaign import _sentence
+from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.identification.fit import Fit, MeasuredShot, Sampling
 from warpimpact.identification.hits import CLASSES, read_hit
@@ -110,7 +110,7 @@ def _model(kind: Any, data: Any, place: str) -> Any:
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        raise FitError(f"{place}: {_sentence(error, data)}") from None
+        raise FitError(f"{place}: {sentence(error, data)}") from None
 
 
 def _shot(given: Any, tables: Mapping[str, Any], record: Record, place: str, parameters: list[Parameter]) -> Any:
@@ -218,7 +218,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
             scene = fit.scene_of(shot)
             check_bending(fit.record, fit.numerics)
         except ValueError as error:
-            told = _sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
+            told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
             raise FitError(f"{where}: {told}") from None
         _check_hit(shot, scene, where)
         has_limit = any(one.is_limit for one in shot.observations)
@@ -230,7 +230,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
                 if has_limit:
                     check_arrests(reached)
             except ValueError as error:
-                told = _sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
+                told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
                 at = ", ".join(f"{dotted(path)} = {value:.4g}" for path, value in values.items())
                 raise FitError(
                     f"{where}: the priors reach {at} (SI), which is not possible: {told}; bound them, as uniform or "

@@ -22,7 +22,7 @@ from scipy.spatial import KDTree
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import passed, status_codes
+from warpimpact.results.dataset import outlines, passed, status_codes
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -87,7 +87,7 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None)
         title += f", {float(array[v.STANDOFF]) * _MM:g} mm behind the plate"
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
-    values = np.where(exists, array.values * factor, np.nan)
+    values = np.where(exists, array.values.astype(np.float64) * factor, np.nan)
     return Shown(values, f"{words(variable)} [{unit.strip()}]", title, variable in _SIGNED)
 
 
@@ -180,11 +180,12 @@ def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
     """
     (left, right), (bottom, top) = limits(dataset)
     axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="hit y [mm]", ylabel="hit z [mm]", aspect="equal")
-    if not dataset.sizes["vertex"]:
+    holes = outlines(dataset)
+    if not len(holes["y"]):
         return []
     (edge,) = axes.plot(
-        dataset[v.OUTLINE_Y] * _MM,
-        dataset[v.OUTLINE_Z] * _MM,
+        holes["y"] * _MM,
+        holes["z"] * _MM,
         color="white",
         linewidth=1.2,
         path_effects=[Stroke(linewidth=2.8, foreground="black"), Normal()],

@@ -66,7 +66,8 @@ def _extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
     """Drawn extent along y and z [m]; that of an unbounded plate is at least twice the core's diameter."""
     if plate.size is not None:
         return np.array(plate.size)
-    return np.maximum(_CELLS * np.array(plate.pattern.unit_cell), 0.0 if core is None else 4.0 * core.max_radius)
+    least = 0.0 if core is None else 4.0 * core.max_radius
+    return np.asarray(np.maximum(_CELLS * np.array(plate.pattern.unit_cell), least))
 
 
 def _sheet(extent: NDArray[np.float64]) -> tuple[Figure, Axes]:

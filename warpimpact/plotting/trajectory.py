@@ -151,7 +151,13 @@ def plate(dataset: xarray.Dataset) -> Figure:
             snapshot.T, origin="lower", extent=(*y, *z), cmap="viridis", vmin=0.0, vmax=1.0, interpolation="nearest"
         )
         edge = [Stroke(linewidth=2.4, foreground="black"), Normal()]
-        panel.plot(dataset[v.OUTLINE_Y] * _MM, dataset[v.OUTLINE_Z] * _MM, color="white", lw=1.0, path_effects=edge)
+        panel.plot(
+            dataset[v.OUTLINE_Y].values * _MM,
+            dataset[v.OUTLINE_Z].values * _MM,
+            color="white",
+            lw=1.0,
+            path_effects=edge,
+        )
         panel.plot(dataset[v.HIT_Y] * _MM, dataset[v.HIT_Z] * _MM, "+", color="#D55E00", ms=10, mew=2)
         panel.set(xlim=limits["y"], ylim=limits["z"], title=f"{float(snapshot[v.SNAPSHOT]) * _US:.1f} µs")
     for panel in panels[-1]:

@@ -15,6 +15,7 @@ from warpimpact.plotting.cell import STATUS_COLOURS, Shown, hit_points, limits, 
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.dataset import hit_numbers, outlines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,17 +34,18 @@ _MM = 1e3
 
 
 def thinned(dataset: xarray.Dataset, most: int, *, keep: Sequence[int] = ()) -> xarray.Dataset:
-    """The hits of a page, loaded, with their numbers as the coordinate "hit".
+    """The hits of a page, loaded.
 
     If there are more than `most`, the hits in `keep` stay and others are chosen at random. Hits at a constant step in a
     grid or a Sobol sampling would leave out parts of the cell.
     """
-    numbers = np.arange(dataset.sizes["hit"])
-    if len(numbers) > most:
-        others = np.setdiff1d(numbers, keep)
-        chosen = np.random.default_rng(0).choice(others, most - len(keep), replace=False)
-        numbers = np.union1d(chosen, np.array(keep, dtype=int))
-    return dataset.isel(hit=numbers).load().assign_coords(hit=numbers)
+    places = np.arange(dataset.sizes["hit"])
+    if len(places) > most:
+        kept = np.flatnonzero(np.isin(hit_numbers(dataset), keep))
+        others = np.setdiff1d(places, kept)
+        chosen = np.random.default_rng(0).choice(others, most - len(kept), replace=False)
+        places = np.union1d(chosen, kept)
+    return dataset.assign_coords(hit=hit_numbers(dataset)).isel(hit=places).load()
 
 
 def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int] = ()) -> list[int]:
@@ -52,7 +54,8 @@ def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int
     velocity = shown(dataset, v.RESIDUAL_VELOCITY).values
     worst = np.argsort(-np.nan_to_num(velocity, nan=-1.0), kind="stable")[: round(WORST_SHARE * count)]
     numbers = dataset["hit"].values
-    chosen = list(dict.fromkeys([*np.searchsorted(numbers, first).tolist(), *worst.tolist()]))[:count]
+    place_of = {number: place for place, number in enumerate(numbers.tolist())}
+    chosen = list(dict.fromkeys([*(place_of[number] for number in first), *worst.tolist()]))[:count]
     points, period = hit_points(dataset), np.asarray(dataset.attrs[attr.PLATE_PERIOD])
     distance = np.full(len(points), np.inf)
 
@@ -109,8 +112,8 @@ def _map_data(dataset: xarray.Dataset, columns: dict[str, Array]) -> dict[str, A
     return {
         "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * _MM),
         "limits": limits(dataset).tolist(),
-        "outline": [_rounded(dataset[v.OUTLINE[axis]].values * _MM) for axis in "yz"],
-        "number": dataset["hit"].values.tolist(),
+        "outline": [_rounded(outline * _MM) for outline in outlines(dataset).values()],
+        "number": hit_numbers(dataset).tolist(),
         "y": _rounded(y),
         "z": _rounded(z),
         "status": dataset[v.STATUS].values.astype(int).tolist(),

@@ -21,6 +21,7 @@ from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.dataset import outlines
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
 
@@ -139,7 +140,8 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
     """The cell of the hits, with its holes as an SVG path: lengths in mm, y to the right, z up."""
-    vertices = np.stack([dataset[v.OUTLINE_Y].values, -dataset[v.OUTLINE_Z].values], axis=-1) * _MM
+    holes = outlines(dataset)
+    vertices = np.stack([holes["y"], -holes["z"]], axis=-1) * _MM
     gaps = np.flatnonzero(np.isnan(vertices[:, 0]))
     rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(vertices, gaps)]
     path = " ".join("M" + "L".join(f"{y:.3f},{z:.3f}" for y, z in ring) + "Z" for ring in rings if len(ring))

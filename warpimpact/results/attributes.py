@@ -1,6 +1,12 @@
 """Names of the global attributes of the Datasets, which describe a result as a whole."""
 
+import platform
+import subprocess
+from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import version
+from pathlib import Path
+from typing import Any
 
 # CF
 TITLE = "title"
@@ -13,8 +19,23 @@ CAMPAIGN_ANGLES = "campaign_angles"
 """Unit of the angles that the campaign gives as numbers; not there where they are radians (version 0.1.0)."""
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
+PYTHON_VERSION = "python_version"
+NUMPY_VERSION = "numpy_version"
+XARRAY_VERSION = "xarray_version"
+COMMIT = "commit"
+"""Of the checkout that computed the result; not there where warpimpact was installed without one."""
+MACHINE = "machine"
+PROCESSOR = "processor"
 DEVICE = "device"
 NUMERICS = "numerics"
+"""The numerics in force in words. As numbers:"""
+PATCHES_AXIAL = "patches_axial"
+PATCHES_AROUND = "patches_around"
+GRID_SPACING = "grid_spacing"
+TIME_STEP = "time_step"
+TOLERANCE_RESIDUAL_VELOCITY = "tolerance_residual_velocity"
+TOLERANCE_TILT = "tolerance_tilt"
+PRECISION = "precision"
 NUMERICS_GIVEN = "numerics_given"
 RESOLUTION = "resolution"
 """JSON of the level of resolution that the promise of a named fidelity took; likewise only of one:"""
@@ -37,6 +58,7 @@ COMPUTED_HITS = "computed_hits"
 
 # Core, plate and output
 CORE = "core"
+PLATE = "plate"
 IMPACT = "impact"
 MATERIAL = "material"
 STANDOFF_POINT = "standoff_point"
@@ -60,8 +82,78 @@ HIT = "hit"
 AGREEMENT = "agreement"
 
 
+_SI = "SI; a text says its unit"
+UNITS = {
+    COMPUTE_TIME: "s",
+    HITS_PER_SECOND: "s-1",
+    RESIDUAL_VELOCITY_ERROR_P90: "m s-1",
+    TILT_ERROR_P90: "degree",
+    GRID_SPACING: "m",
+    TIME_STEP: "s",
+    TOLERANCE_RESIDUAL_VELOCITY: "m s-1",
+    TOLERANCE_TILT: "degree",
+    OPEN_AREA: "1",
+    AREAL_DENSITY: "kg m-2",
+    LIGAMENT: "m",
+    PLATE_PERIOD: "m",
+    PLATE_THICKNESS: "m",
+    FAILED_SHARE: "1",
+    CORE: _SI,
+    PLATE: _SI,
+    IMPACT: _SI,
+    MATERIAL: _SI,
+    NUMERICS_GIVEN: _SI,
+}
+"""Units of the attributes that have one; the attribute ``<name>_units`` tells them in the Dataset."""
+
+
+def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Attributes, each that has a unit followed by it."""
+    told: dict[str, Any] = {}
+    for name, value in attributes.items():
+        told[name] = value
+        if name in UNITS:
+            told[f"{name}_units"] = UNITS[name]
+    return told
+
+
 def versions() -> dict[str, str]:
-    """The attributes that say which versions computed a result."""
+    """The attributes that say which versions computed a result and decide its bits."""
     import warp  # a second to import
 
     return {WARPIMPACT_VERSION: version("warpimpact"), WARP_VERSION: warp.__version__}
+
+
+@cache
+def machine() -> dict[str, str]:
+    """The attributes that say what else was there: machine, processor, commit and other versions."""
+    told = {
+        PYTHON_VERSION: platform.python_version(),
+        NUMPY_VERSION: version("numpy"),
+        XARRAY_VERSION: version("xarray"),
+        MACHINE: f"{platform.system()} {platform.machine()}",
+        PROCESSOR: _processor(),
+    }
+    commit = _commit()
+    return told | ({COMMIT: commit} if commit else {})
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, "") or platform.processor() or "unknown"
+
+
+def _commit() -> str:
+    """Commit of the checkout around this file, with "-dirty" if it was changed; empty if there is none."""
+    checkout = Path(__file__).resolve().parents[2]
+    if not (checkout / ".git").exists():
+        return ""
+    command = ["git", "-C", str(checkout), "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()
+    except (OSError, subprocess.SubprocessError):
+        return ""

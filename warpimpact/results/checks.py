@@ -18,15 +18,18 @@ _TEXTS = (
     *(attr.TITLE, attr.HISTORY, attr.REFERENCES, attr.CAMPAIGN, attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     *(attr.DEVICE, attr.NUMERICS, attr.NUMERICS_GIVEN, attr.FINGERPRINT, attr.SAMPLING, attr.SYMMETRIES, attr.CORE),
     *(attr.MATERIAL, attr.CAMPAIGN_ANGLES, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
-    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT),
+    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.PRECISION, attr.MACHINE),
+    *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION),
+    *(f"{name}_units" for name in attr.UNITS),
 )
-_TABLES = (attr.CORE, attr.IMPACT, attr.MATERIAL, attr.NUMERICS_GIVEN, attr.RESOLUTION)
+_TABLES = (attr.CORE, attr.PLATE, attr.IMPACT, attr.MATERIAL, attr.NUMERICS_GIVEN, attr.RESOLUTION)
 """Texts that are JSON objects."""
 _COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS)
 _NUMBERS = (
     *(attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.SEED, attr.OPEN_AREA, attr.AREAL_DENSITY, attr.LIGAMENT),
     *(attr.PLATE_THICKNESS, attr.FAILED_SHARE, attr.ESTIMATE, attr.CONFIDENCE, attr.HIT),
-    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90),
+    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.GRID_SPACING),
+    *(attr.TIME_STEP, attr.TOLERANCE_RESIDUAL_VELOCITY, attr.TOLERANCE_TILT, attr.PATCHES_AXIAL, attr.PATCHES_AROUND),
 )
 _PAIRS = (attr.PLATE_PERIOD, attr.ESTIMATE_INTERVAL)
 _TOGETHER = (
@@ -49,6 +52,18 @@ def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
     """
     found = (_variable_fault(dataset[str(one)], one) for one in known if one in dataset.variables)
     return next(filter(None, found), None) or _attribute_fault(dataset.attrs)
+
+
+def unusable(dataset: xarray.Dataset) -> str | None:
+    """What keeps a Dataset that was chosen from a result from being used as one, as a sentence; None if nothing does."""
+    if v.HIT not in dataset.sizes:
+        return "holds one hit without its dimension; choose hits as a list, as in isel(hit=[5])"
+    if v.STANDOFF not in dataset.sizes:
+        return "holds one stand-off without its dimension; choose stand-offs as a list, as in isel(standoff=[0])"
+    status = dataset[v.STATUS]
+    if status.dtype.kind == "f" and bool(status.isnull().any()):
+        return "has hits without a status, as where(...) leaves them; choose hits with where(..., drop=True)"
+    return None
 
 
 def _variable_fault(array: xarray.DataArray, declared: v.Variable) -> str | None:

@@ -16,6 +16,8 @@ import xarray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.scene import Plate
+from warpimpact.scene.target import value_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,6 +36,8 @@ _ATTRIBUTES = {
     "front face; y and z in the plate. NaN marks a value that does not exist.",
 }
 
+_SLICE = 2**18
+"""Numbers of hits in memory at a time."""
 _STATIONS, _SECTION_POINTS = 101, 1601
 """Points of a core's profile and of a section of the plate in a history."""
 
@@ -46,8 +50,11 @@ def to_dataset(
     period: tuple[float, float],
     attributes: Mapping[str, Any],
     estimates: Estimates | None = None,
+    double: bool = False,
 ) -> xarray.Dataset:
     """Gather shots and outcomes into the Dataset of the hit map.
+
+    Hits are numbered from 0. The outlines of the holes are coordinates: no choice of hits spreads them over the hits.
 
     Args:
         scene: The scene, which records m stand-offs.
@@ -56,8 +63,11 @@ def to_dataset(
         period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
         estimates: Estimated errors of a run to a tolerance, SI and radians.
+        double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
+            shots are always double.
     """
     coordinates: dict[str, Any] = {
+        v.HIT: np.arange(len(shots), dtype=np.int32),
         v.HIT_Y: shots.hit_y,
         v.HIT_Z: shots.hit_z,
         v.STANDOFF: np.array(scene.record.standoffs),
@@ -65,47 +75,94 @@ def to_dataset(
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     values |= {name: shots.columns[name] for name in v.SCATTER_VARIABLES if name in shots.columns}
-    ended = (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES)
+    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.LAYER_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
-    values |= _outlines(scene, *((-0.5 * side, 0.5 * side) for side in period))
-    optional = (name for name in (*v.SCATTER_VARIABLES, *v.BENDING_VARIABLES) if name in values)
-    variables = [*v.VARIABLES, *optional]
+    values |= _of_layers(scene, shots)
+    if v.EXIT_POSITION in values:
+        zero = np.zeros(len(shots))
+        values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
+    coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
+    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES, *v.LAYER_SCATTER)
+    optional = (*v.EXIT_VARIABLES, *v.SCATTER_VARIABLES, *v.BENDING_VARIABLES, *layers)
+    variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES
         values |= {name: getattr(estimates, name) for name in v.ESTIMATE_VARIABLES}
         values[v.CONVERGED] = estimates.converged.astype(np.int8)
+    described = _described(variables, values)
+    if not double:
+        described |= _in_single(described, (*ended, *v.ESTIMATE_VARIABLES))
     return xarray.Dataset(
-        _described(variables, values),
-        _described(v.COORDINATES, coordinates),
-        _ATTRIBUTES | dict(attributes) | {attr.PLATE_PERIOD: np.array(period)},
+        described,
+        _described((*v.COORDINATES, *v.OUTLINE_VARIABLES), coordinates),
+        _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
 
-def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
-    """Outcomes of the first shots against the solid plate of equal areal density, to be merged with the Dataset of all
+def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:
+    """Outcomes of the first shots against the solid plate of equal areal density, as coordinates of the Dataset of all
     shots.
 
     Args:
         outcomes: SI and radians.
+        double: as in `to_dataset`.
     """
     values: dict[str, Any] = {variable: getattr(outcomes, variable.field) for variable in v.SOLID_VARIABLES}
-    return xarray.Dataset(_described(v.SOLID_VARIABLES, values))
+    described = _described(v.SOLID_VARIABLES, values)
+    return described if double else described | _in_single(described, v.SOLID_VARIABLES)
+
+
+def _in_single(described: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -> dict[str, tuple[Any, ...]]:
+    """Those of some variables that hold numbers, in single precision."""
+    return {
+        name: (dims, values.astype(np.float32), told)
+        for name, (dims, values, told) in described.items()
+        if name in set(names) and values.dtype.kind == "f"
+    }
+
+
+def numbered(dataset: xarray.Dataset, first: int = 0) -> xarray.Dataset:
+    """A Dataset whose hits have their numbers in the campaign, from `first` on."""
+    numbers = np.arange(first, first + dataset.sizes["hit"], dtype=np.int32)
+    return dataset.assign_coords(_described((v.HIT,), {v.HIT: numbers}))
+
+
+def hit_numbers(dataset: xarray.Dataset) -> NDArray[np.int64]:
+    """Numbers of the hits in their campaign, shape (hit,); those of a file without them count from 0."""
+    return np.asarray(dataset[v.HIT].values)
+
+
+def is_choice(dataset: xarray.Dataset) -> bool:
+    """Whether the hits are others than the first ones of the campaign in their order; of an open file, one slice at a
+    time is in memory."""
+    if v.HIT not in dataset.coords:
+        return False
+    hits = dataset.sizes["hit"]
+    return any(
+        not np.array_equal(hit_numbers(dataset[[v.HIT]].isel(hit=slice(first, first + _SLICE))), numbers)
+        for first in range(0, hits, _SLICE)
+        for numbers in [np.arange(first, min(first + _SLICE, hits))]
+    )
 
 
 def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """Shots and outcomes of the solid plate, with the names of a hit map and along "hit"; None if there are none.
 
-    A solid plate is its own reference.
+    Its hits are the first ones of the Dataset, or one where one shot tells of all. A solid plate that stands alone is
+    its own reference.
     """
-    if dataset.attrs.get(attr.OPEN_AREA) == 0.0:
+    if dataset.attrs.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset.variables:
         return dataset
     if not v.SOLID_VARIABLES.keys() <= dataset.variables.keys():
         return None
-    solid = dataset[list(v.SOLID_VARIABLES)].isel(solid_hit=slice(dataset.sizes["hit"])).load()
-    solid = solid.rename(v.SOLID_VARIABLES | {"solid_hit": "hit"})
-    shots = v.shot_variables(dataset)
-    first = dataset[shots].isel(hit=slice(solid.sizes["hit"]))
-    return solid.merge(first.load())
+    shots = dataset.sizes["solid_hit"]
+    numbers = np.zeros(1, dtype=int) if shots == 1 else hit_numbers(dataset[[v.HIT]].isel(hit=slice(shots)))
+    numbers = numbers[: np.argmax(np.append(numbers, shots) >= shots)]  # the first hits, as far as they have one
+    if not len(numbers):
+        return None
+    solid = dataset[list(v.SOLID_VARIABLES)].reset_coords(list(v.SOLID_VARIABLES)).isel(solid_hit=numbers).load()
+    first = dataset[v.shot_variables(dataset)].isel(hit=slice(len(numbers))).load()
+    return first.assign({of_hits: solid[name].rename(solid_hit="hit") for name, of_hits in v.SOLID_VARIABLES.items()})
 
 
 def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> xarray.Dataset:
@@ -118,7 +175,7 @@ def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> x
     return xarray.Dataset(
         _described(v.STUDY_VARIABLES, values),
         _described(v.STUDY_COORDINATES, values),
-        _ATTRIBUTES | dict(attributes),
+        _ATTRIBUTES | attr.with_units(attributes),
     )
 
 
@@ -146,7 +203,8 @@ def history_dataset(
         v.SOLID_ALONG_Y: plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
-    values |= _outlines(scene, *((float(cells.min()), float(cells.max())) for cells in (replay.cell_y, replay.cell_z)))
+    cells = (replay.cell_y, replay.cell_z)
+    values |= outlines_in(plate, *((float(some.min()), float(some.max())) for some in cells))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
         v.QUATERNION: ["x", "y", "z", "w"],
@@ -157,14 +215,29 @@ def history_dataset(
         v.STATION: core.mass_properties.centre_of_mass - stations,
     }
     dataset = (
-        hit.drop_dims("vertex")
+        hit.drop_dims("vertex", errors="ignore")
         .rename({v.ANGULAR_VELOCITY: v.RESIDUAL_ANGULAR_VELOCITY})
         .assign_coords(_described(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
     return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES), values)).assign_attrs(
-        dict(attributes) | {attr.PLATE_THICKNESS: thickness}
+        attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )
+
+
+def _of_layers(scene: Scene, shots: Shots) -> dict[str, NDArray[np.float64]]:
+    """Faces of the layers, and what differs in them from shot to shot; empty if the plate stands alone."""
+    target = scene.target
+    if not target.layers:
+        return {}
+    values = dict(zip(v.LAYER_FACES, target.faces.T, strict=True))
+    for variable in v.LAYER_SCATTER:
+        if variable in shots.columns:
+            name = variable.removeprefix("layer_")
+            own = [shots.own(name, value_in(target.plate, name))]
+            own += [shots.own_of_layer(name, k, value_in(layer, name)) for k, layer in enumerate(target.layers)]
+            values[variable] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
+    return values
 
 
 def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
@@ -176,12 +249,30 @@ def _in_units(variable: v.Variable, values: Any) -> Any:
     return np.degrees(values) if variable.units == "degree" else values
 
 
-def _outlines(
-    scene: Scene, y_range: tuple[float, float], z_range: tuple[float, float]
+def outlines(dataset: xarray.Dataset) -> dict[str, NDArray[np.float64]]:
+    """Outlines of the holes [m], each of shape (vertex,), by the axis "y" and "z", with a NaN between one and the next.
+
+    Those of a Dataset that was read or chosen without them follow from its plate. Only those of a mask cannot: they
+    are empty then.
+    """
+    if v.OUTLINE_Y not in dataset.variables:
+        period = dataset.attrs[attr.PLATE_PERIOD]
+        try:
+            plate = Plate.model_validate_json(dataset.attrs.get(attr.PLATE, ""))
+        except ValueError:  # without a plate, or the file of its mask
+            plate = None
+        ranges = [(-0.5 * float(side), 0.5 * float(side)) for side in period]
+        found = {} if plate is None else outlines_in(plate, *ranges)
+        return {axis: found.get(name, np.empty(0)) for axis, name in v.OUTLINE.items()}
+    return {axis: dataset[name].values for axis, name in v.OUTLINE.items()}
+
+
+def outlines_in(
+    plate: Plate, y_range: tuple[float, float], z_range: tuple[float, float]
 ) -> dict[str, NDArray[np.float64]]:
     """Outlines of the holes in a rectangle [m], by OUTLINE_VARIABLES, with a NaN between one and the next."""
     gap = np.full((1, 2), np.nan)
-    rows = [row for outline in scene.target.plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
+    rows = [row for outline in plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
     vertices = np.concatenate(rows[1:]) if rows else np.empty((0, 2))
     return {v.OUTLINE_Y: vertices[:, 0], v.OUTLINE_Z: vertices[:, 1]}
 

@@ -15,7 +15,8 @@ import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.checks import fault
+from warpimpact.results.checks import fault, unusable
+from warpimpact.results.dataset import numbered
 from warpimpact.results.interrupts import uninterrupted
 
 
@@ -27,17 +28,34 @@ class ResultError(ValueError):
     """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
-def write(dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None) -> None:
+def write(
+    dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None, compressed: bool = True
+) -> None:
     """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
 
     Args:
         named: gives the name of what was written, by its contents, in place of `path`.
+        compressed: smaller, at the cost of some time.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
     with uninterrupted(), aside(path, named=named) as file:
-        dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=_encoding(dataset))
+        _write(dataset, file, compressed=compressed)
+
+
+def _write(
+    dataset: xarray.Dataset, file: Path, *, chunk: int | None = None, compressed: bool = True, **options: Any
+) -> None:
+    """Write a Dataset, with the coordinates that have a group of their own in it."""
+    groups = {group: [name for name in names if name in dataset.coords] for group, names in v.GROUPS.items()}
+    hits = dataset.drop_vars([name for names in groups.values() for name in names])
+    options = {"format": "NETCDF4", "engine": "netcdf4"} | options
+    hits.to_netcdf(file, encoding=_encoding(hits, chunk=chunk, compressed=compressed), **options)
+    for group, names in groups.items():
+        if names:
+            inner = dataset[names].reset_coords(names).drop_attrs(deep=False)
+            inner.to_netcdf(file, mode="a", group=group, encoding=_encoding(inner), format="NETCDF4", engine="netcdf4")
 
 
 CHUNK = 2**15
@@ -62,8 +80,7 @@ def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> No
     with aside(path, parts[0].parent) as file:
         with uninterrupted():
             dataset = read(parts[0]).assign_attrs(attributes).drop_encoding()
-            encoding = _encoding(dataset, chunk=min(hits, CHUNK))
-            dataset.to_netcdf(file, format="NETCDF4", engine="netcdf4", encoding=encoding, unlimited_dims=["hit"])
+            _write(dataset, file, chunk=min(hits, CHUNK), unlimited_dims=["hit"])
         at = dataset.sizes["hit"]
         with netCDF4.Dataset(file, "a") as joined:
             joined.set_auto_maskandscale(False)
@@ -85,12 +102,14 @@ def _append(joined: Any, part: Path, at: int) -> int:
     return end
 
 
-def _encoding(dataset: xarray.Dataset, *, chunk: int | None = None) -> dict[str, dict[str, Any]]:
+def _encoding(
+    dataset: xarray.Dataset, *, chunk: int | None = None, compressed: bool = True
+) -> dict[str, dict[str, Any]]:
     """How variables are stored: compressed, and with `chunk` hits per chunk if that is given."""
     encoding: dict[str, dict[str, Any]] = {
         str(name): {"zlib": True, "complevel": 1}
         for name, array in dataset.variables.items()
-        if array.dtype.kind in "if"  # netCDF compresses no strings
+        if compressed and array.dtype.kind in "if"  # netCDF compresses no strings
     }
     for name in dataset.coords:
         encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
@@ -145,7 +164,25 @@ def read(path: Path) -> xarray.Dataset:
         ResultError: The file is missing, is not netCDF, or is not a warpimpact result.
     """
     with uninterrupted(), opened(path) as file:
-        return file.load()
+        dataset = file.load()
+    return dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
+
+
+def open_result(path: str | Path) -> xarray.Dataset:
+    """Open a result file. Only what is used of it is read; ``with open_result(path) as result:`` closes it.
+
+    Args:
+        path: a file of ``warpimpact run``, of `run_to_file`, or of ``to_netcdf`` of a result.
+
+    Returns:
+        The Dataset of `run`, one entry per hit.
+
+    Raises:
+        ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
+    """
+    with opened(Path(path)):
+        pass  # it is a sound result
+    return _opened(Path(path))
 
 
 @contextmanager
@@ -158,6 +195,8 @@ def opened(path: Path) -> Iterator[xarray.Dataset]:
     with opened_either(path) as dataset:
         if is_history(dataset):
             raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
+        if found := unusable(dataset):
+            raise ResultError(f"{path}: {found}")
         yield dataset
 
 
@@ -169,11 +208,16 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         ResultError: The file is missing, is not netCDF, or is neither.
     """
     with _netcdf(path) as dataset:
-        missing = {*v.COORDINATES, *v.VARIABLES} - dataset.variables.keys()
+        if v.SETTING in dataset.variables:
+            raise ResultError(f"{path}: is a study of the numerics, as warpimpact study writes, not a map of hits")
+        missing = {*v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
         if attr.PLATE_PERIOD not in dataset.attrs:
-            raise ResultError(f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"')
+            raise ResultError(
+                f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"; where it was chosen from '
+                "one, keep its attributes"
+            )
         if not is_history(dataset):
             _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES))
         yield dataset
@@ -194,15 +238,15 @@ def read_study(path: Path) -> xarray.Dataset:
 
 
 def _check(dataset: xarray.Dataset, path: Path, known: Collection[v.Variable]) -> None:
-    if 0 in dataset.sizes.values() and dataset.sizes.get("hit") == 0:
-        raise ResultError(f"{path}: not a result of warpimpact, it has no hits")
+    if dataset.sizes.get("hit") == 0:
+        raise ResultError(f"{path}: has no hits, so there is nothing to show")
     if found := fault(dataset, known):
         raise ResultError(f"{path}: not a result of warpimpact, or damaged: {found}")
 
 
 def is_history(dataset: xarray.Dataset) -> bool:
     """Whether a Dataset is the history of one hit, not a map of hits."""
-    return "hit" not in dataset.sizes
+    return v.TIME in dataset.variables
 
 
 _MOST_PACKED = 2000
@@ -231,8 +275,28 @@ def _opened(path: Path) -> xarray.Dataset:
     _, slots, preemption = kept = netCDF4.get_chunk_cache()
     netCDF4.set_chunk_cache(4 * 8 * CHUNK, slots, preemption)
     try:
-        return xarray.open_dataset(path, engine="netcdf4")
+        return _joined(path)
     except Exception as error:  # a file that was altered leads xarray into errors of any class
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
     finally:
         netCDF4.set_chunk_cache(*kept)
+
+
+def _joined(path: Path) -> xarray.Dataset:
+    """The root of a file with the contents of its groups as coordinates.
+
+    Numbers of hits have no index, which would be in memory as a whole. Files of version 0.1.0 have no groups; theirs
+    are variables of the root.
+    """
+    root = xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False)
+    with netCDF4.Dataset(path) as file:
+        groups = [group for group in v.GROUPS if group in file.groups]
+    dataset = root.set_coords([name for names in v.GROUPS.values() for name in names if name in root.variables])
+    for group in groups:
+        with xarray.open_dataset(path, engine="netcdf4", group=group) as inner:
+            dataset = dataset.assign_coords({name: array.variable for name, array in inner.load().data_vars.items()})
+    for name in dataset.dims:
+        if name != v.HIT and name in dataset.coords:
+            dataset = dataset.set_xindex(str(name))
+    dataset.set_close(root.close)
+    return dataset

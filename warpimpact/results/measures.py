@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images, passed
+from warpimpact.results.dataset import failed, images, is_choice, passed
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -132,7 +132,7 @@ class Measure:
         column = dataset[self.variable]
         if self.standoff is not None:
             column = column.sel(standoff=self.standoff, method="nearest")
-        values = np.where(passed(dataset), column.values, np.nan)
+        values = np.where(passed(dataset), column.values.astype(np.float64), np.nan)
         if self.kind != "probability":
             return values
         beyond = values > self.limit if self.above else values < self.limit
@@ -166,5 +166,7 @@ class Tally:
 
 
 def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
-    """Arguments of `Dealt` that fit the sampling of a result."""
+    """Arguments of `Dealt` that fit the sampling of a result. Chosen hits are no longer dealt out in turn."""
+    if is_choice(dataset):
+        return {"replicates": 1, "images": 1}
     return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": images(dataset)}

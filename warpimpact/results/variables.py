@@ -1,4 +1,7 @@
-"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings."""
+"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings.
+
+Long because it is one table: each variable stands here once.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels.status import LayerStatus, Status
 
 if TYPE_CHECKING:
     import xarray
@@ -72,12 +75,13 @@ _HIT, _AT_STANDOFF = ("hit",), ("hit", "standoff")
 _MAIN = ("run", "inspect", "plot", "report")
 
 # --- Coordinates of a hit map ---
+HIT = Variable("hit", _HIT, "1", "number of the hit in its campaign, from 0")
 HIT_Y = Variable("hit_y", _HIT, "m", "hit point on the front face, y")
 HIT_Z = Variable("hit_z", _HIT, "m", "hit point on the front face, z")
-STANDOFF = Variable("standoff", ("standoff",), "m", "distance behind the rear face")
+STANDOFF = Variable("standoff", ("standoff",), "m", "distance behind the rear face of the target")
 AXIS = Variable("axis", ("axis",), "1", "axis of the plate frame")
 
-COORDINATES = (HIT_Y, HIT_Z, STANDOFF, AXIS)
+COORDINATES = (HIT, HIT_Y, HIT_Z, STANDOFF, AXIS)
 
 # --- Impact ---
 IMPACT_VELOCITY = Variable("impact_velocity", _HIT, "m s-1", "impact velocity", field="velocity")
@@ -107,8 +111,8 @@ SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS
 STATUS = Variable("status", _HIT, "1", "how the shot ended", flags=Status)
 RESIDUAL_VELOCITY = Variable("residual_velocity", _HIT, "m s-1", "residual velocity", shown_by=_MAIN)
 DEFLECTION = Variable("deflection", _HIT, "degree", "angle between residual velocity and line of fire", shown_by=_MAIN)
-ANGULAR_VELOCITY = Variable("angular_velocity", ("hit", "axis"), "rad s-1", "residual angular velocity")
-ENERGY_LOSS = Variable("energy_loss", _HIT, "J", "kinetic energy lost in the plate")
+ANGULAR_VELOCITY = Variable("angular_velocity", ("hit", "axis"), "rad s-1", "angular velocity at the end of contact")
+ENERGY_LOSS = Variable("energy_loss", _HIT, "J", "kinetic energy lost in the target")
 CONTACT_DURATION = Variable("contact_duration", _HIT, "s", "duration of contact")
 TILT = Variable("tilt", _AT_STANDOFF, "degree", "angle between core axis and line of fire", shown_by=_MAIN)
 PITCH = Variable("pitch", _AT_STANDOFF, "degree", "pitch of the core, projected into the x-z plane")
@@ -127,6 +131,14 @@ OUTCOME_VARIABLES = (
     YAW,
     TOTAL_YAW,
 )
+
+_VECTOR = ("hit", "axis")
+EXIT_VELOCITY = Variable("exit_velocity", _VECTOR, "m s-1", "velocity at the end of contact")
+EXIT_AXIS = Variable("exit_axis", _VECTOR, "1", "unit vector along the core towards its nose at the end of contact")
+EXIT_POSITION = Variable("exit_position", _VECTOR, "m", "centre of mass at the end of contact, in the plate frame")
+
+EXIT_VARIABLES = (EXIT_VELOCITY, EXIT_AXIS, EXIT_POSITION)
+"""Present unless `output.exit_state` is false. With `angular_velocity` they start a flight behind the plate."""
 
 
 def _solid(variable: Variable) -> Variable:
@@ -161,6 +173,39 @@ BENDING_STRESS_SECTION = Variable("bending_stress_section", _HIT, "m", "distance
 BENDING_VARIABLES = (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION)
 """Present only with `output.bending`."""
 
+_IN_LAYER = ("hit", "layer")
+LAYER_STATUS = Variable("layer_status", _IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus)
+LAYER_RESIDUAL_VELOCITY = Variable(
+    "layer_residual_velocity", _IN_LAYER, "m s-1", "velocity when the last point of the core leaves the layer"
+)
+LAYER_TILT = Variable(
+    "layer_tilt", _IN_LAYER, "degree", "angle between core axis and line of fire when its last point leaves the layer"
+)
+LAYER_TIME = Variable(
+    "layer_time", _IN_LAYER, "s", "time when the last point of the core leaves the layer, since the first touch"
+)
+STOPPED_IN = Variable("stopped_in", _HIT, "1", "deepest layer that the core rests in; -1 where it does not rest in one")
+DEPTH = Variable("depth", _HIT, "m", "how far behind the front face of that layer any point of the core came")
+
+LAYER_VARIABLES = (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, STOPPED_IN, DEPTH)
+"""Present only with layers behind the plate, which is layer 0."""
+
+LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer, from that of the target")
+LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")
+
+LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
+"""Likewise; of the means where thicknesses scatter."""
+
+LAYER_SCATTER = (
+    Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer"),
+    Variable("layer_resistance", _IN_LAYER, "Pa", "resistance of each layer"),
+    Variable("layer_shear_coefficient", _IN_LAYER, "1", "friction per normal stress of each layer"),
+    Variable("layer_degradation", _IN_LAYER, "1", "share of the resistance left after contact, of each layer"),
+    Variable("layer_offset_y", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, y"),
+    Variable("layer_offset_z", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, z"),
+)
+"""Present only in a campaign in which they differ from shot to shot in a layer behind the plate."""
+
 RESIDUAL_VELOCITY_ERROR = Variable("residual_velocity_error", _HIT, "m s-1", "estimated error of the residual velocity")
 TILT_ERROR = Variable("tilt_error", _AT_STANDOFF, "degree", "estimated error of the tilt")
 CONVERGED = Variable("converged", _HIT, "1", "whether the estimated errors meet the tolerance, 1 or 0")
@@ -174,9 +219,15 @@ OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit c
 
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
-VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *OUTLINE_VARIABLES)
+GROUPS = {"plate": OUTLINE_VARIABLES, "solid": tuple(SOLID_VARIABLES)}
+"""What is not along "hit" stands in groups of the file. In memory these are coordinates, which no choice of hits
+spreads over the hits."""
+
+VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
-HIT_NUMBERS = tuple(v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit)
+HIT_NUMBERS = tuple(
+    v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES, *LAYER_VARIABLES) if v.is_number_of_hit
+)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
 # --- History of one hit ---
@@ -315,9 +366,10 @@ def shown_by(command: str) -> tuple[Variable, ...]:
 
 def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables of the impact, and of plate and core where they differ; hit points are not included."""
-    return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
+    return [*SHOT_VARIABLES, *(name for name in (*SCATTER_VARIABLES, *LAYER_SCATTER) if name in dataset)]
 
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    return [*OUTCOME_VARIABLES, *(name for name in BENDING_VARIABLES if name in dataset)]
+    optional = (*EXIT_VARIABLES, *BENDING_VARIABLES, *LAYER_VARIABLES)
+    return [*OUTCOME_VARIABLES, *(name for name in optional if name in dataset)]

@@ -23,9 +23,10 @@ from .patterns import (
 from .plate import Plate
 from .sampling import Sampler, make_shots
 from .scatter import OF_THE_SCENE, Scatter
-from .scene import Record, Scene, Target
+from .scene import Record, Scene
 from .shots import Hits, Impact, Shots
 from .symmetry import IDENTITY, Symmetry, symmetries_used
+from .target import Layer, Target
 
 __all__ = [
     "IDENTITY",
@@ -41,6 +42,7 @@ __all__ = [
     "Impact",
     "Interaction",
     "LatticePattern",
+    "Layer",
     "MaskPattern",
     "MassProperties",
     "NoPattern",

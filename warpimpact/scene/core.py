@@ -38,8 +38,12 @@ class MassProperties(NamedTuple):
 class Core(Model, ABC):
     """A rigid, homogeneous body of revolution, closed by discs at nose and base.
 
-    Exactly one of `mass` [kg] and `density` [kg/m³] is given. `centre_of_mass` (from the nose tip [m]),
-    `inertia_axial` and `inertia_transverse` [kg m²] follow from the shape; each can be overridden.
+    Attributes:
+        mass: of the core [kg]; exactly one of mass and density is given.
+        density: of its material [kg/m³].
+        centre_of_mass: distance behind the nose tip [m]; it follows from the shape unless it is given.
+        inertia_axial: moment of inertia about the axis [kg m²]; it follows from the shape unless it is given.
+        inertia_transverse: about a line across the axis through the centre of mass [kg m²]; likewise.
     """
 
     mass: PositiveMass | None = None
@@ -148,7 +152,13 @@ class Core(Model, ABC):
 
 
 class PolynomialCore(Core):
-    """r(s) = Σ coefficients[i] sⁱ, in metres: the paper's core is [3.0e-4, 0.24, -5.29]."""
+    """r(s) = Σ coefficients[i] sⁱ, in metres: the paper's core is [3.0e-4, 0.24, -5.29].
+
+    Attributes:
+        shape: "polynomial".
+        coefficients: of r(s), the constant first, in metres.
+        length: from nose to base [m].
+    """
 
     shape: Literal["polynomial"] = "polynomial"
     coefficients: tuple[Number, ...] = Field(min_length=1, max_length=16)
@@ -172,7 +182,7 @@ class PolynomialCore(Core):
 
     def radius(self, s: Array) -> Array:
         """Radius [m] at stations `s` [m] within [0, length]; same shape."""
-        return np.maximum(self._polynomial(s), 0.0)
+        return np.asarray(np.maximum(self._polynomial(s), 0.0))
 
     @property
     def _polynomial(self) -> Polynomial:
@@ -185,7 +195,12 @@ class PolynomialCore(Core):
 
 
 class _NosedCore(Core):
-    """A nose up to its shoulder, then a cylindrical shank of `diameter` up to `length`."""
+    """A nose up to its shoulder, then a cylindrical shank of `diameter` up to `length`.
+
+    Attributes:
+        diameter: of the shank [m].
+        length: from nose tip to base [m].
+    """
 
     diameter: PositiveLength
     length: PositiveLength
@@ -216,7 +231,12 @@ class _NosedCore(Core):
 
 
 class OgiveCore(_NosedCore):
-    """Tangent ogive nose of `crh` calibres radius, then a cylindrical shank of `diameter` up to `length`."""
+    """Tangent ogive nose of `crh` calibres radius, then a cylindrical shank of `diameter` up to `length`.
+
+    Attributes:
+        shape: "ogive".
+        crh: radius of the ogive in diameters of the core, "calibre radius head".
+    """
 
     shape: Literal["ogive"] = "ogive"
     crh: Annotated[Number, Field(ge=0.5)]
@@ -235,7 +255,12 @@ class OgiveCore(_NosedCore):
 
 
 class ConeCore(_NosedCore):
-    """Sharp cone of `cone_length` (by default all of `length`), then a cylindrical shank of `diameter`."""
+    """Sharp cone of `cone_length` (by default all of `length`), then a cylindrical shank of `diameter`.
+
+    Attributes:
+        shape: "cone".
+        cone_length: from tip to shoulder [m]; by default all of `length`.
+    """
 
     shape: Literal["cone"] = "cone"
     cone_length: PositiveLength | None = None
@@ -254,6 +279,12 @@ class ProfileCore(Core):
     """Straight lines between tabulated stations `s` and radii `r` [m], from s = 0 at the nose to the base.
 
     Both may come from `file`, a CSV file with the header s,r in metres.
+
+    Attributes:
+        shape: "profile".
+        s: stations from the nose tip, which is 0, to the base, increasing [m].
+        r: radii there [m]; 0 at an end only.
+        file: CSV file with the header s,r in metres, instead of s and r.
     """
 
     shape: Literal["profile"] = "profile"

@@ -20,8 +20,8 @@ class Tolerance(_AsGiven):
     """Largest error that an outcome may have; a quantity that is not given has no limit.
 
     Attributes:
-        residual_velocity: [m/s].
-        tilt: at every stand-off, given in degrees or with its unit [rad].
+        residual_velocity: of the residual velocity [m/s].
+        tilt: of the tilt at every stand-off [rad].
     """
 
     residual_velocity: PositiveSpeed = float("inf")
@@ -41,7 +41,7 @@ class Numerics(_AsGiven):
         fidelity: "draft", "standard" or "reference". A campaign chooses the resolution so that 90 % of its hits are
             within 5 m/s and 5°, 1 m/s and 1°, or 0.2 m/s and 0.2°. A single setting ends that promise.
         scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
-        time_step: [s].
+        time_step: length of a step [s].
         patches_axial, patches_around: surface patches per length of the core and around it. The consistent scheme takes
             shorter patches behind the widest station. With a multiple of 4 around the core, mirrored shots have exactly
             mirrored outcomes.

@@ -24,16 +24,16 @@ class Plate(Model):
     """A perforated plate. It is unbounded, or rectangular if `size` is given.
 
     Attributes:
-        thickness: h [m].
+        thickness: that of the plate, h [m].
         resistance: Y, the stress of the material against the core [Pa].
         shear_coefficient: η, friction per normal stress.
         degradation: β, the share of Y that is left after contact for `degradation_interval` or over
             `degradation_distance`; 1 means that Y does not fall.
-        degradation_interval: Δt_β [s]; None where exposure counts the path.
+        degradation_interval: Δt_β [s], 1 us unless one of both is given; None where exposure counts the path.
         degradation_distance: Δs_β, a path of the centre of mass [m]; None where exposure counts the time. By path, the
             law has no rate: outcomes depend on Y/v² alone.
         degradation_length: ℓ, how far around a contact the material weakens [m].
-        density: [kg/m³].
+        density: of the material [kg/m³].
         size: extent along y and z of a finite plate centred on the origin [m]; None is unbounded.
         margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out. None
             lets the rim cut holes.

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .model import Array
 from .plate import Plate
-from .scatter import EDGE, QUANTITIES, Scatter
+from .scatter import EDGE, OF_A_LAYER, QUANTITIES, Scatter
 from .shots import Hits, Impact, Shots
+from .sobol import Sobol
 from .symmetry import check_scatter, irreducible_part, symmetries_used
 
 _HIT_COLUMNS = 2
-"""Columns of uniform numbers for y and z of the hit; those of QUANTITIES follow."""
+"""Columns of uniform numbers for y and z of the hit; those of QUANTITIES follow, then those of OF_A_LAYER for every
+layer."""
 
 
 class Sampler:
@@ -45,9 +46,11 @@ class Sampler:
         self._middle = 0.5 * self._cell[0] * (high_y + low_y), 0.5 * self._cell[1] * (high_z + low_z)
         computed = None if hits.count is None else max(1, hits.count // len(self._group))
         self._hits = hits.model_copy(update={"count": computed})
-        self._scatter = (scatter or Scatter()).given
-        dimensions = _HIT_COLUMNS + (len(QUANTITIES) if self._scatter else 0)
-        self._sobol = [_Sobol(dimensions, hits.seed, replicate) for replicate in range(replicates)]
+        scatter = scatter or Scatter()
+        self._scatter, self._of_layers, self._layers = scatter.given, scatter.of_layers, len(scatter.layers)
+        dimensions = _HIT_COLUMNS + (len(QUANTITIES) if self._scatter or self._of_layers else 0)
+        dimensions += len(OF_A_LAYER) * self._layers if self._of_layers else 0
+        self._sobol = [Sobol(dimensions, _seed(hits.seed, replicate)) for replicate in range(replicates)]
 
     def __len__(self) -> int:
         """Number of shots."""
@@ -69,12 +72,18 @@ class Sampler:
     def _originals(self, first: int, count: int) -> Shots:
         """`count` shots that are not images of another shot, from number `first` of these on."""
         columns = [_HIT_COLUMNS + list(QUANTITIES).index(name) for name in self._scatter]
+        after = _HIT_COLUMNS + len(QUANTITIES)
+        columns += [after + len(OF_A_LAYER) * k + list(OF_A_LAYER).index(name) for name, k in self._of_layers]
         hit_y, hit_z, *uniform = self._uniform([0, 1, *columns], first, count)
         values = {name: np.full(count, value) for name, value in self._impact}
-        values |= {
-            name: distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))
-            for (name, distribution), share in zip(self._scatter.items(), uniform, strict=True)
-        }
+        distributions = [*self._scatter.values(), *self._of_layers.values()]
+        drawn = [
+            distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))
+            for distribution, share in zip(distributions, uniform, strict=True)
+        ]
+        values |= dict(zip(self._scatter, drawn, strict=False))
+        for (name, k), column in zip(self._of_layers, drawn[len(self._scatter) :], strict=True):
+            values.setdefault(f"layer_{name}", np.full((count, self._layers), np.nan))[:, k] = column
         values |= {
             "hit_y": (hit_y - 0.5) * self._extent[0] + self._middle[0],
             "hit_z": (hit_z - 0.5) * self._extent[1] + self._middle[1],
@@ -118,27 +127,9 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
     return sampler.shots(0, len(sampler))
 
 
-class _Sobol:
-    """One scrambled Sobol sequence. It remembers how far it was read."""
-
-    def __init__(self, dimensions: int, seed: int, replicate: int) -> None:
-        self.dimensions, self._seed = dimensions, seed
-        self._key = (replicate,) if replicate else ()
-        self._engine: Any = None
-
-    def points(self, first: int, count: int) -> Array:
-        """Points of the unit cube from number `first` on, shape [count, dimensions]."""
-        from scipy.stats.qmc import Sobol  # a second to import
-
-        if self._engine is None or self._engine.num_generated > first:
-            seed = np.random.SeedSequence(self._seed, spawn_key=self._key)  # new: the engine counts what it spawns
-            self._engine = Sobol(d=self.dimensions, rng=np.random.default_rng(seed))
-        if first > self._engine.num_generated:
-            self._engine.fast_forward(first - self._engine.num_generated)
-        # The sequence is balanced at powers of two. scipy warns if the first draw has another number of points.
-        drawn = 1 << (count - 1).bit_length() if first == 0 else count
-        points: Array = self._engine.random(drawn)
-        return points[:count]
+def _seed(seed: int, replicate: int) -> np.random.SeedSequence:
+    """Seed of one scrambling."""
+    return np.random.SeedSequence(seed, spawn_key=(replicate,) if replicate else ())
 
 
 def _pairs(seed: int, first: int, count: int) -> tuple[Array, Array]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from collections.abc import Callable, Mapping
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import (
@@ -25,6 +25,7 @@ from .shots import Obliquity, Shots, Tilt
 from .units import (
     Angle,
     AngularVelocity,
+    Length,
     NonNegativeNumber,
     NonNegativeStress,
     Number,
@@ -63,20 +64,29 @@ QUANTITIES = {
 }
 """By name. The position in this table is the column of the random numbers. So the draws of a quantity do not depend on
 which other quantities scatter."""
+OF_A_LAYER = {
+    "thickness": Quantity("layer", PositiveLength),
+    "resistance": Quantity("layer", NonNegativeStress),
+    "shear_coefficient": Quantity("layer", NonNegativeNumber),
+    "degradation": Quantity("layer", Annotated[Number, Field(ge=0, le=1)]),
+    "offset_y": Quantity("layer", Length),
+    "offset_z": Quantity("layer", Length),
+}
+"""Quantities of each layer behind the plate, likewise: their columns follow, layer by layer."""
 OF_THE_SCENE = tuple(name for name, quantity in QUANTITIES.items() if quantity.table != "impact")
 """Quantities of plate and core that may differ from shot to shot."""
 
 
-def check_range(name: str, low: float, high: float) -> None:
+def check_range(name: str, low: float, high: float, known: Mapping[str, Quantity] = QUANTITIES) -> None:
     """Refuse a range of a quantity, `low` to `high`, that contains values which are not allowed.
 
     Raises:
         ValueError: says what was reached and what is allowed.
     """
-    read = quantity(QUANTITIES[name].type)
+    read = quantity(known[name].type)
     for value in (low, high):
         try:
-            TypeAdapter(QUANTITIES[name].type).validate_python(read.as_read(float(value)))
+            TypeAdapter(known[name].type).validate_python(read.as_read(float(value)))
         except ValidationError as error:
             allowed = error.errors()[0]["msg"].replace("Input should", "it must")
             reached = f"{math.degrees(value):.6g} deg" if read.unit == "rad" else f"{value:.6g}"
@@ -88,7 +98,11 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Distribution(Model, ABC):
-    """A distribution of one quantity; its fields hold SI and radians."""
+    """A distribution of one quantity; its fields hold SI and radians.
+
+    Attributes:
+        distribution: its name.
+    """
 
     distribution: str
 
@@ -111,7 +125,12 @@ class Continuous(Distribution, ABC):
 
 
 class Bounded(Continuous, ABC):
-    """A distribution that ends at low and high."""
+    """A distribution that ends at low and high.
+
+    Attributes:
+        low: smallest value.
+        high: largest value.
+    """
 
     low: _Finite
     high: _Finite
@@ -124,7 +143,12 @@ class Bounded(Continuous, ABC):
 
 
 class Normal(Continuous):
-    """Mean and standard deviation."""
+    """Mean and standard deviation.
+
+    Attributes:
+        mean: of the quantity.
+        std: standard deviation.
+    """
 
     distribution: Literal["normal"] = "normal"
     mean: _Finite
@@ -137,7 +161,12 @@ class Normal(Continuous):
 
 
 class TruncatedNormal(Bounded):
-    """The part of a normal distribution between low and high; `mean` and `std` are those of the whole."""
+    """The part of a normal distribution between low and high; `mean` and `std` are those of the whole.
+
+    Attributes:
+        mean: of the whole distribution.
+        std: standard deviation of the whole distribution.
+    """
 
     distribution: Literal["truncated_normal"] = "truncated_normal"
     mean: _Finite
@@ -166,7 +195,11 @@ class Uniform(Bounded):
 
 
 class Triangular(Bounded):
-    """From low to high with its peak at mode."""
+    """From low to high with its peak at mode.
+
+    Attributes:
+        mode: where the peak is.
+    """
 
     distribution: Literal["triangular"] = "triangular"
     mode: _Finite
@@ -185,8 +218,12 @@ class Triangular(Bounded):
 
 
 class Lognormal(Continuous):
-    """The logarithm is normal. Half of the values lie below `median`; `sigma` is the standard deviation of the
-    logarithm."""
+    """The logarithm is normal.
+
+    Attributes:
+        median: half of the values lie below it.
+        sigma: standard deviation of the logarithm.
+    """
 
     distribution: Literal["lognormal"] = "lognormal"
     median: _Positive
@@ -199,8 +236,12 @@ class Lognormal(Continuous):
 
 
 class Discrete(Distribution):
-    """One of several values. Weights are proportional to the probabilities; without weights all values are equally
-    probable."""
+    """One of several values.
+
+    Attributes:
+        values: those that there are.
+        weights: proportional to the probabilities; without weights all values are equally probable.
+    """
 
     distribution: Literal["discrete"] = "discrete"
     values: Annotated[tuple[_Finite, ...], Field(min_length=1)]
@@ -227,15 +268,76 @@ class Discrete(Distribution):
 AnyDistribution = Annotated[
     Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Discrete, Field(discriminator="distribution")
 ]
-_PURE_NUMBERS = {"distribution", "sigma", "weights"}
+PURE_NUMBERS = {"distribution", "sigma", "weights"}
 
 
-class Scatter(Model):
+class _Scattering(Model):
+    """Distributions of quantities; None does not differ from shot to shot."""
+
+    _quantities: ClassVar[Mapping[str, Quantity]]
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
+        """Parameters may have units of their quantity."""
+        assert info.field_name is not None
+        if not isinstance(value, dict) or info.field_name not in cls._quantities:
+            return value
+        read = quantity(cls._quantities[info.field_name].type)
+        return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
+        assert info.field_name is not None
+        if isinstance(value, Distribution):
+            low, high = value.quantile(np.array([EDGE, 1.0 - EDGE]))
+            try:
+                check_range(info.field_name, low, high, cls._quantities)
+            except ValueError as error:
+                raise ValueError(f"got a {value.distribution} distribution that {error}") from None
+        return value
+
+    @field_serializer("*", mode="wrap")
+    def _as_read(self, value: Any, write: SerializerFunctionWrapHandler, info: FieldSerializationInfo) -> Any:
+        """Angles as they are read again."""
+        written = write(value)
+        known = self._quantities.get(info.field_name)
+        if not isinstance(written, dict) or known is None or quantity(known.type).unit != "rad":
+            return written
+        mark = in_radians if info.mode == "json" else Radians
+        return {name: part if name in PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
+
+    @property
+    def given(self) -> dict[str, Distribution]:
+        """The distributions that are given, by name."""
+        return {name: value for name in self._quantities if (value := getattr(self, name)) is not None}
+
+
+class LayerScatter(_Scattering):
+    """Distributions of the quantities of one layer that differ from shot to shot; None does not differ."""
+
+    _quantities = OF_A_LAYER
+
+    thickness: AnyDistribution | None = None
+    resistance: AnyDistribution | None = None
+    shear_coefficient: AnyDistribution | None = None
+    degradation: AnyDistribution | None = None
+    offset_y: AnyDistribution | None = None
+    offset_z: AnyDistribution | None = None
+
+
+class Scatter(_Scattering):
     """Distributions of the quantities that differ from shot to shot, beside the hit point; None does not differ.
 
     In a campaign file a distribution takes the place of the value:
     ``velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }``.
+
+    Attributes:
+        layers: of the layers behind the plate, in order; empty if none of them differs.
     """
+
+    _quantities = QUANTITIES
 
     velocity: AnyDistribution | None = None
     obliquity: AnyDistribution | None = None
@@ -248,47 +350,12 @@ class Scatter(Model):
     degradation: AnyDistribution | None = None
     thickness: AnyDistribution | None = None
     mass: AnyDistribution | None = None
-
-    @field_validator("*", mode="before")
-    @classmethod
-    def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
-        """Parameters may have units of their quantity."""
-        if not isinstance(value, dict):
-            return value
-        assert info.field_name is not None
-        read = quantity(QUANTITIES[info.field_name].type)
-        return in_si(read, value)
-
-    @field_validator("*", mode="after")
-    @classmethod
-    def _is_possible(cls, value: Distribution | None, info: ValidationInfo) -> Distribution | None:
-        if value is not None:
-            assert info.field_name is not None
-            low, high = value.quantile(np.array([EDGE, 1.0 - EDGE]))
-            try:
-                check_range(info.field_name, low, high)
-            except ValueError as error:
-                raise ValueError(f"got a {value.distribution} distribution that {error}") from None
-        return value
-
-    @field_serializer("*", mode="wrap")
-    def _as_read(self, value: Any, write: SerializerFunctionWrapHandler, info: FieldSerializationInfo) -> Any:
-        """Angles as they are read again."""
-        written = write(value)
-        if not isinstance(written, dict) or quantity(QUANTITIES[info.field_name].type).unit != "rad":
-            return written
-        mark = in_radians if info.mode == "json" else Radians
-        return {name: part if name in _PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
+    layers: tuple[LayerScatter, ...] = ()
 
     @property
-    def given(self) -> dict[str, Distribution]:
-        """The distributions that are given, by name."""
-        return {name: value for name, value in self if value is not None}
-
-
-def in_si(read: Any, distribution: dict[str, Any]) -> dict[str, Any]:
-    """The table of a distribution with its parameters in SI, as the reader of its quantity takes them."""
-    return {name: part if name in _PURE_NUMBERS else _read(read, name, part) for name, part in distribution.items()}
+    def of_layers(self) -> dict[tuple[str, int], Distribution]:
+        """The distributions of layers, by name and number of the layer behind the plate."""
+        return {(name, k): one for k, layer in enumerate(self.layers) for name, one in layer.given.items()}
 
 
 def _marked(value: Any, mark: Callable[[float], Any]) -> Any:
@@ -302,4 +369,5 @@ def _read(read: Any, name: str, value: Any) -> Any:
         raise ValueError(f"{name}: {error}") from None
 
 
-assert set(QUANTITIES) == set(Scatter.model_fields) == set(Shots.__dataclass_fields__) - {"hit_y", "hit_z"}
+assert set(QUANTITIES) == set(Scatter.model_fields) - {"layers"}
+assert {"hit_y", "hit_z", *QUANTITIES, *(f"layer_{name}" for name in OF_A_LAYER)} == set(Shots.__dataclass_fields__)

@@ -1,7 +1,7 @@
 """Scene: one core, its target, how the material resists, and what is recorded of a shot."""
 
 from itertools import pairwise
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import Field, field_validator, model_validator
 
@@ -9,6 +9,7 @@ from .core import AnyCore, Core
 from .interaction import Interaction
 from .model import Model
 from .plate import Plate
+from .target import Target
 from .units import PositiveLength
 
 
@@ -16,7 +17,7 @@ class Record(Model):
     """What is recorded of every shot beside how it ended.
 
     Attributes:
-        standoffs: distances behind the rear face at which the attitude is reported [m], increasing.
+        standoffs: distances behind the rear face of the target at which the attitude is reported [m], increasing.
         standoff_point: the point of the core that passes them.
         bending: whether the largest bending moment and stress of each core are reported.
     """
@@ -48,7 +49,7 @@ class Record(Model):
             )
 
     def check_standoffs(self, core: Core) -> None:
-        """Refuse stand-offs at which a core may still be in the plate.
+        """Refuse stand-offs at which a core may still be in the target.
 
         Raises:
             ValueError: names the first stand-off and the least that is allowed.
@@ -59,7 +60,7 @@ class Record(Model):
         if self.standoffs and self.standoffs[0] < needed:
             raise ValueError(
                 f"got {self._name}.standoffs of {self.standoffs[0]:g} m, "
-                f"but a core of this size is certain to be out of the plate only from {needed:.4g} m"
+                f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
             )
 
     @property
@@ -68,14 +69,10 @@ class Record(Model):
         return type(self).__name__.lower()
 
 
-class Target(Model):
-    """What is shot at.
-
-    Attributes:
-        plate: the plate, with its front face at x = 0.
-    """
-
-    plate: Plate
+if TYPE_CHECKING:
+    AnyTarget: TypeAlias = Target | Any  # what a scene holds, or what it takes, a plate above all
+else:
+    AnyTarget = Target
 
 
 class Scene(Model):
@@ -89,7 +86,7 @@ class Scene(Model):
     """
 
     core: AnyCore
-    target: Target
+    target: AnyTarget
     interaction: Interaction = Interaction()
     record: Record = Record()
 

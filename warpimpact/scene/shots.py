@@ -35,8 +35,12 @@ def _is_tilt(angle: float) -> float:
     return angle
 
 
-Obliquity = Annotated[Angle, AfterValidator(_is_obliquity)]
-Tilt = Annotated[Angle, AfterValidator(_is_tilt)]
+Obliquity = Annotated[
+    Angle, AfterValidator(_is_obliquity), Field(json_schema_extra={"minimum": 0, "exclusiveMaximum": 90})
+]
+Tilt = Annotated[
+    Angle, AfterValidator(_is_tilt), Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90})
+]
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 
 
@@ -46,7 +50,7 @@ class Impact(Model):
     An angle is given in degrees, or as a string with its unit; the fields hold radians.
 
     Attributes:
-        velocity: [m/s].
+        velocity: of the centre of mass [m/s].
         obliquity: angle between line of flight and plate normal [rad].
         azimuth: direction of the obliquity in the plate, from +y towards +z [rad].
         pitch, yaw: projected attitude of the axis beyond that of the line of flight [rad].
@@ -85,7 +89,7 @@ class Hits(Model):
             those quantities: angles in degrees, all else in SI.
         repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
         replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
-            two. Their spread tells how certain a mean is; `scramblings` says what None is.
+            two; 16 unless given. Their spread tells how certain a mean is.
         area: what the sampling covers: one unit cell, or a plate smaller than it, or all of a finite "plate".
         irreducible: sample only the part of the unit cell that the symmetries of plate and shot leave over, and give
             each hit there with its images, as many in all as `count` holds, or one hit's.
@@ -121,7 +125,7 @@ class Hits(Model):
         if self.file is None:
             return None
         required = ("hit_y", "hit_z")
-        columns = read_columns(self.file, required, tuple(f.name for f in fields(Shots) if f.name not in required))
+        columns = read_columns(self.file, required, _listable(required))
         return {name: np.radians(column) if name in _ANGLES else column for name, column in columns.items()}
 
     @property
@@ -167,6 +171,9 @@ class Shots:
         spin: about the axis [rad/s].
         resistance [Pa], shear_coefficient, degradation, thickness [m]: of the plate, and
         mass: of the core [kg]; None where all shots have the scene's own value.
+        layer_thickness [m], layer_resistance [Pa], layer_shear_coefficient, layer_degradation, layer_offset_y [m],
+            layer_offset_z [m]: of the layers behind the plate, shape [shots, layers]; NaN where a layer has the scene's
+            own value, None where all layers have.
     """
 
     hit_y: Array
@@ -182,6 +189,12 @@ class Shots:
     degradation: Array | None = None
     thickness: Array | None = None
     mass: Array | None = None
+    layer_thickness: Array | None = None
+    layer_resistance: Array | None = None
+    layer_shear_coefficient: Array | None = None
+    layer_degradation: Array | None = None
+    layer_offset_y: Array | None = None
+    layer_offset_z: Array | None = None
 
     def __len__(self) -> int:
         """Number of shots."""
@@ -200,7 +213,19 @@ class Shots:
         """A quantity of every shot, shape [shots]; where they do not have one of their own that of the scene, [1]."""
         return self.columns.get(name, np.array([otherwise]))
 
+    def own_of_layer(self, name: str, layer: int, otherwise: float) -> Array:
+        """A quantity of a layer behind the plate, likewise."""
+        columns = self.columns.get(f"layer_{name}")
+        if columns is None or np.isnan(columns[:, layer]).all():
+            return np.array([otherwise])
+        return np.where(np.isnan(columns[:, layer]), otherwise, columns[:, layer])
+
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """One after the other; all have the same columns."""
         return cls(**{name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns})
+
+
+def _listable(required: tuple[str, ...]) -> tuple[str, ...]:
+    """Quantities that a list of hits may have beside those required: one number per shot."""
+    return tuple(f.name for f in fields(Shots) if f.name not in required and not f.name.startswith("layer_"))

@@ -7,15 +7,24 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import islice
 from numbers import Real
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer
+from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
 
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
 """Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
+_STRING = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$"
+_STRING_WITH_UNIT = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*\S.*$"
+"""What editors accept, in the dialect of JSON schemas; which units there are is for the reader."""
 _NUMBER_AND_UNIT = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?", re.DOTALL)
+
+
+if TYPE_CHECKING:
+    Read: TypeAlias = float | Any  # what a field holds, or what is read into it: a string with a unit, above all
+else:
+    Read = float
 
 
 class Radians(float):
@@ -89,14 +98,42 @@ def _float(value: Real) -> float:
 
 @cache
 def _registry() -> Any:
-    import pint  # a third of a second, needed only where a string carries a unit
+    import pint  # a third of a second
 
     return pint.UnitRegistry()
+
+
+COMMON = {
+    ("m", "m"): 1.0,
+    ("mm", "m"): 1e-3,
+    ("cm", "m"): 1e-2,
+    ("um", "m"): 1e-6,
+    ("kg", "kg"): 1.0,
+    ("g", "kg"): 1e-3,
+    ("s", "s"): 1.0,
+    ("us", "s"): 1e-6,
+    ("Pa", "Pa"): 1.0,
+    ("MPa", "Pa"): 1e6,
+    ("GPa", "Pa"): 1e9,
+    ("kg/m^3", "kg/m^3"): 1.0,
+    ("m/s", "m/s"): 1.0,
+    ("rad", "rad"): 1.0,
+    ("deg", "rad"): math.pi / 180.0,
+    ("rad/s", "rad/s"): 1.0,
+}
+"""Factors of the units that most campaigns use: reading these files needs no pint, which takes as long to load as some
+thousand hits take to compute. A test sets each beside pint's."""
 
 
 @cache
 def _factor(unit: str, si_unit: str) -> float:
     """Factor from `unit` to `si_unit`; LookupError for an unknown unit, ValueError for another kind."""
+    if (unit, si_unit) in COMMON:
+        return COMMON[unit, si_unit]
+    return _by_pint(unit, si_unit)
+
+
+def _by_pint(unit: str, si_unit: str) -> float:
     import pint
 
     if _TOWER.search(unit):
@@ -138,7 +175,13 @@ def _part(value: object, depth: int = 3) -> object:
 
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
-    return BeforeValidator(_Quantity(name, unit, example))
+    """The reader of a quantity, and what the JSON schema of a campaign says of it."""
+    told = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
+    if unit:
+        told["unit"] = "deg" if unit == "rad" else unit
+    return BeforeValidator(
+        _Quantity(name, unit, example), json_schema_input_type=Annotated[float | str, WithJsonSchema(told)]
+    )
 
 
 def in_radians(value: float) -> str:
@@ -161,24 +204,24 @@ def _is_printable(text: str) -> str:
 
 Title = Annotated[str, Field(max_length=200), AfterValidator(_is_printable)]
 """One line that figures and terminals show."""
-Number = Annotated[float, _quantity("a number", "", "0.05")]
-Length = Annotated[float, _quantity("a length", "m", "4 mm")]
-Mass = Annotated[float, _quantity("a mass", "kg", "4 g")]
-Time = Annotated[float, _quantity("a time", "s", "1 us")]
-Stress = Annotated[float, _quantity("a stress", "Pa", "2600 MPa")]
-Moment = Annotated[float, _quantity("a moment", "N m", "50 N m")]
-Density = Annotated[float, _quantity("a density", "kg/m^3", "7850 kg/m^3")]
-Speed = Annotated[float, _quantity("a speed", "m/s", "825 m/s")]
+Number = Annotated[Read, _quantity("a number", "", "0.05")]
+Length = Annotated[Read, _quantity("a length", "m", "4 mm")]
+Mass = Annotated[Read, _quantity("a mass", "kg", "4 g")]
+Time = Annotated[Read, _quantity("a time", "s", "1 us")]
+Stress = Annotated[Read, _quantity("a stress", "Pa", "2600 MPa")]
+Moment = Annotated[Read, _quantity("a moment", "N m", "50 N m")]
+Density = Annotated[Read, _quantity("a density", "kg/m^3", "7850 kg/m^3")]
+Speed = Annotated[Read, _quantity("a speed", "m/s", "825 m/s")]
 Angle = Annotated[
-    float,
+    Read,
     _quantity("an angle", "rad", "20 deg"),
     AfterValidator(Radians),
     PlainSerializer(in_radians, return_type=str, when_used="json"),
 ]
 """A number is degrees; the field holds radians, and JSON says so."""
-AngularVelocity = Annotated[float, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
-Energy = Annotated[float, _quantity("an energy", "J", "10 J")]
-Inertia = Annotated[float, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]
+AngularVelocity = Annotated[Read, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
+Energy = Annotated[Read, _quantity("an energy", "J", "10 J")]
+Inertia = Annotated[Read, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]
 
 PositiveLength = Annotated[Length, Field(gt=0)]
 PositiveMass = Annotated[Mass, Field(gt=0)]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +13,8 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.bending import Sections, check_bending, sections_of
-from warpimpact.solver.resolution import Resolution, decay_rate, resolve
+from warpimpact.solver.materials import Materials, materials_of
+from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
 from warpimpact.solver.tile import FINER, FINEST, Tile, tent_taps, tile_of
 
@@ -21,8 +24,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-ONSET = 0.02
-"""Onset speed of contact in units of what full contact of a wall as deep as the plate does in one step."""
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
 STEP_ALLOWANCE = 200
@@ -57,10 +58,9 @@ class Arrays:
         core, rings: the core, and its surface.
         azimuths: of the patches of even rings, then of odd rings [rad], shape [2 around].
         sections: of the core behind the rings; None where it does not bend.
-        grid: the plate.
-        rate_stress: a2 of the law [Pa s²/m²].
+        grids: the plate, and the layers behind it.
+        materials: of the plate, and of the layers behind it.
         onset: κ of the law.
-        by_path: whether exposure counts the path of the core, not the time.
         shots: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         rows: of the trace of each shot; 0 for none.
     """
@@ -71,25 +71,31 @@ class Arrays:
     rings: Rings
     azimuths: Array
     sections: Sections | None
-    grid: Grid
-    rate_stress: float
+    grids: list[Grid]
+    materials: list[Materials]
     onset: float
-    by_path: bool
     shots: dict[str, Array]
     rows: int
+
+    @property
+    def grid(self) -> Grid:
+        """The plate."""
+        return self.grids[0]
 
 
 def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
     """The build of the kernels that a scene needs."""
-    plate, interaction = scene.target.plate, scene.interaction
+    plates, interaction, scattered = scene.target.plates, scene.interaction, shots.columns
     return Variant(
         double=resolution.double,
         nodal=resolution.nodal,
-        degrades=plate.degradation < 1.0 or "degradation" in shots.columns,
-        rubs=plate.shear_coefficient > 0.0 or "shear_coefficient" in shots.columns,
+        degrades=any(weakens(scene.target, scattered)),
+        rubs=any(plate.shear_coefficient > 0.0 for plate in plates)
+        or not scattered.keys().isdisjoint(("shear_coefficient", "layer_shear_coefficient")),
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
-        rimmed=plate.size is not None,
+        rimmed=any(plate.size is not None for plate in plates),
         bends=scene.record.bending,
+        layered=len(plates) > 1,
     )
 
 
@@ -103,12 +109,13 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         ValueError: the numerics have no bending moment, which the scene records.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
-    core, plate = scene.core, scene.target.plate
+    core, target = scene.core, scene.target
     check_bending(scene.record, numerics)
     resolution = resolve(numerics, scene, shots.columns)
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
-    conditions = _conditions(scene, resolution, shots)
+    materials = materials_of(scene, shots)
+    conditions = _conditions(scene, resolution, shots, materials)
     return Arrays(
         resolution=resolution,
         variant=variant_of(resolution, scene, shots),
@@ -116,21 +123,23 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         rings=rings,
         azimuths=azimuths_of(around),
         sections=sections_of(core, rings) if scene.record.bending else None,
-        grid=_grid(plate, resolution),
-        rate_stress=scene.interaction.quadratic * plate.density,
+        grids=[
+            _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length)
+            for plate in target.plates
+        ],
+        materials=materials,
         onset=scene.interaction.onset,
-        by_path=plate.degradation_distance is not None,
         shots=conditions,
         rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
     )
 
 
-def _grid(plate: Plate, resolution: Resolution) -> Grid:
-    nodal = resolution.nodal
-    cell = min(resolution.grid_spacing / FINER, plate.degradation_length / FINEST)
-    tile = tile_of(plate, resolution.grid_spacing if nodal else cell, sharp=nodal)
-    # Nodes of the literal scheme are the tile's cells, which fit the period.
-    spacing = min(tile.dy, tile.dz) if nodal else resolution.grid_spacing
+def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:
+    """The grid of a layer, whose cells are so many times as wide as those of the plate."""
+    nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
+    tile = tile_of(plate, spacing if nodal else min(spacing / FINER, plate.degradation_length / FINEST), sharp=nodal)
+    if nodal:  # its nodes are the tile's cells, which fit the period
+        spacing = min(tile.dy, tile.dz)
     size_y, size_z = plate.size or (math.inf, math.inf)
     return Grid(
         tile=tile,
@@ -147,40 +156,45 @@ def half_taps(length: float, spacing: float) -> Array:
     return np.append(taps[len(taps) // 2 :], 0.0)
 
 
-def _conditions(scene: Scene, resolution: Resolution, shots: Shots) -> dict[str, Array]:
-    """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it."""
-    core, plate, body = scene.core, scene.target.plate, scene.core.mass_properties
-    thickness, degradation = shots.own("thickness", plate.thickness), shots.own("degradation", plate.degradation)
-    mass, passage = shots.own("mass", body.mass), resolution.passage(thickness)
+def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: list[Materials]) -> dict[str, Array]:
+    """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
+
+    The layer that needs the shortest step sets the step. The law is that of the plate; the thickness is the depth of
+    the whole target.
+    """
+    core, target, body, plate = scene.core, scene.target, scene.core.mass_properties, materials[0]
+    mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
+    passage = _least(resolution.passage(one.thickness) for one in materials)
+    times = (
+        resolution.longest_time(material.degradation, layer, shots.velocity)
+        for material, layer in zip(materials, target.plates, strict=True)
+    )
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
-    a0, a1, _ = scene.interaction.coefficients(shots.own("resistance", plate.resistance), plate.density)
-    return shots.columns | {
-        "thickness": thickness,
+    gaps = sum(layer.gap for layer in target.layers)
+    return {name: values for name, values in shots.columns.items() if not name.startswith("layer_")} | {
+        "thickness": depth,
         "mass": mass,
         "inertia_axial": scale * body.inertia_axial,
         "inertia_transverse": scale * body.inertia_transverse,
-        "a0": a0,
-        "a1": a1,
-        "friction": shots.own("shear_coefficient", plate.shear_coefficient),
-        "decay_rate": decay_rate(degradation, plate.degradation_unit),
-        "degradation": degradation,
-        "onset_jump": onset_jump(core, thickness, mass, a0),
+        "a0": plate.a0,
+        "a1": plate.a1,
+        "friction": plate.friction,
+        "decay_rate": plate.decay_rate,
+        "degradation": plate.degradation,
+        "onset_jump": plate.onset_jump,
         "way": resolution.travel * passage,
-        "longest_time": resolution.longest_time(degradation, plate, shots.velocity),
+        "longest_time": _least(times),
         "longest_step": passage,
-        "longest_way": STEP_ALLOWANCE * (thickness + 2.0 * core.bounding_radius),
+        "longest_way": STEP_ALLOWANCE * (depth - gaps + 2.0 * len(materials) * core.bounding_radius) + gaps,
     }
+
+
+def _least(values: Iterable[Array]) -> Array:
+    return np.asarray(reduce(np.minimum, values))
 
 
 def _most_steps(resolution: Resolution, conditions: dict[str, Array]) -> int:
     """Steps after which any of the shots is given up."""
-    names = ("velocity", "obliquity", "thickness", "longest_time")
+    names = ("velocity", "obliquity", "longest_step", "longest_time")
     step = resolution.step_at(*(conditions[name] for name in names))
-    return math.ceil((conditions["longest_way"] / (conditions["velocity"] * step)).max())
-
-
-def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) -> Array:
-    """Onset speed of contact per time step [m/s²] of cores of some masses [kg] in plates of some thicknesses [m] and
-    static stresses [Pa], of their shape; positive, also for a plate without resistance."""
-    wall = 2.0 * core.max_radius * np.minimum(thickness, core.length)
-    return np.maximum(ONSET * static_stress * wall / mass, 1.0)
+    return math.ceil(float((conditions["longest_way"] / (conditions["velocity"] * step)).max()))

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import psutil
 import warp as wp
+
+_logger = logging.getLogger(__name__)
 
 
 class DeviceError(RuntimeError):
@@ -81,4 +85,6 @@ def load(kernel: Any, device: Any) -> None:
     A module is compiled for one block size. By default Warp loads with the block size of CUDA on a CPU, too, and
     compiles again at the launch.
     """
+    begin = time.perf_counter()
     kernel.module.load(device, 1 if device.is_cpu else 256)
+    _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)

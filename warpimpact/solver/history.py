@@ -7,7 +7,6 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from warpimpact.kernels.trace import COLUMNS
 from warpimpact.scene import MassProperties
@@ -44,6 +43,8 @@ class History:
     @classmethod
     def from_trace(cls, trace: Array, body: MassProperties) -> Self:
         """Read a trace of shape [steps, WIDTH] (kernels/trace.py)."""
+        from scipy.spatial.transform import Rotation  # a third of a second to import
+
         time, position, attitude, velocity, momentum, force, moment = (trace[:, part] for part in COLUMNS.values())
         axis = Rotation.from_quat(attitude).apply([1.0, 0.0, 0.0])
         along = np.sum(momentum * axis, axis=1, keepdims=True) * axis

@@ -38,18 +38,20 @@ class Inputs:
     Attributes:
         stage: the build of the march that the scene needs.
         put: puts values on the device.
-        surface, sections, plate, law, shots, pace: structs on the device.
+        surface, sections, plate, law, shots, pace, target: structs on the device.
     """
 
     def __init__(self, arrays: Arrays, device: Any) -> None:
         self.stage, self.put = march.build(arrays.variant), Put(device.alias, arrays.variant.real)
         self.surface = surface_of(self.stage.Surface, arrays.core, arrays.rings, arrays.azimuths, self.put)
-        self.plate = plate_of(self.stage.Plate, arrays.grid, self.put)
+        self.plates = [plate_of(self.stage.Plate, grid, self.put) for grid in arrays.grids]
+        self.plate = self.plates[0]
+        self.target = self._target(arrays)
         self.sections = self._sections(arrays)
         self.shots = self._shots(arrays)
         self.law = self.stage.Law()
-        self.law.by_path = arrays.by_path
-        self.law.a2, self.law.onset_share, self.law.onset_limit = arrays.rate_stress, arrays.onset, LARGEST_ONSET
+        self.law.by_path, self.law.a2 = arrays.materials[0].by_path, arrays.materials[0].a2
+        self.law.onset_share, self.law.onset_limit = arrays.onset, LARGEST_ONSET
         self.pace = self.stage.Pace()
         self.pace.time_step, self.pace.way_along = arrays.resolution.time_step or 0.0, arrays.resolution.way_along
         self.pace.rows = arrays.rows
@@ -57,6 +59,32 @@ class Inputs:
     def give_up_after(self, way: float) -> None:
         """Give up every shot after this distance [m] at impact velocity."""
         self.shots.longest_way.fill_(way)
+
+    def _target(self, arrays: Arrays) -> Any:
+        """The layers of a target (kernels/layers.py), all but their windows; empty if the plate stands alone."""
+        target, materials = self.stage.Layers(), arrays.materials
+        if not arrays.variant.layered:
+            return target
+        target.count, target.plates = (
+            len(materials),
+            wp.array(self.plates, dtype=self.stage.Plate, device=self.put.device),
+        )
+        target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
+        target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
+        target.a2 = self.put(np.array([one.a2 for one in materials]))
+        for name, variable in self.stage.Layers.vars.items():
+            if getattr(variable.type, "ndim", 1) == 2:
+                rows = np.broadcast_arrays(*(getattr(one, name) for one in materials))
+                setattr(target, name, self.put(np.stack(rows), variable.type.dtype))
+        return target
+
+    def place_windows(self, cells: list[tuple[int, int]]) -> None:
+        """Give every layer that weakens a window of so many nodes, one behind the other."""
+        sizes = np.array(cells)
+        ends = np.cumsum(sizes.prod(axis=1))
+        self.target.first = self.put(ends - sizes.prod(axis=1), wp.int32)
+        self.target.cells_y, self.target.cells_z = (self.put(column, wp.int32) for column in sizes.T)
+        self.target.nodes = int(ends[-1])
 
     def _sections(self, arrays: Arrays) -> Any:
         struct = self.stage.Sections()
@@ -104,7 +132,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     return plate
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
     """Material and clearance of a tile. No kernel changes them, so they are kept for later shots at the same plate."""
     return put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))

@@ -201,7 +201,7 @@ class _Search:
     def width(self) -> Array:
         """Distance of the two ends; 0 where both are infinite."""
         same = self.passed == self.stopped
-        return np.abs(np.where(same, 0.0, self.passed) - np.where(same, 0.0, self.stopped))
+        return np.asarray(np.abs(np.where(same, 0.0, self.passed) - np.where(same, 0.0, self.stopped)))
 
     @property
     def converged(self) -> NDArray[np.bool_]:
@@ -261,7 +261,7 @@ class _Search:
         """Where a core has no energy left, if it is linear; NaN or beyond the ends where that cannot be told."""
         with np.errstate(invalid="ignore"):
             drive = self._drive(self.passed) - self.left / self.slope
-            return np.sqrt(drive) if self.rising else drive
+            return np.asarray(np.sqrt(drive) if self.rising else drive)
 
     def _aimed(self) -> Array:
         """Values beside the limit as it is expected, on the side of the farther end, which then comes close."""

@@ -20,6 +20,7 @@ from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
 from warpimpact.solver.device import cores, free_memory, load
 from warpimpact.solver.inputs import Inputs
+from warpimpact.solver.layering import Passages, deep_cells
 from warpimpact.solver.resolution import Fidelity
 
 Array = NDArray[np.float64]
@@ -63,6 +64,7 @@ class March:
         self.variant, self.stage = self.arrays.variant, self.inputs.stage
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
+        self.passages = Passages(self.stage, len(shots), len(self.inputs.plates), self.variant, device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -95,7 +97,7 @@ class March:
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
         exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
-        return self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure)
+        return np.asarray(self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure))
 
     def body(self) -> MassProperties:
         """Mass properties of the first shot."""
@@ -133,7 +135,9 @@ class March:
         )
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
         status = contact.status.numpy().astype(np.int8)
-        return {"status": status} | values | (self._bending(status) if self.variant.bends else {})
+        values |= _exits(contact, status)
+        bent = self._bending(status) if self.variant.bends else {}
+        return {"status": status} | values | bent | self.passages.columns()
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
         """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is
@@ -173,11 +177,21 @@ class March:
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
 
+    def _windows(self, cells_y: int, cells_z: int) -> list[tuple[int, int]]:
+        """Cells of the windows of all layers, if the plate's has this many."""
+        return [(cells_y, cells_z)] + [
+            deep_cells(self.arrays, layer, cells_y) for layer in range(1, len(self.inputs.plates))
+        ]
+
+    def _nodes(self, cells_y: int, cells_z: int) -> int:
+        """Nodes of a slot in all its windows."""
+        return sum(y * z for y, z in self._windows(cells_y, cells_z))
+
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        per_ring = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        rings = self.inputs.surface.rings * per_ring
-        return len(self._fields()) * cells_y * cells_z * size + self._patches() * (6 * size + 2 * 4) + rings
+        per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        rings: int = self.inputs.surface.rings * per_ring
+        return len(self._fields()) * self._nodes(cells_y, cells_z) * size + self._patches() * (6 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
@@ -185,7 +199,7 @@ class March:
 
     @property
     def _keeps_fields(self) -> bool:
-        return self.variant.nodal or self.variant.degrades
+        return bool(self.variant.nodal or self.variant.degrades)
 
     def _patches(self) -> int:
         """Patches of a slot's touches."""
@@ -196,18 +210,18 @@ class March:
         free = free_memory() if self.device.is_cpu else self.device.free_memory
         wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
-        return min(wanted, affordable, (2**31 - 1) // (cells_y * cells_z))
+        return min(wanted, affordable, (2**31 - 1) // self._nodes(cells_y, cells_z))
 
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
 
-    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, Any]:
-        """Fields and touches of some slots."""
+    def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, ...]:
+        """Fields, touches and layers of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         scratch, touches = self.stage.Fields(), self.stage.Touches()
         scratch.cells_y, scratch.cells_z = cells_y, cells_z
         for name in self._fields():
-            setattr(scratch, name, empty(slots * cells_y * cells_z))
+            setattr(scratch, name, empty(slots * self._nodes(cells_y, cells_z)))
         patches = slots * self._patches()
         for name in ("area", "slope", "shift", "gain", "y", "z"):
             setattr(touches, name, empty(patches))
@@ -217,13 +231,14 @@ class March:
         touches.ring_area = empty(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
-        return scratch, touches
+            touches.total_area = empty(rings)
+        return scratch, touches, self.passages.stack(slots)
 
     def _launch(
         self,
         order: Any,
         outcomes: Any,
-        scratch: tuple[Any, Any],
+        scratch: tuple[Any, ...],
         slots: int,
         first: int,
         count: int,
@@ -243,9 +258,10 @@ class March:
                 inputs.law,
                 inputs.shots,
                 inputs.pace,
+                inputs.target,
                 *scratch,
             ],
-            outputs=[outcomes, self.bending, self.history],
+            outputs=[outcomes, self.passages.filled, self.bending, self.history],
             device=self.device,
         )
         return count
@@ -253,6 +269,8 @@ class March:
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
         load(self.stage.kernel, self.device)
+        if self.variant.layered:
+            self.inputs.place_windows(self._windows(*self.cells))
         launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
         if self.device.is_cpu:
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)
@@ -287,6 +305,17 @@ class March:
             for count in pool.map(work, _chunks(total, max(1, min(CPU_CHUNK, total // (4 * len(slots)))))):
                 done += count
                 progress(done)
+
+
+def _exits(contact: Any, status: NDArray[np.int8]) -> dict[str, Array]:
+    """The state of every core at the end of contact; NaN where the computation failed."""
+    failed, arrested = (status >= Status.UNFINISHED)[:, None], (status == Status.ARRESTED)[:, None]
+    state = {
+        "exit_velocity": np.where(arrested, 0.0, _host(contact.velocity)),
+        "exit_axis": _host(contact.axis),
+        "exit_position": _host(contact.position),
+    }
+    return {name: np.where(failed, np.nan, values) for name, values in state.items()}
 
 
 def _after(finished: int, total: int, progress: Progress) -> Progress1:

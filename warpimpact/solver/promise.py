@@ -7,6 +7,7 @@ one: a high order statistic of the pilot's shots, times a margin for the error o
 
 from __future__ import annotations
 
+import logging
 import math
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,6 +19,8 @@ from warpimpact.scene import Numerics, Scene, Shots, Tolerance
 from warpimpact.solver.refinement import Change
 from warpimpact.solver.resolution import LADDER, Fidelity, level
 from warpimpact.solver.simulate import Outcomes, simulate
+
+_logger = logging.getLogger(__name__)
 
 PILOT = 32
 """Shots of a pilot."""
@@ -88,6 +91,8 @@ def keep(scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto"
         errors = MARGIN[finer - index] * _errors(known[index], known[finer])
         kept = errors[0] <= tolerance.residual_velocity and errors[1] <= tolerance.tilt
         found = Promise(level(index, numerics), bool(kept), float(errors[0]), float(errors[1]))
+        told = (index, float(errors[0]), math.degrees(errors[1]), "kept" if kept else "not kept")
+        _logger.info("pilot at level %d: errors of %.2g m/s and %.2g deg, the promise is %s", *told)
         if kept:
             break
     return found

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from warpimpact.scene import Numerics, Scene, Shots, Tolerance
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import level
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
 
 Array = NDArray[np.float64]
 
 LEVELS = (0, 2, 4, 6, 8)
 """Levels of LADDER that a shot goes through, each some four times as expensive as the one before."""
-CLOSE, FAR = 0.4, 1.0
+CLOSE, FAR = 0.25, 1.0
 """A shot has converged where its last change is at most CLOSE of the tolerance; or where its last change is within the
 tolerance and the change from two levels before within FAR times that. Two levels may agree by chance, three rarely."""
 
@@ -106,8 +106,9 @@ def simulate_to_tolerance(
 
 @dataclass(frozen=True)
 class Change:
-    """What changes between two levels: of the residual velocity [m/s], shape [shots], and of the tilt [rad], shape
-    [shots, stand-offs]. 0 where neither has a value, infinite where the status differs or only one has a value."""
+    """What changes between two levels: of the residual velocity [m/s], behind a layer if that is more, shape [shots],
+    and of the tilt [rad], shape [shots, stand-offs]. 0 where neither has a value, infinite where the status differs or
+    only one has a value."""
 
     residual_velocity: Array
     tilt: Array
@@ -117,12 +118,15 @@ class Change:
         """The change from the outcomes of one level to those of another, of the same shots."""
         same = coarse.status == fine.status
         velocity, tilt = _apart(coarse.residual_velocity, fine.residual_velocity), _apart(coarse.tilt, fine.tilt)
+        if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
+            behind = _apart(coarse.layer_residual_velocity, fine.layer_residual_velocity)
+            velocity = np.maximum(velocity, behind.max(axis=1))
         return cls(np.where(same, velocity, np.inf), np.where(same[:, None], tilt, np.inf))
 
     def in_tolerances(self, tolerance: Tolerance) -> Array:
         """The larger of both in units of the tolerance, shape [shots]."""
         tilt = self.tilt.max(axis=1, initial=0.0) / tolerance.tilt
-        return np.maximum(self.residual_velocity / tolerance.residual_velocity, tilt)
+        return np.asarray(np.maximum(self.residual_velocity / tolerance.residual_velocity, tilt))
 
 
 def _apart(coarse: Array, fine: Array) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene
+from warpimpact.scene import Impact, Numerics, Plate, Scene, Target
 
 Array = NDArray[np.float64]
 
@@ -62,6 +62,7 @@ LADDER = (
     Fidelity(60, 80, 3.5, 0.1),
     Fidelity(84, 108, 5.0, 0.07),
     Fidelity(116, 148, 7.0, 0.05),
+    Fidelity(160, 204, 10.0, 0.035),
 )
 """Levels of resolution, coarse to fine: patches, grid and step are refined together. The error about halves from one
 to the next, and the cost about doubles."""
@@ -73,6 +74,9 @@ NODAL: dict[str, Any] = {
     "time_step": 1.0e-6,
 }
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
+
+
+ONE_PLATE = "the nodal scheme knows one plate and no layers behind it; the consistent scheme takes layers"
 
 
 def level(index: int, numerics: Numerics) -> Fidelity:
@@ -97,6 +101,7 @@ class Resolution:
     patches_axial: int
     patches_around: int
     grid_spacing: float
+    """In the plate [m]; in a layer in proportion to its degradation length."""
     double: bool
     patch_width: float
     """No ring is wider than this radially [m]."""
@@ -125,9 +130,13 @@ class Resolution:
         return np.asarray(np.minimum(way, passage) / velocity)
 
     def step_of(self, impact: Impact, plate: Plate) -> float:
-        """Time step [s] of a scene, or where it scatters, of its means."""
+        """Time step [s] of a plate that stands alone, or where it scatters, of its means."""
         longest_time = self.longest_time(np.array(plate.degradation), plate, impact.velocity)
         return float(self.step_at(impact.velocity, impact.obliquity, plate.thickness, longest_time))
+
+    def step_in(self, impact: Impact, target: Target) -> float:
+        """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
+        return min(self.step_of(impact, plate) for plate in target.plates)
 
 
 def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[str] = ()) -> Resolution:
@@ -136,15 +145,17 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
     Args:
         scattered: names of the quantities of the scene that differ from shot to shot.
     """
-    core, plate = scene.core, scene.target.plate
+    core, plate, plates = scene.core, scene.target.plate, scene.target.plates
+    weakening = weakens(scene.target, scattered)
     if isinstance(numerics, Fidelity):
         fidelity, numerics = numerics, Numerics()
     else:
         fidelity = FIDELITIES[numerics.fidelity]
     if numerics.tolerance is not None:
         raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
-    degrades = plate.degradation < 1.0 or "degradation" in scattered
-    width = fidelity.patch_width * plate.degradation_length if degrades else math.inf
+    lengths = [one.degradation_length for one, does in zip(plates, weakening, strict=True) if does]
+    finest = min(lengths, default=plate.degradation_length)
+    width = fidelity.patch_width * finest if lengths else math.inf
     defaults: dict[str, Any] = {
         "time_step": None,
         "patches_axial": fidelity.patches_axial,
@@ -153,6 +164,8 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
     }
     if numerics.scheme == "nodal":
         defaults = NODAL
+        if scene.target.layers:
+            raise ValueError(ONE_PLATE)
         if plate.degradation_distance is not None:
             raise ValueError(
                 "the nodal scheme weakens the plate once per time step: it knows no degradation_distance, which the "
@@ -164,18 +177,24 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
         double=fidelity.double if numerics.precision is None else numerics.precision == "double",
         travel=fidelity.travel,
         slender=SLENDER * core.length,
-        way_along=ALONG * fidelity.travel * plate.degradation_length,
+        way_along=ALONG * fidelity.travel * finest,
         weakening=WEAKENING * fidelity.travel,
         patch_width=math.inf if numerics.scheme == "nodal" else width,
         **(defaults | given),
     )
 
 
+def weakens(target: Target, scattered: Collection[str] = ()) -> list[bool]:
+    """Whether each layer weakens, if the quantities of these names differ from shot to shot."""
+    names = ["degradation", *["layer_degradation"] * len(target.layers)]
+    return [one.degradation < 1.0 or name in scattered for one, name in zip(target.plates, names, strict=True)]
+
+
 def spelt_out(fidelity: Fidelity, scene: Scene, impact: Impact) -> Numerics:
     """Numerics that give, for one impact, what `resolve` would make of the fidelity if it had a name."""
     plate = scene.target.plate
     return Numerics(
-        time_step=resolve(fidelity, scene).step_of(impact, plate),
+        time_step=resolve(fidelity, scene).step_in(impact, scene.target),
         patches_axial=fidelity.patches_axial,
         patches_around=fidelity.patches_around,
         grid_spacing=plate.degradation_length / fidelity.cells_per_length,

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from warpimpact.scene import Core
 
@@ -16,6 +15,8 @@ Array = NDArray[np.float64]
 BEHIND = 0.57
 """Length of the rings behind the core's widest station, as a share of the length of those ahead of it. The rings behind
 touch when the core swings, and they have the longest levers."""
+ZOOMS = 4
+"""Searches for the widest station, each within the two gaps that the one before leaves of a thousand."""
 
 
 @dataclass(frozen=True)
@@ -101,11 +102,12 @@ def _divided(core: Core, edges: Array, widest: float) -> Array:
 def _widest_station(core: Core) -> float:
     """First station of the largest radius [m]. It must be an edge: the loads on a ring across it would partly
     cancel."""
-    stations = np.linspace(0.0, core.length, 1001)
-    peak = int(core.radius(stations).argmax())
-    low, high = stations[max(peak - 1, 0)], stations[min(peak + 1, len(stations) - 1)]
-    found = minimize_scalar(lambda s: -core.radius(np.array(s)), bounds=(low, high), method="bounded")
-    candidates = np.array([*(b for b in core.breaks if low <= b <= high), found.x, stations[peak]])
+    low, high = 0.0, core.length
+    for _ in range(ZOOMS):
+        stations = np.linspace(low, high, 1001)
+        peak = int(core.radius(stations).argmax())
+        low, high = stations[max(peak - 1, 0)], stations[min(peak + 1, len(stations) - 1)]
+    candidates = np.array([*core.breaks, stations[peak]])
     return float(candidates[core.radius(candidates).argmax()])
 
 

@@ -34,6 +34,9 @@ class Outcomes:
         tilt: angle between core axis and line of fire [rad], shape [shots, stand-offs].
         pitch, yaw: projected angles of the axis [rad], shape [shots, stand-offs].
         total_yaw: angle between core axis and residual velocity [rad], shape [shots, stand-offs].
+        exit_velocity: at the end of contact, plate frame [m/s], shape [shots, 3]; 0 for an arrested core.
+        exit_axis: unit vector towards the nose then, shape [shots, 3].
+        exit_position: centre of mass then, from the hit point [m], shape [shots, 3].
     """
 
     status: NDArray[np.int8]
@@ -46,6 +49,9 @@ class Outcomes:
     pitch: Array
     yaw: Array
     total_yaw: Array
+    exit_velocity: Array
+    exit_axis: Array
+    exit_position: Array
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,34 @@ class BentOutcomes(Outcomes):
     bending_section: Array
     bending_stress: Array
     bending_stress_section: Array
+
+
+@dataclass(frozen=True)
+class LayeredOutcomes(Outcomes):
+    """Outcomes with how each core left each layer; layer 0 is the plate. The others are those of the whole target.
+
+    A core leaves a layer at the instant when its last point passes the rear face. NaN where it does not.
+
+    Attributes:
+        layer_status: codes of `LayerStatus`, shape [shots, layers].
+        layer_residual_velocity: speed at that instant [m/s], shape [shots, layers].
+        layer_tilt: angle between core axis and line of fire at that instant [rad], shape [shots, layers].
+        layer_time: that instant, from the first touch of the front face on [s], shape [shots, layers].
+        stopped_in: the deepest layer that the core rests in, −1 for a core that does not rest in one, shape [shots].
+        depth: how far behind the front face of this layer any point of the core came [m], shape [shots]; else NaN.
+    """
+
+    layer_status: NDArray[np.int8]
+    layer_residual_velocity: Array
+    layer_tilt: Array
+    layer_time: Array
+    stopped_in: NDArray[np.int8]
+    depth: Array
+
+
+@dataclass(frozen=True)
+class LayeredBentOutcomes(BentOutcomes, LayeredOutcomes):
+    """Outcomes with both."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +138,8 @@ def simulate(
         progress: called repeatedly with (shots done, all shots); an exception that it raises ends the computation.
 
     Returns:
-        The outcomes at the stand-offs that the scene records; `BentOutcomes` where it records the bending moment.
+        The outcomes at the stand-offs that the scene records; `BentOutcomes` where it records the bending moment,
+        `LayeredOutcomes` where the target has layers behind its plate, `LayeredBentOutcomes` where both.
 
     Raises:
         DeviceError: the device is absent.
@@ -123,8 +158,13 @@ def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
 
 
 def _outcomes(march: March, contact: Any) -> Outcomes:
-    report = march.report(contact)
-    return BentOutcomes(**report) if march.variant.bends else Outcomes(**report)
+    kinds: dict[tuple[bool, bool], type[Outcomes]] = {
+        (False, False): Outcomes,
+        (True, False): BentOutcomes,
+        (False, True): LayeredOutcomes,
+        (True, True): LayeredBentOutcomes,
+    }
+    return kinds[march.variant.bends, march.variant.layered](**march.report(contact))
 
 
 def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None) -> list[Array]:

@@ -8,8 +8,6 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d, distance_transform_edt
-from scipy.optimize import brentq
 
 from warpimpact.scene import Pattern, Plate
 from warpimpact.solver.device import free_memory
@@ -44,6 +42,8 @@ class Tile:
         """Lower bound of every cell's distance from the material of the whole lattice [m], shape of `material`."""
         # The search runs over blocks of cells. A block with any material is a wall. One period is searched amid eight
         # others: no hole is wider than the period, so they contain the nearest wall.
+        from scipy.ndimage import distance_transform_edt  # a quarter of a second to import
+
         rows, columns = self.material.shape
         block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
         starts = [np.arange(0, count, size) for count, size in zip(self.material.shape, block, strict=True)]
@@ -84,7 +84,7 @@ class _Itself:
         return id(self.pattern)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
     """The tile of a pattern, kept for later shots at the same plate."""
     pattern = itself.pattern
@@ -112,6 +112,8 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
         y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
         part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
     if not sharp:  # no running sum: its rounding would leave material in the middle of a hole
+        from scipy.ndimage import correlate1d
+
         for axis in range(2):
             material = correlate1d(material, np.full(BLUR, 1.0 / BLUR), axis, mode="wrap")
     return Tile(material, dy, dz)
@@ -127,14 +129,12 @@ def tent_taps(length: float, cell: float) -> Array:
     if length <= math.sqrt(2.0) * cell:
         return np.ones(1)
 
-    def taps(half_width: float) -> tuple[Array, Array]:
-        reach = int(np.ceil(half_width / cell - 1e-9)) - 1
-        offsets = cell * np.arange(-reach, reach + 1, dtype=np.float64)
-        weights: Array = np.asarray(1.0 - np.abs(offsets) / half_width)
-        return weights / weights.sum(), offsets
-
-    def excess(half_width: float) -> float:
-        weights, offsets = taps(half_width)
-        return float(weights @ offsets**2 + cell**2 / 3.0 - length**2 / 6.0)
-
-    return taps(brentq(excess, cell, length + cell))[0]
+    moment = (length / cell) ** 2 / 6.0 - 1.0 / 3.0  # of the filter, in cells
+    for reach in range(1, math.ceil(length / cell) + 1):
+        # Σ(1 - |k|/w) k² = moment Σ(1 - |k|/w) over |k| <= reach is linear in 1/w.
+        points, ramp = 2 * reach + 1, reach * (reach + 1)
+        half_width = ramp * (0.5 * ramp - moment) / (points * (ramp / 3.0 - moment))
+        if reach < half_width + 1e-9 <= reach + 1 + 2e-9:
+            break
+    weights = 1.0 - np.abs(np.arange(-reach, reach + 1)) / half_width
+    return np.asarray(weights / weights.sum())

@@ -16,7 +16,8 @@ from warpimpact.solver.simulate import Outcomes, Replay
 def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
     """Outcomes of all images of the shots under a group, shape [shots · group]; the images of a shot follow each other.
 
-    A projected angle changes its sign with its axis. The angular velocity is an axial vector. Other outcomes stay.
+    A projected angle changes its sign with its axis. The angular velocity is an axial vector, the other vectors are
+    polar. Other outcomes stay.
     """
     every = _repeated(outcomes, len(group))
     signs = np.tile([s.polar for s in group], (len(outcomes.status), 1))
@@ -26,6 +27,9 @@ def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
         angular_velocity=every.angular_velocity * axial,
         yaw=every.yaw * signs[:, 1:2],
         pitch=every.pitch * signs[:, 2:3],
+        exit_velocity=every.exit_velocity * signs,
+        exit_axis=every.exit_axis * signs,
+        exit_position=every.exit_position * signs,
     )
 
 

@@ -93,7 +93,7 @@ class Student:
 
 def log_prior(points: Array) -> Array:
     """Logarithm of the standard normal density, shape [points]."""
-    return -0.5 * (points**2).sum(axis=1) - 0.5 * points.shape[1] * math.log(2.0 * math.pi)
+    return np.asarray(-0.5 * (points**2).sum(axis=1) - 0.5 * points.shape[1] * math.log(2.0 * math.pi))
 
 
 @dataclass
@@ -219,7 +219,7 @@ def _tempered(raw: Array, effective: float) -> Array:
     def at(power: float) -> Array:
         log = np.where(np.isfinite(raw), power * raw, -np.inf)
         weights: Array = np.exp(log - log.max())
-        return weights / weights.sum()
+        return np.asarray(weights / weights.sum())
 
     wanted = min(effective, 0.5 * np.isfinite(raw).sum())
     low, high = 0.0, 1.0

@@ -16,7 +16,7 @@ from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
-from warpimpact.results.variables import HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.results.variables import EXIT_VARIABLES, HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.scene import Interaction
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -66,7 +66,7 @@ def test_replay_ends_with_the_bits_of_the_stored_outcome(
     for hit in range(3):
         history = replay(result, hit, folder=NOWHERE)
         assert history.attrs["agreement"] == "bit-identical"
-        for name in OUTCOME_VARIABLES:
+        for name in (*OUTCOME_VARIABLES, *EXIT_VARIABLES):
             end = "residual_angular_velocity" if name == "angular_velocity" else name
             np.testing.assert_array_equal(history[end], result[name][hit])
 
@@ -87,6 +87,8 @@ def test_history_leads_to_its_end(history: xarray.Dataset) -> None:
     last, body = history.isel(time=-1), CORE.mass_properties
     assert float(np.linalg.norm(last["velocity"])) == pytest.approx(float(history["residual_velocity"]), rel=1e-14)
     np.testing.assert_allclose(last["angular_velocity"], history["residual_angular_velocity"], rtol=1e-12)
+    for along, end in (("velocity", "exit_velocity"), ("core_axis", "exit_axis"), ("plate_position", "exit_position")):
+        np.testing.assert_allclose(last[along], history[end], rtol=1e-12, atol=1e-12, err_msg=end)
     impact = 0.5 * (body.mass * SLANTED.velocity**2 + body.inertia_axial * SLANTED.spin**2)
     end = float(last["translational_energy"] + last["rotational_energy"])
     assert impact - end == pytest.approx(float(history["energy_loss"]), rel=1e-12)
@@ -178,9 +180,11 @@ def test_files_of_the_campaign_are_looked_for_in_the_folder(tmp_path: Path) -> N
     assert replay(result, 0, folder=tmp_path).attrs["agreement"] == "bit-identical"
     with pytest.raises(CampaignError, match=r"the campaign in the result: hits\.file: .* no file nowhere/hits\.csv"):
         replay(result, 0, folder=NOWHERE)
-    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.001,0.002\n0.002,0.002\n")
-    with pytest.raises(ResultError, match="got a result with 1 hits, but its campaign and the files it names give 2"):
+    (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0.002,0.002\n")
+    with pytest.raises(ResultError, match="names now give another shot"):
         replay(result, 0, folder=tmp_path)
+    with pytest.raises(ResultError, match="hit: got 4, but the campaign and the files it names give only 1 hits"):
+        replay(result.assign_coords(hit=[4]), 4, folder=tmp_path)
 
 
 def test_command_writes_history_and_figures(

@@ -41,6 +41,7 @@ def campaign(tmp_path: Path, quantity: str, half_width: str, max_count: int = 2*
     text = DRAFT.replace("[output]", STOP.format(quantity, half_width, max_count))
     for name, value in hits.items():
         text = text.replace(f'{name} = "sobol"' if name == "sampling" else "seed = 1", f"{name} = {value}")
+    text = text.replace("[hits]", "[hits]\nirreducible = false")  # the numbers here know no symmetry
     (tmp_path / "campaign.toml").write_text(text, encoding="utf-8")
     return Campaign.from_toml(tmp_path / "campaign.toml")
 
@@ -184,3 +185,30 @@ def test_intervals_of_a_campaign_that_says_nothing_of_replicates_hold(text: str,
         if text.startswith("mean"):
             assert estimate.half_width < 0.5 * independent.half_width
     assert held >= LEAST
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (("", ""), True),
+        (("[hits]", "[hits]\nirreducible = false"), False),
+        (
+            ('velocity = "825 m/s"', 'velocity = "825 m/s"\npitch = { distribution = "normal", mean = 0, std = 1 }'),
+            False,
+        ),
+        (('sampling = "sobol"', 'sampling = "random"'), True),
+    ],
+)
+def test_a_rule_computes_no_image_unless_told_otherwise(
+    change: tuple[str, str], expected: bool, tmp_path: Path
+) -> None:
+    text = DRAFT.replace("[output]", STOP.format("mean(residual_velocity)", "1 m/s", 4096))
+    changed = text.replace(*change) if change[0] else text
+    assert not change[0] or changed != text
+    scene = Campaign.from_text(changed, name="text", folder=tmp_path)
+    assert scene.hits.irreducible is expected
+    assert Campaign.from_text(scene.text, name="text", folder=tmp_path) == scene
+    without = changed.replace(STOP.format("mean(residual_velocity)", "1 m/s", 4096), "[output]")
+    if expected:
+        counted = Campaign.from_text(without.replace("seed = 1", "seed = 1\ncount = 8"), name="text", folder=tmp_path)
+        assert not counted.hits.irreducible

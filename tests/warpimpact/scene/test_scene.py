@@ -43,11 +43,11 @@ def test_a_plate_alone_is_a_target() -> None:
         ({"record": {"standoffs": ["130 mm", "50 mm"]}}, "got 0.05 m after 0.13 m, but stand-offs must increase"),
         (
             {"record": {"standoffs": ["10 mm"]}},
-            "got record.standoffs of 0.01 m, but a core of this size is certain to be out of the plate only from 0.01",
+            "got record.standoffs of 0.01 m, but a core of this size is certain to be out of the target only from 0.01",
         ),
         (
             {"record": {"standoffs": ["20 mm"], "standoff_point": "nose"}},
-            "got record.standoffs of 0.02 m, but a core of this size is certain to be out of the plate only from 0.03",
+            "got record.standoffs of 0.02 m, but a core of this size is certain to be out of the target only from 0.03",
         ),
         (
             {"core": CORE.model_copy(update={"centre_of_mass": 15e-3}), "record": {"bending": True}},

@@ -71,3 +71,8 @@ def test_an_angle_that_was_read_is_not_read_again() -> None:
     assert angle.validate_python(once) == once == pytest.approx(math.radians(20))
     assert angle.validate_json(angle.dump_json(once)) == once
     assert angle.validate_python(angle.dump_python(once)) == once
+
+
+@pytest.mark.parametrize(("unit", "si_unit"), units.COMMON)
+def test_common_units_are_those_of_pint(unit: str, si_unit: str) -> None:
+    assert units.COMMON[unit, si_unit] == units._by_pint(unit, si_unit)

@@ -48,7 +48,7 @@ def _parsed(path: Path) -> xml.Element:
                 raise ValueError(f"{path.name} has groups in groups, more than {_MOST_DEEP} deep")
     except (xml.ParseError, UnicodeDecodeError, LookupError, OSError) as error:
         raise ValueError(f"{path.name} is not an SVG drawing: {brief(str(error))}") from None
-    assert root is not None  # a file without elements is no XML
+    assert isinstance(root, xml.Element)  # a file without elements is no XML
     return root
 
 

@@ -286,7 +286,7 @@ class LatticePattern(Pattern):
 def _bin(at: Array, period: Any, count: Any) -> NDArray[np.int64]:
     """Index of the bin of each coordinate, of `count` bins of a period about the origin. The outermost bins have no
     end."""
-    return np.clip(np.floor((at / period + 0.5) * count), 0, count - 1).astype(np.int64)
+    return np.asarray(np.clip(np.floor((at / period + 0.5) * count), 0, count - 1), dtype=np.int64)
 
 
 def _millimetres(pair: Any) -> str:

@@ -23,6 +23,11 @@ class MaskPattern(Pattern):
     value is material. In a PNG image y runs from left to right and z from bottom to top: black is hole, one
     other grey is material. An SVG drawing has the same orientation and must have a width and a height in mm. Filled
     shapes are holes, and a cell is hole if its middle lies in one.
+
+    Attributes:
+        shape: "mask".
+        file: PNG image, .npy array or SVG drawing.
+        cell_size: side of a cell [m].
     """
 
     shape: Literal["mask"] = "mask"
@@ -58,7 +63,7 @@ class MaskPattern(Pattern):
             np.floor(coordinate / self.cell_size + cells / 2).astype(np.int64) % cells
             for coordinate, cells in zip((y, z), self.material.shape, strict=True)
         )
-        return ~self.material[i, j]
+        return np.asarray(~self.material[i, j])
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """Closed outlines, each of shape [points, 2] [m], of holes; the rectangle cuts them."""

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
 
 from ..files import check_bytes
 from ..model import Array
@@ -47,6 +46,8 @@ def read_mask(path: Path, cell_size: float) -> BoolArray:
 
 
 def _material(path: Path, cells: NDArray[Any]) -> BoolArray:
+    from scipy.ndimage import label  # a quarter of a second to import
+
     levels = np.unique(cells)
     if not (len(levels) == 2 and levels[0] == 0 < levels[1]):
         raise ValueError(f"{path.name} is not a mask: a mask has two values, 0 is hole and one above is material")

@@ -92,7 +92,11 @@ class Pattern(Model, ABC):
 
 
 class NoPattern(Pattern):
-    """A plate without holes; its unit cell is a square millimetre."""
+    """A plate without holes; its unit cell is a square millimetre.
+
+    Attributes:
+        shape: "none".
+    """
 
     shape: Literal["none"] = "none"
 

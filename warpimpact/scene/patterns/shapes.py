@@ -14,7 +14,12 @@ _ELLIPSE_CHORDS = 720
 
 
 class CirclePattern(LatticePattern):
-    """Round holes of `diameter` [m]."""
+    """Round holes of `diameter` [m].
+
+    Attributes:
+        shape: "circle".
+        diameter: of a hole [m].
+    """
 
     shape: Literal["circle"] = "circle"
     diameter: PositiveLength
@@ -31,7 +36,12 @@ class CirclePattern(LatticePattern):
 
 
 class _OblongPattern(LatticePattern):
-    """Holes of overall `length` along z and `width` along y [m]."""
+    """Holes of overall `length` along z and `width` along y [m].
+
+    Attributes:
+        length: overall, along z [m].
+        width: along y, at most the length [m].
+    """
 
     length: PositiveLength
     width: PositiveLength
@@ -45,7 +55,11 @@ class _OblongPattern(LatticePattern):
 
 
 class SlotPattern(_OblongPattern):
-    """Stadium-shaped slots, overall `length` along z and `width` along y [m]."""
+    """Stadium-shaped slots, overall `length` along z and `width` along y [m].
+
+    Attributes:
+        shape: "slot".
+    """
 
     shape: Literal["slot"] = "slot"
 
@@ -62,7 +76,11 @@ class SlotPattern(_OblongPattern):
 
 
 class EllipsePattern(_OblongPattern):
-    """Elliptic holes, overall `length` along z and `width` along y [m]."""
+    """Elliptic holes, overall `length` along z and `width` along y [m].
+
+    Attributes:
+        shape: "ellipse".
+    """
 
     shape: Literal["ellipse"] = "ellipse"
 
@@ -86,7 +104,11 @@ class EllipsePattern(_OblongPattern):
 
 
 class _PolygonPattern(LatticePattern):
-    """Regular polygons about the place of the hole, with corners rounded by `corner_radius` [m]."""
+    """Regular polygons about the place of the hole, with corners rounded by `corner_radius` [m].
+
+    Attributes:
+        corner_radius: of the rounded corners [m].
+    """
 
     corner_radius: Length = Field(default=0.0, ge=0)
 
@@ -119,7 +141,12 @@ class _PolygonPattern(LatticePattern):
 
 
 class TrianglePattern(_PolygonPattern):
-    """Equilateral triangles: one side along y, apex to +z. `side` [m] is that of the triangle with sharp corners."""
+    """Equilateral triangles: one side along y, apex to +z.
+
+    Attributes:
+        shape: "triangle".
+        side: of the triangle with sharp corners [m].
+    """
 
     shape: Literal["triangle"] = "triangle"
     side: PositiveLength
@@ -136,7 +163,12 @@ class TrianglePattern(_PolygonPattern):
 
 
 class SquarePattern(_PolygonPattern):
-    """Squares of `side` [m], sides along y and z."""
+    """Squares of `side` [m], sides along y and z.
+
+    Attributes:
+        shape: "square".
+        side: of the square with sharp corners [m].
+    """
 
     shape: Literal["square"] = "square"
     side: PositiveLength
@@ -153,7 +185,12 @@ class SquarePattern(_PolygonPattern):
 
 
 class HexagonPattern(_PolygonPattern):
-    """Regular hexagons of `width` across flats [m], two sides along z."""
+    """Regular hexagons of `width` across flats [m], two sides along z.
+
+    Attributes:
+        shape: "hexagon".
+        width: across flats [m].
+    """
 
     shape: Literal["hexagon"] = "hexagon"
     width: PositiveLength

@@ -1,0 +1,97 @@
+"""How a core left each layer of a target, and where it came to rest."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import rigid_body
+from .status import LayerStatus, Status
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the passage through the layers for one variant."""
+    real, vec3 = variant.real, variant.vec3
+    one = real(1.0)
+    motion = rigid_body.build(variant)
+    Body, State = motion.Body, motion.State
+    ARRESTED, RICOCHETED, UNFINISHED = (
+        wp.constant(int(s)) for s in (Status.ARRESTED, Status.RICOCHETED, Status.UNFINISHED)
+    )
+    PASSED, MISSED, ENTERED, NOT_REACHED = (
+        wp.constant(int(s))
+        for s in (LayerStatus.PERFORATED, LayerStatus.MISSED, LayerStatus.ARRESTED, LayerStatus.NOT_REACHED)
+    )
+
+    @wp.struct
+    class Passage:
+        """How each core left each layer: arrays of shape [shots, layers], SI and radians.
+
+        Velocity, tilt and time are those at the instant when the last point of the core leaves the layer through its
+        rear face; NaN where that does not happen. Per shot: the layer that the core came to rest in, or −1, and how far
+        behind this layer's front face any of its points came [m].
+        """
+
+        status: wp.array2d(dtype=wp.int32)
+        velocity: wp.array2d(dtype=real)
+        tilt: wp.array2d(dtype=real)
+        time: wp.array2d(dtype=real)
+        stopped_in: wp.array(dtype=wp.int32)
+        depth: wp.array(dtype=real)
+
+    @wp.func
+    def begin(passage: Passage, shot: wp.int32, layers: wp.int32):
+        """No layer is reached yet."""
+        for k in range(layers):
+            passage.status[shot, k] = NOT_REACHED
+            passage.velocity[shot, k] = real(wp.nan)
+            passage.tilt[shot, k] = real(wp.nan)
+            passage.time[shot, k] = real(wp.nan)
+        passage.stopped_in[shot] = -1
+        passage.depth[shot] = real(wp.nan)
+
+    @wp.func
+    def enter(passage: Passage, shot: wp.int32, layer: wp.int32):
+        """Record that the core touches a layer."""
+        if passage.status[shot, layer] == NOT_REACHED:
+            passage.status[shot, layer] = ENTERED
+
+    @wp.func
+    def has_left(passage: Passage, shot: wp.int32, layer: wp.int32):
+        """Whether the core has left a layer through its rear face before."""
+        return passage.status[shot, layer] == PASSED or passage.status[shot, layer] == MISSED
+
+    @wp.func
+    def leave(
+        passage: Passage,
+        body: Body,
+        shot: wp.int32,
+        layer: wp.int32,
+        state: State,
+        beyond: real,
+        time: real,
+        flight: vec3,
+    ):
+        """Record how a core whose last point is `beyond` a layer's rear face [m] left the layer."""
+        since = beyond / wp.max(state.velocity[0], one)
+        axis = motion.turned(body, motion.axis_of(state.attitude), state.angular_momentum, -since)
+        passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, PASSED, MISSED)
+        passage.velocity[shot, layer] = wp.length(state.velocity)
+        passage.tilt[shot, layer] = wp.atan2(wp.length(wp.cross(axis, flight)), wp.dot(axis, flight))
+        passage.time[shot, layer] = time - since
+
+    @wp.func
+    def conclude(passage: Passage, shot: wp.int32, layer: wp.int32, status: wp.int32, inside: wp.bool, depth: real):
+        """Say how the core ended in a layer that it did not leave through the rear face. It rests there if it is
+        `inside`; `depth` is how far it came behind the front face [m]."""
+        if passage.status[shot, layer] == ENTERED:
+            stays = status == ARRESTED and inside
+            other = wp.where(status >= UNFINISHED, status, RICOCHETED)
+            passage.status[shot, layer] = wp.where(stays, ARRESTED, other)
+            if stays:
+                passage.stopped_in[shot] = layer
+                passage.depth[shot] = depth
+
+    return SimpleNamespace(Passage=Passage, begin=begin, enter=enter, has_left=has_left, leave=leave, conclude=conclude)

@@ -1,0 +1,98 @@
+"""The JSON schema of campaign files: it takes what warpimpact takes, and finds the slips that an editor can find."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from warpimpact.campaign.schema import campaign_schema
+
+CAMPAIGNS = sorted((Path(__file__).parents[3] / "campaigns").glob("*.toml"))
+
+
+@pytest.fixture(scope="module")
+def schema() -> dict[str, Any]:
+    return campaign_schema()
+
+
+@pytest.fixture
+def campaign() -> dict[str, Any]:
+    text = (CAMPAIGNS[0].parent / "slotted_plate.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def complaints(schema: dict[str, Any], campaign: dict[str, Any]) -> list[str]:
+    return [error.json_path for error in Draft202012Validator(schema).iter_errors(campaign)]
+
+
+def test_it_is_a_schema(schema: dict[str, Any]) -> None:
+    Draft202012Validator.check_schema(schema)
+
+
+@pytest.mark.parametrize("path", CAMPAIGNS, ids=lambda path: path.stem)
+def test_it_takes_the_campaigns(schema: dict[str, Any], path: Path) -> None:
+    assert complaints(schema, tomllib.loads(path.read_text(encoding="utf-8"))) == []
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [
+        ("plate", "thickness", 0.004),
+        ("plate", "size", ["200 mm", 0.3]),
+        ("impact", "obliquity", 20),
+        ("impact", "velocity", {"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"}),
+        ("core", "mass", {"distribution": "discrete", "values": ["4 g", "4.1 g"], "weights": [1, 2]}),
+        ("plate", "pattern", {"shape": "circle", "diameter": "9 mm", "spacing": [0.01, 0.02], "holes": [[0, 0]]}),
+        ("numerics", "tolerance", {"tilt": "1 deg"}),
+        ("stop", "half_width", "0.5 m/s"),
+    ],
+)
+def test_it_takes(schema: dict[str, Any], campaign: dict[str, Any], table: str, key: str, value: object) -> None:
+    stop = {"quantity": "mean(residual_velocity)", "half_width": 1, "max_count": 64}
+    assert complaints(schema, campaign | {table: campaign.get(table, stop) | {key: value}}) == []
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "value"),
+    [
+        ("plate", "thicknes", "4 mm"),
+        ("plate", "thickness", "mm 4"),
+        ("plate", "thickness", "4"),
+        ("plate", "thickness", 0),
+        ("plate", "degradation", 1.8),
+        ("plate", "size", ["200 mm"]),
+        ("plate", "pattern", {"shape": "star", "spacing": [1, 1]}),
+        ("impact", "obliquity", 95),
+        ("impact", "velocity", {"distribution": "norml", "mean": "820 m/s", "std": "10 m/s"}),
+        ("hits", "count", 0),
+        ("numerics", "fidelity", "fine"),
+        ("hits", "irreducible", "yes"),
+    ],
+)
+def test_it_refuses(schema: dict[str, Any], campaign: dict[str, Any], table: str, key: str, value: object) -> None:
+    found = complaints(schema, campaign | {table: campaign[table] | {key: value}})
+    assert any(place.startswith(f"$.{table}") for place in found), found
+
+
+def test_every_key_says_what_it_means(schema: dict[str, Any]) -> None:
+    tables = {"campaign": schema, **schema["$defs"]}
+    silent = [
+        f"{table}.{key}"
+        for table, one in tables.items()
+        for key, told in one.get("properties", {}).items()
+        if len(told.get("description", "")) < 5
+    ]
+    assert not silent, f"say what these keys mean, under Attributes in the docstring of their model: {silent}"
+
+
+def test_nothing_is_told_that_toml_lacks(schema: dict[str, Any]) -> None:
+    text = str(schema)
+    assert "'null'" not in text
+    assert "inf," not in text
+
+
+def test_a_profile_comes_from_a_file_or_from_numbers(schema: dict[str, Any], campaign: dict[str, Any]) -> None:
+    for core in ({"file": "core.csv"}, {"s": [0, "1 mm"], "r": [0, "1 mm"]}):
+        assert complaints(schema, campaign | {"core": {"shape": "profile", "mass": "4 g", **core}}) == []

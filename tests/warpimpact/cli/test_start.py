@@ -1,0 +1,90 @@
+"""The commands that help to start: examples, new, schema, completion; and what -v and -q tell."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from warpimpact import Campaign
+from warpimpact.cli import main
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["examples"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == sorted(path.stem for path in CAMPAIGNS.glob("*.toml"))
+    assert all("?" in line for line in lines)
+
+
+@pytest.mark.parametrize("name", ["slotted_plate", "paper_shots"])
+def test_a_new_campaign_can_be_read(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("folder").mkdir()
+    assert main(["new", name, "-o", "folder/my.toml"]) == 0
+    written = capsys.readouterr().out.split()
+    assert all(Path(file).is_file() for file in written)
+    first, rest = Path("folder/my.toml").read_text(encoding="utf-8").split("\n", 1)
+    assert first == "#:schema warpimpact.schema.json"
+    assert rest == (CAMPAIGNS / f"{name}.toml").read_text(encoding="utf-8")
+    assert "$defs" in json.loads(Path("folder/warpimpact.schema.json").read_text(encoding="utf-8"))
+    assert Campaign.from_toml("folder/my.toml") == Campaign.from_toml(CAMPAIGNS / f"{name}.toml").model_copy(
+        update={"hits": Campaign.from_toml("folder/my.toml").hits}
+    )
+
+
+def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("slotted_plate.toml").write_text("mine")
+    assert main(["new", "slotted_plate"]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert Path("slotted_plate.toml").read_text() == "mine"
+    assert main(["new", "slotted_plate", "--overwrite"]) == 0
+    assert Path("slotted_plate.toml").read_text() != "mine"
+
+
+def test_an_unknown_example_is_told_with_a_likely_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "sloted_plate"]) == 2
+    assert 'did you mean "slotted_plate"?' in capsys.readouterr().err
+
+
+def test_the_schema_is_printed_or_written(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    printed = capsys.readouterr().out
+    assert main(["schema", "-o", "it.json"]) == 0
+    assert Path("it.json").read_text(encoding="utf-8") == printed
+    assert json.loads(printed)["title"] == "warpimpact campaign"
+    assert main(["schema", "-o", "it.json"]) == 2
+
+
+def test_bash_completes_commands_and_options(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", "bash"]) == 0
+    script = capsys.readouterr().out + (
+        "COMP_WORDS=(warpimpact pl); COMP_CWORD=1; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
+        "COMP_WORDS=(warpimpact run --ov); COMP_CWORD=2; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
+    )
+    done = subprocess.run(["bash"], input=script, capture_output=True, text=True, check=False)
+    assert done.stdout.splitlines() == ["plot plate", "--overwrite"]
+
+
+@pytest.mark.parametrize(
+    ("option", "told", "untold"),
+    [
+        ([], "64 of 64 hits", "warpimpact.solver"),
+        (["-q"], "", "of 64 hits"),
+        (["-v"], "warpimpact.solver.promise: pilot at level", "warpimpact.solver.device"),
+        (["-vv"], "warpimpact.solver.device: march on cpu: loaded in", "nothing of the kind"),
+    ],
+)
+def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", str(CAMPAIGNS / "slotted_plate.toml"), "--count", "64", "--device", "cpu", *option]) == 0
+    shown = capsys.readouterr().err
+    assert told in shown
+    assert untold not in shown

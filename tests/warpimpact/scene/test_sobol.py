@@ -1,0 +1,33 @@
+"""Sobol points by their number."""
+
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from warpimpact.scene.sobol import BITS, MOST_DIMENSIONS, Sobol
+
+
+@pytest.mark.parametrize("dimensions", [1, 2, 15, MOST_DIMENSIONS])
+def test_the_points_of_scipy(dimensions: int) -> None:
+    found = Sobol(dimensions, np.random.SeedSequence(7, spawn_key=(3,))).points(0, 256)
+    rng = np.random.default_rng(np.random.SeedSequence(7, spawn_key=(3,)))
+    np.testing.assert_array_equal(found, qmc.Sobol(dimensions, rng=rng).random(256))
+
+
+def test_any_part_at_any_time() -> None:
+    whole = Sobol(5, np.random.SeedSequence(1)).points(0, 300)
+    late = Sobol(5, np.random.SeedSequence(1))
+    np.testing.assert_array_equal(late.points(200, 100), whole[200:])
+    np.testing.assert_array_equal(late.points(17, 40), whole[17:57])
+
+
+def test_the_last_point_exists_and_the_next_does_not() -> None:
+    sobol = Sobol(2, np.random.SeedSequence(1))
+    assert sobol.points((1 << BITS) - 1, 1).shape == (1, 2)
+    with pytest.raises(ValueError, match="has 1073741824 points"):
+        sobol.points(1 << BITS, 1)
+
+
+def test_too_many_dimensions() -> None:
+    with pytest.raises(ValueError, match=f"{MOST_DIMENSIONS} are allowed"):
+        Sobol(MOST_DIMENSIONS + 1, np.random.SeedSequence(1))

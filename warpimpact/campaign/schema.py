@@ -1,0 +1,153 @@
+"""The JSON schema of campaign files, from the models: for editors, and for the reference in the documentation."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import BaseModel
+
+from ..scene.model import Model
+from ..scene.scatter import PURE_NUMBERS, QUANTITIES, Distribution
+from .campaign import Campaign
+
+Schema = dict[str, Any]
+
+_BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+_ENTRY = re.compile(r"^    (?P<names>\w+(?:, \w+)*)(?: \[[^]]*\])?: ?(?P<text>.*)$")
+
+
+def campaign_schema() -> Schema:
+    """The JSON schema (2020-12) of a campaign file, and of one with several plates for ``warpimpact compare``.
+
+    Every key has its description, its default and its bounds. A quantity is a number or a string with a unit; the
+    keyword ``unit`` is that of a number. A schema cannot tell that keys exclude each other: warpimpact does.
+    """
+    schema: Schema = _tidied(Campaign.model_json_schema(mode="validation"))
+    definitions = schema["$defs"]
+    for model in _models():
+        if model.__name__ in definitions:
+            _complete(definitions[model.__name__], model)
+    _complete(schema, Campaign)
+    _take_distributions(schema)
+    _take_plates(schema)
+    definitions["Stop"]["properties"]["half_width"]["type"] = ["number", "string"]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        **schema,
+        "title": "warpimpact campaign",
+        "description": "A campaign of warpimpact: what is shot at what, where, how finely it is computed.",
+    }
+
+
+def _models(base: type[BaseModel] = Model) -> Iterator[type[BaseModel]]:
+    """All models of campaigns."""
+    for model in base.__subclasses__():
+        yield model
+        yield from _models(model)
+
+
+def _tidied(part: Any) -> Any:
+    """Without what TOML lacks (null, infinity) and titles, and with the names of the standard for bounds."""
+    if isinstance(part, list):
+        return [_tidied(one) for one in part]
+    if not isinstance(part, dict):
+        return part
+    kept = {_BOUNDS.get(name, name): _tidied(value) for name, value in part.items() if _says_something(name, value)}
+    choices = [one for one in kept.get("anyOf", []) if one != {"type": "null"}]
+    if len(choices) == 1:
+        del kept["anyOf"]
+        return choices[0] | kept
+    return kept | ({"anyOf": choices} if choices else {})
+
+
+def _says_something(name: str, value: Any) -> bool:
+    if name == "title":
+        return isinstance(value, dict)  # a key of that name
+    return name != "default" or value not in (None, float("inf"))
+
+
+def _complete(definition: Schema, model: type[BaseModel]) -> None:
+    """Add what the model knows of its keys beyond their types."""
+    properties, (summary, meanings) = definition["properties"], described(model)
+    definition["description"] = summary
+    for name, text in meanings.items():
+        if name in properties:
+            properties[name]["description"] = _in_a_file(text)
+    if issubclass(model, Model):
+        for name in [key for key in model._keys() if key not in properties]:  # read into other keys, as a file is
+            properties[name] = {"description": meanings.get(name, "")}
+            definition.pop("required", None)
+    chosen = [name for name in ("shape", "distribution") if "const" in properties.get(name, {})]
+    if chosen:
+        definition["required"] = [*chosen, *definition.get("required", [])]
+
+
+def _in_a_file(text: str) -> str:
+    """What a docstring says of a field, as it holds for the key of a file: its unit is told apart."""
+    return re.sub(r"\bNone\b", "not given", re.sub(r"(?:^| )\[[^]]*\]", "", text)).strip(" .") + "."
+
+
+def described(model: type) -> tuple[str, dict[str, str]]:
+    """What the docstring of a model says: its first paragraphs, and the meanings of its keys."""
+    meanings: dict[str, str] = {}
+    for kind in reversed(model.__mro__):
+        meanings |= _entries(inspect.cleandoc(kind.__doc__ or "").partition("Attributes:\n")[2])
+    summary = inspect.cleandoc(model.__doc__ or "").partition("Attributes:\n")[0]
+    return " ".join(summary.split()), meanings
+
+
+def _entries(text: str) -> dict[str, str]:
+    entries: dict[str, str] = {}
+    names: list[str] = []
+    for line in text.splitlines():
+        if line and not line.startswith(" "):  # the section ends
+            break
+        if (match := _ENTRY.match(line)) is not None:
+            names = match["names"].split(", ")
+            entries |= dict.fromkeys(names, match["text"])
+        elif line.strip():
+            entries |= {name: f"{entries[name]} {line.strip()}" for name in names}
+    return entries
+
+
+def _take_distributions(schema: Schema) -> None:
+    """A distribution may take the place of a value that scatters."""
+    definitions, kinds = schema["$defs"], [model.__name__ for model in _models(Distribution)]
+    kinds = [name for name in kinds if name in definitions]
+    for name in kinds:
+        for key, one in definitions[name]["properties"].items():
+            if key not in PURE_NUMBERS:
+                one.get("items", one)["type"] = ["number", "string"]
+    definitions["Distribution"] = {
+        "description": "A distribution in the place of a value: each shot draws its own.",
+        "oneOf": [{"$ref": f"#/$defs/{name}"} for name in kinds],
+    }
+    del schema["properties"]["scatter"], definitions["Scatter"]  # a file has its distributions in the places of values
+    for name, quantity in QUANTITIES.items():
+        for definition in _referred(schema, schema["properties"][quantity.table]):
+            value = definition["properties"][name]
+            told = {key: value.pop(key) for key in ("description", "default") if key in value}
+            definition["properties"][name] = told | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
+
+
+def _referred(schema: Schema, part: Schema) -> list[Schema]:
+    """The definitions that a part of the schema refers to."""
+    references = [one["$ref"] for one in (part, *part.get("oneOf", [])) if "$ref" in one]
+    return [schema["$defs"][reference.rpartition("/")[2]] for reference in references]
+
+
+def _take_plates(schema: Schema) -> None:
+    """Several plates, each with a name, in a file for ``warpimpact compare``."""
+    one = schema["$defs"]["Plate"]
+    name = {"type": "string", "description": "Name of the plate and of its result; only where there are several."}
+    schema["$defs"]["NamedPlate"] = one | {
+        "description": "One of several plates that are compared.",
+        "properties": {"name": name} | one["properties"],
+        "required": ["name", *one["required"]],
+    }
+    several = {"type": "array", "items": {"$ref": "#/$defs/NamedPlate"}, "minItems": 2}
+    told = schema["properties"]["plate"]
+    schema["properties"]["plate"] = {"description": told.pop("description"), "anyOf": [told, several]}

@@ -1,0 +1,152 @@
+"""The commands examples, new, schema and completion: what helps to write a campaign and to type a command."""
+
+import argparse
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from .options import Commands, add_command, add_output, add_overwrite
+from .paths import check_output
+
+_SCHEMA = "warpimpact.schema.json"
+
+
+def add_examples(commands: Commands) -> None:
+    add_command(
+        commands,
+        "examples",
+        _examples,
+        summary="list the campaigns that come with warpimpact",
+        description="List the campaigns that come with warpimpact, each with the question that it answers. "
+        "warpimpact new copies one.",
+        example="examples",
+    )
+
+
+def _examples(arguments: argparse.Namespace) -> None:
+    paths = _campaigns()
+    width = max(map(len, paths))
+    for name, path in paths.items():
+        question = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("# ")
+        print(f"{name:<{width}}  {question}")
+
+
+def add_new(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "new",
+        _new,
+        summary="start a campaign of your own from an example",
+        description="Copy a campaign that comes with warpimpact, and the files that it names. The schema of campaigns "
+        f"is written beside it ({_SCHEMA}), so that an editor can complete and check the keys.",
+        example="new slotted_plate -o my.toml",
+    )
+    parser.add_argument("name", metavar="NAME", help="one of those that warpimpact examples lists")
+    add_output(parser, "CAMPAIGN.toml", "campaign file (default: NAME.toml in this folder)")
+    add_overwrite(parser, "existing files")
+
+
+def _new(arguments: argparse.Namespace) -> None:
+    import tomllib
+    from difflib import get_close_matches
+
+    from warpimpact.campaign.text import CampaignError
+
+    paths, name = _campaigns(), arguments.name.removesuffix(".toml")
+    if name not in paths:
+        meant = get_close_matches(name, paths, n=1)
+        hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(paths)}"
+        raise CampaignError(f'got the unknown example "{name}"; {hint}')
+    source, output = paths[name], arguments.output or Path(f"{name}.toml")
+    text = source.read_text(encoding="utf-8")
+    copies = {source.parent / file: output.parent / file for file in _named(tomllib.loads(text))}
+    for file in (output, *copies.values()):
+        check_output(file, overwrite=arguments.overwrite)
+    for one, copy in copies.items():
+        shutil.copyfile(one, copy)
+    output.write_text(f"#:schema {_SCHEMA}\n{text}", encoding="utf-8")
+    schema = output.parent / _SCHEMA
+    schema.write_text(_schema_text(), encoding="utf-8")
+    for written in (output, *copies.values(), schema):
+        print(written)
+
+
+def _campaigns() -> dict[str, Path]:
+    """Names of the campaigns of this installation, and their files."""
+    from importlib.resources import files
+
+    folder = Path(str(files("warpimpact.campaigns")))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def _named(value: Any) -> Iterator[str]:
+    """Files that a campaign names."""
+    inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, one in inner:
+        if key == "file" and isinstance(one, str):
+            yield one
+        yield from _named(one)
+
+
+def add_schema(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "schema",
+        _schema,
+        summary="print the JSON schema of campaign files, for editors",
+        description="Print the JSON schema of campaign files. An editor that knows TOML, such as VS Code with Even "
+        f"Better TOML, completes and checks a campaign whose first line is: #:schema {_SCHEMA}",
+        example=f"schema -o {_SCHEMA}",
+    )
+    add_output(parser, "SCHEMA.json", "file (default: printed)")
+    add_overwrite(parser, "an existing file")
+
+
+def _schema(arguments: argparse.Namespace) -> None:
+    if arguments.output is None:
+        print(_schema_text(), end="")
+        return
+    check_output(arguments.output, overwrite=arguments.overwrite)
+    arguments.output.write_text(_schema_text(), encoding="utf-8")
+    print(arguments.output)
+
+
+def _schema_text() -> str:
+    import json
+
+    from warpimpact.campaign.schema import campaign_schema
+
+    return json.dumps(campaign_schema(), indent=1, ensure_ascii=False) + "\n"
+
+
+def add_completion(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "completion",
+        _completion,
+        summary="print the completion of commands for a shell",
+        description="Print a script that lets the Tab key complete commands, options and file names. Put it where your "
+        'shell looks, or into a session: eval "$(warpimpact completion bash)"',
+        example="completion bash > ~/.local/share/bash-completion/completions/warpimpact",
+    )
+    parser.add_argument("shell", choices=("bash", "zsh", "tcsh"), help="the shell")
+
+
+def _completion(arguments: argparse.Namespace) -> None:
+    import shtab
+
+    from . import parser
+
+    program = parser()
+    for command in _commands(program):
+        for action in command._actions:
+            if action.type is Path:
+                action.complete = shtab.FILE  # type: ignore[attr-defined]
+    print(shtab.complete(program, arguments.shell))
+
+
+def _commands(program: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    for action in program._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            yield from action.choices.values()
