@@ -34,6 +34,13 @@ def add_run(commands: Commands) -> None:
     cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
     add_count(parser)
     parser.add_argument(
+        "--posterior",
+        type=Path,
+        metavar="POSTERIOR.nc",
+        help="draw the parameters of the material of every shot from this posterior, all of them together; written by "
+        "warpimpact identify",
+    )
+    parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; start a new one if there is none"
     )
     add_overwrite(parser, "an existing result or an interrupted run")
@@ -46,7 +53,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.team import cluster_team
     from warpimpact.results import files
 
-    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
     team = None

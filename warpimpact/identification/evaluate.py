@@ -12,8 +12,8 @@ from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.hits import Aim, Place, aim
 from warpimpact.identification.likelihood import Data, Score, score
 from warpimpact.identification.measured import WithLimit
-from warpimpact.identification.parameters import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.scene import Scene, Shots
+from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.simulate import Outcomes, simulate
 from warpimpact.solver.unfold import unfolded

@@ -12,10 +12,11 @@ from pydantic import Field
 
 from warpimpact.identification.hits import Place
 from warpimpact.identification.measured import Observation
-from warpimpact.identification.parameters import Parameter, Path, as_read, put
+from warpimpact.identification.parameters import Parameter, as_read, put
 from warpimpact.results.measures import Measure
 from warpimpact.scene import Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, Target
 from warpimpact.scene.model import Model
+from warpimpact.solver.columns import Path
 
 
 class Sampling(Model):

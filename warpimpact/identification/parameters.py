@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -16,22 +15,10 @@ from warpimpact.scene import AnyCore, Interaction, Plate
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.scatter import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from warpimpact.scene.units import quoted
-from warpimpact.solver.resolution import decay_rate
-
-Path = tuple[str | int, ...]
+from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path
 
 TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": AnyCore}
 """Tables of the scene whose numbers may be parameters."""
-COLUMNS = {
-    ("plate", "resistance"): "resistance",
-    ("plate", "shear_coefficient"): "shear_coefficient",
-    ("plate", "degradation"): "degradation",
-    ("plate", "thickness"): "thickness",
-    ("core", "mass"): "mass",
-}
-"""Parameters that differ from shot to shot of one computation. All others make a scene of their own."""
-UNITS_OF_EXPOSURE = (("plate", "degradation_interval"), ("plate", "degradation_distance"))
-"""β per Δt_β is the same law as β^(Δt₀/Δt_β) per Δt₀, so these become a degradation of the shot."""
 _DISTRIBUTION: TypeAdapter[Distribution] = TypeAdapter(AnyDistribution)
 _ALONG = ("y", "z")
 
@@ -245,21 +232,6 @@ def as_read(parameter: Parameter, value: float) -> Any:
     return f"{value!r} rad" if parameter.unit == "rad" else value
 
 
-def columns_of(values: Mapping[Path, Array], plate: Plate) -> dict[str, Array]:
-    """Columns of shots for the values of parameters, each of shape [sets].
-
-    Args:
-        values: by the path of the parameter, shape [sets].
-        plate: that of the scene, whose degradation and unit of exposure count where they have no values.
-    """
-    columns = {COLUMNS[path]: values[path] for path in COLUMNS if path in values}
-    for path in UNITS_OF_EXPOSURE:
-        if path in values:
-            base = columns.get("degradation", np.full_like(values[path], plate.degradation))
-            columns["degradation"] = np.exp(decay_rate(base, 1.0) * plate.degradation_unit / values[path])
-    return columns
-
-
 def corners(parameters: Sequence[Parameter]) -> Iterator[dict[Path, float]]:
     """Extreme values of the parameters: each alone at its ends with all others at their medians, then all together."""
     medians = {one.path: float(one.prior.quantile(np.array(0.5))) for one in parameters}
@@ -268,9 +240,3 @@ def corners(parameters: Sequence[Parameter]) -> Iterator[dict[Path, float]]:
             yield {**medians, one.path: end}
     for index in range(min(2 ** len(parameters), 256)):
         yield {one.path: one.ends[index >> place & 1] for place, one in enumerate(parameters)}
-
-
-def shown_unit(unit: str, typical: float) -> tuple[str, float]:
-    """Unit that people read a parameter in, and the factor to it from SI."""
-    shown = {"rad": ("°", math.degrees(1.0)), "Pa": ("GPa", 1e-9), "m": ("mm", 1e3), "s": ("µs", 1e6), "kg": ("g", 1e3)}
-    return shown.get(unit, (unit, 1.0)) if math.isfinite(typical) else (unit, 1.0)

@@ -12,6 +12,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from warpimpact.campaign.drawn import OF_THE_MATERIAL
 from warpimpact.identification.evaluate import data_of, discrepancies
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import KEPT, Score
@@ -29,6 +30,7 @@ ALIKE = 0.15
 """Largest distance between the distribution functions of prior and posterior at which they count as alike."""
 WIDE = 0.6
 """Share of the prior within the posterior's 90 % interval (0.9 if nothing was learnt) above which little was learnt."""
+_OF_PLATE = {path[1] for path in OF_THE_MATERIAL if path[0] == "plate"}
 _DENSITY_DRAWS = 400
 """Predicted rows whose probability is compared with that of the measured one."""
 
@@ -207,6 +209,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         attr.TITLE: fit.title,
         attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact identify",
         files.FIT: fit.text,
+        files.MATERIAL: _material(fit),
         **made,
         attr.SEED: fit.sampling.seed,
         files.EFFECTIVE: sampled.effective,
@@ -219,6 +222,12 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         "observations": fit.observed,
         "row_probability": json.dumps(rows),
     }
+
+
+def _material(fit: Fit) -> str:
+    scene = fit.scene_of(fit.shots[0])
+    plate = scene.target.plate.model_dump(include={str(name) for name in _OF_PLATE})
+    return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump()})
 
 
 def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:

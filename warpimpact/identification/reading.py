@@ -18,7 +18,6 @@ from warpimpact.identification.measured import read_measured
 from warpimpact.identification.parameters import (
     FitError,
     Parameter,
-    Path,
     corners,
     dotted,
     read_distribution,
@@ -31,6 +30,7 @@ from warpimpact.scene.model import Model
 from warpimpact.scene.scatter import QUANTITIES, Distribution
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.bending import check_bending
+from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
 
 _TABLES = ("core", "plate", "interaction")

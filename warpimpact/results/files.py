@@ -219,7 +219,11 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 "one, keep its attributes"
             )
         if not is_history(dataset):
-            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES))
+            _check(
+                dataset,
+                path,
+                (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, v.POSTERIOR_DRAW, *v.ESTIMATE_VARIABLES),
+            )
         yield dataset
 
 

@@ -38,6 +38,8 @@ PATH = "path"
 """Attribute of a parameter: its key in the scene, as JSON."""
 
 FIT = "fit"
+MATERIAL = "material"
+"""What the material had in the fit, the parameters at their medians: JSON of the tables plate and interaction."""
 EFFECTIVE = "effective_sample_size"
 PARETO_K = "pareto_k"
 CONVERGED = "converged"

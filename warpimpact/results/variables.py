@@ -104,6 +104,9 @@ DEGRADATION = Variable("degradation", _HIT, "1", "share of the resistance left a
 THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
 MASS = Variable("mass", _HIT, "kg", "mass of the core")
 
+POSTERIOR_DRAW = Variable("posterior_draw", _HIT, "1", "place of the shot's parameters in the posterior")
+"""Present only in a campaign with a posterior."""
+
 SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS)
 """Present only in a campaign in which they differ from shot to shot."""
 
