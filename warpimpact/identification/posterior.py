@@ -30,6 +30,8 @@ ALIKE = 0.15
 """Largest distance between the distribution functions of prior and posterior at which they count as alike."""
 WIDE = 0.6
 """Share of the prior within the posterior's 90 % interval (0.9 if nothing was learnt) above which little was learnt."""
+STRONG = 0.7
+"""Correlation above which two parameters are told of as a combination."""
 _OF_PLATE = {path[1] for path in OF_THE_MATERIAL if path[0] == "plate"}
 _DENSITY_DRAWS = 400
 """Predicted rows whose probability is compared with that of the measured one."""
@@ -218,6 +220,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         files.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
         files.EVIDENCE: weights.log_evidence,
         "wanted_sample_size": fit.sampling.effective,
+        files.SETS: len(sampled.points) // sampled.block,
         "hits": fit.sampling.hits,
         "observations": fit.observed,
         "row_probability": json.dumps(rows),
@@ -304,6 +307,19 @@ def learnt(tree: xarray.DataTree) -> dict[str, Learnt]:
             tuple(float(one) for one in np.quantile(before, [0.05, 0.5, 0.95])),  # type: ignore[arg-type]
         )
     return found
+
+
+def together(tree: xarray.DataTree) -> list[tuple[str, str, float]]:
+    """Pairs of parameters of which the shots determine a combination: names, and their correlation in the posterior by
+    ranks, where it is strong."""
+    from scipy.stats import spearmanr
+
+    posterior, names = tree["posterior"].to_dataset(), parameters_of(tree)
+    pairs = [(one, other) for place, one in enumerate(names) for other in names[place + 1 :]]
+    found = [
+        (one, other, spearmanr(posterior[one].values.ravel(), posterior[other].values.ravel())) for one, other in pairs
+    ]
+    return [(one, other, float(told.statistic)) for one, other, told in found if abs(told.statistic) > STRONG]
 
 
 def parameters_of(tree: xarray.DataTree) -> Sequence[str]:

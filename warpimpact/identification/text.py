@@ -7,7 +7,7 @@ import json
 import numpy as np
 import xarray
 
-from warpimpact.identification.posterior import LARGEST_NOISE, learnt
+from warpimpact.identification.posterior import LARGEST_NOISE, learnt, together
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior as files
 from warpimpact.statistics.importance import LARGEST_K
@@ -45,6 +45,10 @@ def _parameters(tree: xarray.DataTree) -> list[str]:
         prior = f"{factor * one.prior[0]:.3g} to {factor * one.prior[2]:.3g}"
         label = f"{name} [{unit}]" if unit else name
         lines.append(f"{label:26}{middle:9.3g}  {f'{low:.3g} to {high:.3g}':18}{prior:20}{one.verdict}")
+    lines += [
+        f"{one} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
+        for one, other, value in together(tree)
+    ]
     return lines
 
 
@@ -88,7 +92,7 @@ def _worth(tree: xarray.DataTree) -> list[str]:
     told = tree.attrs
     effective, k, noise = (float(told[name]) for name in (files.EFFECTIVE, files.PARETO_K, files.HIT_NOISE))
     lines = [
-        f"{tree['sets'].sizes['set']} sets of parameters, effective sample size {effective:.0f}, Pareto k {k:.2f}, "
+        f"{tree.attrs[files.SETS]} sets of parameters, effective sample size {effective:.0f}, Pareto k {k:.2f}, "
         f"the hits leave ±{noise:.2g} in ln L"
     ]
     if told[files.CONVERGED]:

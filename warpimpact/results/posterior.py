@@ -45,6 +45,7 @@ PARETO_K = "pareto_k"
 CONVERGED = "converged"
 HIT_NOISE = "hit_noise"
 EVIDENCE = "log_evidence"
+SETS = "computed_sets"
 
 
 def write(tree: xarray.DataTree, path: Path) -> None:
