@@ -3,14 +3,19 @@ PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
 PARALLEL := --numprocesses auto --dist worksteal
 
-.PHONY: demo gallery test clean
+.PHONY: demo gallery docs test clean
 
 demo: $(INSTALLED)
 	$(VENV)/bin/warpimpact run campaigns/slotted_plate.toml -o slotted.nc --overwrite
-	$(VENV)/bin/warpimpact plot slotted.nc
+	$(VENV)/bin/warpimpact plot slotted.nc --overwrite
 
 gallery: $(INSTALLED)
 	$(VENV)/bin/python campaigns/gallery.py
+
+# Pages in build/docs/index.html; tutorials are executed, examples in pages checked. A warning is an error.
+docs: $(INSTALLED)
+	$(VENV)/bin/sphinx-build -q -W --keep-going -j auto -b html -d build/doctrees docs build/docs
+	$(VENV)/bin/sphinx-build -q -W --keep-going -b doctest -D nb_execution_mode=off -d build/doctest/trees docs build/doctest
 
 # The kernel and verification tests run once more in Warp's debug mode, which checks array bounds.
 test: $(INSTALLED)

@@ -9,9 +9,7 @@ from pathlib import Path
 
 from dask_jobqueue import SLURMCluster
 
-from warpimpact import Campaign
-from warpimpact.campaign.run import run_to_file
-from warpimpact.campaign.team import cluster_team
+from warpimpact import Campaign, cluster_team, run_to_file
 
 CAMPAIGN = Path(__file__).with_name("slotted_plate.toml")
 OUTPUT = Path("slotted_plate.nc")

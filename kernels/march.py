@@ -19,6 +19,7 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half = real(0.0), real(0.5)
     steadied = real(8.0)  # onsets: as far as a step carries a core beyond the ramp
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
+    most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
     stacked = layers.build(variant)
@@ -32,9 +33,10 @@ def build(variant: Variant) -> SimpleNamespace:
     PERFORATED, ARRESTED, RICOCHETED = (
         wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
     )
-    MISSED, UNFINISHED, LEFT_WINDOW, NOT_FINITE = (
-        wp.constant(int(s)) for s in (Status.MISSED, Status.UNFINISHED, Status.LEFT_WINDOW, Status.NOT_FINITE)
+    MISSED, UNFINISHED, LEFT_WINDOW = (
+        wp.constant(int(s)) for s in (Status.MISSED, Status.UNFINISHED, Status.LEFT_WINDOW)
     )
+    NOT_FINITE, GAINED_ENERGY = (wp.constant(int(s)) for s in (Status.NOT_FINITE, Status.GAINED_ENERGY))
     RUNNING = wp.constant(-1)
 
     @wp.struct
@@ -88,6 +90,8 @@ def build(variant: Variant) -> SimpleNamespace:
         gone = leaving > turning or beyond > surface.bounding_radius
         if not wp.isfinite(energy):
             status = NOT_FINITE
+        elif energy > most * initial_energy:
+            status = GAINED_ENERGY
         elif found.through and state.velocity[0] > zero and gone:
             status = wp.where(touched, PERFORATED, MISSED)
         elif found.back and state.velocity[0] < zero and gone:

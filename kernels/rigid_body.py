@@ -21,6 +21,9 @@ def build(variant: Variant) -> SimpleNamespace:
     quarter, six, twelve, twenty, thirty, forty_two = (real(value) for value in (0.25, 6.0, 12.0, 20.0, 30.0, 42.0))
     gamma, two_gamma = real(1.0 - math.sqrt(0.5)), real(2.0 - math.sqrt(2.0))
     small_square = real(0.02**2)  # of half an angle [rad²]
+    least_normal = real(
+        math.ldexp(1.0, -1022 if variant.double else -126)
+    )  # the inverse of a smaller number is infinite
 
     @wp.struct
     class Body:
@@ -174,7 +177,7 @@ def build(variant: Variant) -> SimpleNamespace:
         curvature = body.mass * wp.dot(dv, dv) + wp.dot(dl, dw)
         share = one
         if slope + curvature > zero:
-            share = wp.max(zero, -slope / curvature)
+            share = wp.max(zero, -slope / wp.max(curvature, least_normal))
         return share
 
     @wp.func

@@ -13,6 +13,7 @@ class Status(IntEnum):
     UNFINISHED = 4
     LEFT_WINDOW = 5
     NOT_FINITE = 6
+    GAINED_ENERGY = 7
 
     @property
     def sentence(self) -> str:
@@ -46,4 +47,5 @@ _SENTENCES = {
     Status.UNFINISHED: "The core was still in the target when the step limit was reached.",
     Status.LEFT_WINDOW: "The core left the largest window of the plate that memory allows.",
     Status.NOT_FINITE: "The motion became infinite or undefined.",
+    Status.GAINED_ENERGY: "The rounding errors of the precision added to the energy of the core.",
 }

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .analysis.comparison import Comparison, compare
+    from .analysis.hit_map import hit_map
     from .campaign.campaign import Campaign, Output
     from .campaign.plates import read_plates
     from .campaign.replay import replay
     from .campaign.run import run, run_to_file
     from .campaign.stop import Stop
-    from .campaign.team import ClusterError
+    from .campaign.team import ClusterError, cluster_team
     from .campaign.text import CampaignError
     from .export.table import to_dataframe
     from .results.files import OutputError, ResultError, open_result
@@ -89,7 +90,9 @@ __all__ = [
     "Tolerance",
     "TrianglePattern",
     "__version__",
+    "cluster_team",
     "compare",
+    "hit_map",
     "limit_thickness",
     "limit_velocity",
     "make_shots",
@@ -113,12 +116,14 @@ _HOMES = {
     "OutputError": ".results.files",
     "ResultError": ".results.files",
     "Stop": ".campaign.stop",
+    "cluster_team": ".campaign.team",
     "compare": ".analysis.comparison",
     "limit_thickness": ".solver.limit",
     "limit_velocity": ".solver.limit",
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
     "replay": ".campaign.replay",
+    "hit_map": ".analysis.hit_map",
     "run": ".campaign.run",
     "run_to_file": ".campaign.run",
     "simulate": ".solver.simulate",

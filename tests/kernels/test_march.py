@@ -21,6 +21,7 @@ from warpimpact.scene import (
     Record,
     Scene,
     Shots,
+    SlotPattern,
 )
 from warpimpact.solver import arrays, marching, simulate
 
@@ -148,6 +149,34 @@ def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device
     outcomes = simulate.simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])
+
+
+def test_load_too_small_for_its_energy_leaves_the_motion_finite(device: str) -> None:
+    # β takes all but 2^-126 of the resistance. The energy of such a kick is a number whose inverse is infinite.
+    cone = ConeCore(length=26e-3, diameter=1.3e-3, mass=1e-5)
+    slots = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3))
+    plate = Plate(
+        thickness=4e-3, resistance=1.1e3, shear_coefficient=5.3, degradation=0.02, degradation_interval=1e-6,
+        pattern=slots,
+    )  # fmt: skip
+    rng = np.random.default_rng(0)
+    (y, z), pitch, yaw = rng.uniform(0.0, 8e-3, (2, 400)), rng.normal(0.0, 0.035, 400), rng.normal(0.0, 0.035, 400)
+    shots = shots_of(velocity=2.0, spin=-26_700.0, obliquity=0.35, hit_y=y, hit_z=z, pitch=pitch, yaw=yaw)
+    outcomes = simulate.simulate(Scene(core=cone, target=plate), shots, numerics=DRAFT, device=device)
+    assert (outcomes.status < Status.UNFINISHED).all()
+
+
+def test_energy_that_rises_is_told(device: str) -> None:
+    # In single precision the spin of so slender a body is what rounding leaves of its tumbling.
+    own = CONE.mass_properties
+    thin = CONE.model_copy(update={"inertia_axial": 1e-7 * own.inertia_axial})
+    shots = shots_of(velocity=20.0, obliquity=0.5, pitch=1.0, spin=1e5)
+    scene = Scene(core=thin, target=HARD)
+    outcomes = simulate.simulate(scene, shots, numerics=DRAFT, device=device)
+    assert Status(outcomes.status[0]) is Status.GAINED_ENERGY
+    assert np.isnan(outcomes.residual_velocity[0])
+    double = Numerics(fidelity="draft", precision="double")
+    assert not Status(simulate.simulate(scene, shots, numerics=double, device=device).status[0]).failed
 
 
 def test_shot_that_leaves_its_window_is_told_or_computed_in_a_wider_one(

@@ -136,7 +136,8 @@ def compare(
     Args:
         datasets: two or more, of the same core under the same impact; of open files one number per hit is in memory.
         names: of the plates, each once.
-        angle, standoff: as in `effectiveness`.
+        angle: inclination beyond which a core counts as tilted [rad].
+        standoff: where that is looked at [m]; None is the largest stand-off.
         confidence: of all differences in a measure together.
 
     Raises:

@@ -191,6 +191,11 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
     for label, measure in zip(labels, measures, strict=True):
         row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
+    if not with_solid:
+        rows.append(
+            "There is no solid plate to compare with: the result has no shots at one. They are computed unless "
+            'output.solid_reference is false, and stand in the group "solid" of the file.'
+        )
     return "\n".join(rows)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,7 +24,7 @@ from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PILOT, Promise, keep
-from warpimpact.solver.refinement import LEVELS, Estimates, simulate_to_tolerance
+from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
 from warpimpact.solver.unfold import unfolded, unfolded_estimates
@@ -39,6 +39,7 @@ def compute(
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
+    refining: Callable[[Refining], None] | None = None,
 ) -> xarray.Dataset:
     """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
@@ -47,6 +48,7 @@ def compute(
         promise: the finding of a pilot (`promise_of`); None to compute with the numerics as they are given.
         solid: shots at the solid plate of equal areal density; None for no such shots.
         device, threads, progress: as in `simulate`.
+        refining: as in `simulate_to_tolerance`; not called without a tolerance.
 
     Returns:
         The Dataset of results/dataset.py, one entry per shot; it is a complete result.
@@ -60,7 +62,7 @@ def compute(
     numerics = campaign.numerics if promise is None else promise.fidelity
     _build(scene, computed, numerics, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow)
+    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining)
     elapsed = time.perf_counter() - begin
     dataset = described(
         campaign,
@@ -75,7 +77,8 @@ def compute(
     if solid is None:
         return dataset
     solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
-    outcomes, _ = _outcomes(reference, solid, numerics, device, threads)
+    follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
+    outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow)
     return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
 
 
@@ -158,9 +161,9 @@ class HitMap:
         """Compute some shots; the arguments are those of `compute`."""
         return compute(campaign, shots, **how)
 
-    def promise_of(self, campaign: Campaign, device: str = "auto") -> Any:
+    def promise_of(self, campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Any:
         """What a pilot of the campaign finds; None if the campaign fixes the resolution itself."""
-        return promise_of(campaign, device)
+        return promise_of(campaign, device, progress)
 
     def promise_in(self, dataset: xarray.Dataset) -> Any:
         """What was found by the pilot of a result."""
@@ -185,18 +188,21 @@ def _at_solid(campaign: Campaign, shots: Shots) -> Shots:
     return replace(shots, **own, thickness=np.broadcast_to(thickness, len(shots)).copy())
 
 
-def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
+def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Promise | None:
     """The promise that a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
 
     The pilot takes the first hits of a Sobol or random sampling. It takes hits at even distances from a grid or a list.
     So it depends on the campaign alone.
+
+    Args:
+        device, progress: as in `simulate`.
 
     Raises:
         DeviceError: the device is absent.
     """
     if campaign.numerics.explicit is not None:
         return None
-    return keep(campaign.scene, campaign.numerics, pilot_of(campaign, PILOT), device=device)
+    return keep(campaign.scene, campaign.numerics, pilot_of(campaign, PILOT), device=device, progress=progress)
 
 
 def pilot_of(campaign: Campaign, most: int) -> Shots:
@@ -247,10 +253,19 @@ def _outcomes(
     device: str,
     threads: int | None,
     progress: Progress | None = None,
+    refining: Callable[[Refining], None] | None = None,
 ) -> tuple[Outcomes, Estimates | None]:
     """Outcomes, and estimates of their errors if the numerics have a tolerance."""
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
-        return simulate_to_tolerance(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
+        return simulate_to_tolerance(
+            scene,
+            shots,
+            numerics=numerics,
+            device=device,
+            threads=threads,
+            progress=progress,
+            refining=refining,
+        )
     return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
 
 

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,45 +16,21 @@ import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
-from warpimpact.campaign.team import Team, local_team
+from warpimpact.campaign.standing import Follow, Standing
+from warpimpact.campaign.team import Team, awaited, local_team
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
+from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Shots
-from warpimpact.statistics.intervals import Estimate
 from warpimpact.statistics.stopping import looks
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""
 _MOST_SOLID = 2**12
 """Shots at most at the solid plate of equal areal density."""
-
-
-@dataclass(frozen=True)
-class Standing:
-    """How far a run is.
-
-    Attributes:
-        done, total: shots; `total` is the most that a stop rule allows.
-        saved: shots of whole shards, which no interrupt loses; `done` counts those of unfinished ones too.
-        resumed: shots that an earlier run had done.
-        failed: shots whose computation failed.
-        estimates: running estimates of the main quantities, over the shots from the first on without a gap.
-        promise: the finding of the pilot; None if the campaign fixes the resolution.
-    """
-
-    done: int
-    total: int
-    saved: int
-    resumed: int
-    failed: int
-    estimates: dict[Measure, Estimate]
-    promise: Any = None
-
-
-Follow = Callable[[Standing], None]
 
 
 class Interrupted(KeyboardInterrupt):
@@ -190,7 +166,10 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     for index in sorted(store.saved):
         watch.add(index, store.load(index))
     watch.resumed = watch.done
-    watch.promise = promise = team.job.promise_in(store.load(min(store.saved))) if store.saved else team.pilot()
+    if store.saved:
+        watch.promise = team.job.promise_in(store.load(min(store.saved)))
+    else:
+        watch.promise = awaited(team.pilot(), _REPORT_EVERY, lambda: follow(watch.standing(0)))
     tasks = _tasks(store, len(sampler), team.task)
     waiting: dict[Future[xarray.Dataset], range] = {}
     try:
@@ -198,17 +177,17 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
             width = team.width()
             while len(waiting) < width and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
-                solid = (
-                    _solid_shots(campaign, shots[: store.extent]) if team.job.takes_solid and task.start == 0 else None
-                )
-                waiting[team.submit(promise, shots, solid)] = task
+                first = team.job.takes_solid and task.start == 0
+                solid = _solid_shots(campaign, shots[: store.extent]) if first else None
+                waiting[team.submit(watch.promise, shots, solid)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
+            stop_if_asked()
             for future in finished:
                 task = waiting.pop(future)
                 for index, shard in _split(future.result(), task, store.extent):
                     store.save(index, shard)
                     watch.add(index, shard)
-            follow(watch.standing(team.underway()))
+            follow(replace(watch.standing(team.underway()), refining=team.refining()))
     finally:
         for future in waiting:
             future.cancel()

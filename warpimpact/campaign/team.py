@@ -6,7 +6,7 @@ import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from queue import SimpleQueue
@@ -17,12 +17,19 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import HitMap, made_by
 from warpimpact.results import attributes as attr
+from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
+from warpimpact.solver.refinement import Refining
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
 _HIT_MAP = HitMap()
+
+
+_PATIENCE = 1.0
+"""Seconds for which a team waits for computations that nobody wants any more: what a thread of this machine computes
+can be broken off between two launches of a kernel only."""
 
 
 class ClusterError(RuntimeError):
@@ -35,22 +42,32 @@ class Team:
 
     Attributes:
         job: what is computed of every hit.
-        pilot: finds the promise of the campaign, None if it fixes the resolution itself.
+        pilot: finds the promise of the campaign in the background, None if it fixes the resolution itself.
         submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Dataset
             comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
         made_by: versions, kind of device and the job's content, which decide the bits.
         underway: how many shots of unfinished tasks are done.
+        refining: the task that has the longest way to its tolerance, None if there is none or it is not known.
     """
 
     job: HitMap
-    pilot: Callable[[], Any]
+    pilot: Callable[[], Future[Any]]
     submit: Callable[[Any, Shots, Shots | None], Future[xarray.Dataset]]
     width: Callable[[], int]
     task: int
     made_by: dict[str, str]
     underway: Callable[[], int]
+    refining: Callable[[], Refining | None]
+
+
+def awaited(future: Future[Any], every: float, tick: Callable[[], object]) -> Any:
+    """The result of a future. Meanwhile `tick` is called every so many seconds, and a signal that came stops it all."""
+    while not wait([future], timeout=every).done:
+        stop_if_asked()
+        tick()
+    return future.result()
 
 
 @contextmanager
@@ -66,37 +83,53 @@ def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Itera
     """
     devices = _devices(device)
     idle, done, stopping = SimpleQueue[str](), dict[int, int](), threading.Event()
+    levels, begun = dict[int, Refining](), list[Future[Any]]()
     for chosen in devices:
         idle.put(str(chosen))
 
+    def progress(finished: int, total: int) -> None:
+        if stopping.is_set():
+            raise InterruptedError
+        done[threading.get_ident()] = finished
+
     def work(promise: Any, shots: Shots, solid: Shots | None) -> xarray.Dataset:
-        name, thread = idle.get(), threading.get_ident()
-
-        def progress(finished: int, total: int) -> None:
-            if stopping.is_set():
-                raise InterruptedError
-            done[thread] = finished
-
+        name = idle.get()
         try:
-            return job.compute(campaign, shots, promise=promise, solid=solid, device=name, progress=progress)
+            return job.compute(
+                campaign,
+                shots,
+                promise=promise,
+                solid=solid,
+                device=name,
+                progress=progress,
+                refining=lambda found: levels.update({threading.get_ident(): found}),
+            )
         finally:
-            done[thread] = 0
+            done[threading.get_ident()] = 0
+            levels.pop(threading.get_ident(), None)
             idle.put(name)
+
+    def begin(task: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        begun[:] = [future for future in begun if not future.done()]
+        begun.append(pool.submit(task, *arguments))
+        return begun[-1]
 
     pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
     try:
         yield Team(
             job=job,
-            pilot=lambda: job.promise_of(campaign, str(devices[0])),
-            submit=lambda *shots: pool.submit(work, *shots),
+            pilot=lambda: begin(job.promise_of, campaign, str(devices[0]), progress),
+            submit=lambda *shots: begin(work, *shots),
             width=lambda: 2 * len(devices),
             task=_task_size(kind),
             made_by=kind | dict(job.content),
             underway=lambda: sum(done.copy().values()),
+            refining=lambda: max(levels.copy().values(), key=lambda one: one.seconds_left or 0.0, default=None),
         )
     finally:
         stopping.set()
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown(wait=False, cancel_futures=True)
+        wait([future for future in begun if not future.cancelled()], timeout=_PATIENCE)
 
 
 def _task_size(kind: dict[str, str]) -> int:
@@ -151,12 +184,13 @@ def cluster_team(
         try:
             yield Team(
                 job=job,
-                pilot=lambda: client.submit(job.promise_of, campaign, device, pure=False).result(),
+                pilot=lambda: executor.submit(job.promise_of, campaign, device),
                 submit=lambda *shots: executor.submit(_compute_alike, job, campaign, *shots, device, threads, kind),
                 width=lambda: 2 * max(1, sum(client.nthreads().values())),
                 task=_task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
+                refining=lambda: None,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
             raise ClusterError(

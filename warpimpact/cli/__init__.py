@@ -7,10 +7,13 @@ arguments, messages and progress here; a number is computed in another room. It 
 import argparse
 import os
 import sys
+import threading
 from collections.abc import Sequence
 from contextlib import redirect_stdout
+from typing import NoReturn
 
 from warpimpact import __version__
+from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .accuracy import add_study, add_validate
 from .compare import add_compare
@@ -44,16 +47,31 @@ _COMMANDS = (
 """In the order of the help."""
 
 
+def command() -> NoReturn:
+    """Run one command as a process of its own.
+
+    A thread that is still computing when the command has ended, after Ctrl-C, has nothing to save: the process does not
+    wait for it.
+    """
+    code = main()
+    if threading.active_count() == 1:
+        sys.exit(code)
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(code)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code: 2 after a mistake that the user can correct, 3 when more shots failed
-    than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted.
+    than the campaign allows, 70 after a bug of warpimpact, 130 when interrupted, 141 when who reads its output has read
+    enough.
 
     This is the one boundary for errors: each of them ends here in one sentence, never in a traceback.
     """
     arguments = parser().parse_args(argv)
     try:
         loud = progress_told(verbose=arguments.verbose, quiet=arguments.quiet)
-        with redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
+        with terminated_as_interrupted(), redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
             code: int | None = arguments.command(arguments)
             sys.stdout.flush()
     except KeyboardInterrupt as interrupt:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_device, add_output, add_overwrite, at_least
-from .paths import check_output
+from .paths import check_output, check_suffix
 from .progress import show_count
 
 
@@ -41,12 +41,14 @@ def _study(arguments: argparse.Namespace) -> None:
 
     campaign = Campaign.from_toml(arguments.campaign)
     output = arguments.output or Path(arguments.campaign.stem + "_study.nc")
-    check_output(output, overwrite=arguments.overwrite)
+    picture = output.with_suffix(".png")
+    check_suffix(output, "a study", ".nc")
+    for written in (output, picture):
+        check_output(written, overwrite=arguments.overwrite)
     with memory_told(arguments.campaign), show_count() as progress:
         dataset = study(campaign, hits=arguments.hits, device=arguments.device, progress=progress)
     files.write(dataset, output)
     print(study_text(dataset))
-    picture = output.with_suffix(".png")
     study_figure(dataset).savefig(picture, dpi=150)
     for written in (output, picture):
         print(written)

@@ -7,10 +7,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from warpimpact.results.interrupts import terminated_as_interrupted
-
 from .mistakes import memory_told
-from .options import Commands, add_command, add_count, add_device, add_output
+from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite
 from .paths import check_picture, named
 from .progress import show_standing, warn
 from .run import failure_code
@@ -53,7 +51,7 @@ def add_compare(commands: Commands) -> None:
     add_device(parser)
     add_count(parser)
     parser.add_argument("--resume", action="store_true", help="continue an interrupted campaign")
-    parser.add_argument("--overwrite", action="store_true", help="compute all plates of a campaign again")
+    add_overwrite(parser, "an existing figure; of a campaign, compute all plates again")
 
 
 def _compare(arguments: argparse.Namespace) -> int:
@@ -65,7 +63,9 @@ def _compare(arguments: argparse.Namespace) -> int:
     is_campaign = arguments.files[0].suffix == ".toml"
     default = arguments.files[0].stem if is_campaign else "comparison"
     figure = arguments.output or Path(f"{default}.png")
-    check_picture(figure)
+    # The figure of a campaign belongs to it as its results do.
+    check_picture(figure, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
+    replaced = " (replaced)" if figure.exists() else ""
     angle, standoff = _quantities(arguments)
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
     if len(paths) < 2:
@@ -78,7 +78,7 @@ def _compare(arguments: argparse.Namespace) -> int:
         code = max(failure_code(dataset, path) for dataset, path in zip(datasets, paths.values(), strict=True))
     print(comparison_text(comparison))
     comparison_figure(comparison).savefig(figure, dpi=150)
-    print(figure)
+    print(f"{figure}{replaced}")
     return code
 
 
@@ -114,7 +114,7 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     paths = {name: folder / f"{name}.nc" for name in campaigns}
     for name, campaign in campaigns.items():
         print(f"plate {name}", file=sys.stderr)
-        with memory_told(arguments.files[0]), terminated_as_interrupted(), show_standing() as progress:
+        with memory_told(arguments.files[0]), show_standing() as progress:
             run_to_file(
                 campaign,
                 paths[name],

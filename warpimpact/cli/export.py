@@ -6,7 +6,7 @@ from pathlib import Path
 
 from .mistakes import folder_told
 from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_results, at_least
-from .paths import check_folder, check_output, named
+from .paths import check_folder, check_output, check_suffix, named
 from .progress import show_count
 
 
@@ -41,11 +41,16 @@ def _export(arguments: argparse.Namespace) -> None:
         if files.is_history(dataset):
             output = output or path.with_name(f"{path.stem}_vtk")
             check_folder(output.parent)
+            if output.suffix:
+                raise files.OutputError(
+                    f"{output}: the history of a hit is written as a folder, so give a name without a dot"
+                )
             if output.exists():
                 raise files.OutputError(f"{output}: exists already; give a new folder with -o")
             written = write_vtk(dataset.load(), output)
         else:
             output = output or path.with_suffix(".csv")
+            check_suffix(output, "a table", ".csv")
             check_output(output, overwrite=arguments.overwrite)
             write_csv(dataset, output)
             written = [output]
@@ -83,6 +88,7 @@ def _report(arguments: argparse.Namespace) -> None:
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
+    check_suffix(output, "a report", ".html")
     check_output(output, overwrite=arguments.overwrite)
     by_name = named(paths)
     with ExitStack() as stack:

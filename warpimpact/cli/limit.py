@@ -4,8 +4,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from warpimpact.results.interrupts import terminated_as_interrupted
-
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite, at_least
 from .paths import check_picture, check_place
@@ -64,7 +62,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
     picture = output.with_suffix(".png")
     check_place(output)
-    check_picture(picture)
+    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
     job = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
     if told := told_of(campaign, arguments.quantity):
         warn(told)
@@ -74,7 +72,7 @@ def _limit(arguments: argparse.Namespace) -> int:
         )
     else:
         team = local_team(campaign, arguments.device, job)
-    with memory_told(arguments.campaign), terminated_as_interrupted(), show_standing() as progress:
+    with memory_told(arguments.campaign), show_standing() as progress:
         run_to_file(
             campaign,
             output,

@@ -25,13 +25,19 @@ def check_output(path: Path, *, overwrite: bool) -> None:
         raise OutputError(f"{path}: exists already; name another file or give --overwrite")
 
 
-def check_picture(path: Path) -> None:
-    """Refuse a picture that cannot be written; an existing one is replaced."""
+def check_picture(path: Path, *, overwrite: bool) -> None:
+    """Refuse a picture that cannot be written, or that exists and must not be replaced."""
+    check_suffix(path, "a picture", ".png", ".pdf", ".svg")
+    check_output(path, overwrite=overwrite)
+
+
+def check_suffix(path: Path, what: str, *suffixes: str) -> None:
+    """Refuse a name that promises another format than the one that is written."""
     from warpimpact.results.files import OutputError
 
-    if path.suffix not in (".png", ".pdf", ".svg"):
-        raise OutputError(f"{path}: the name of a picture must end in .png, .pdf or .svg")
-    check_place(path)
+    if path.suffix.lower() not in suffixes:
+        allowed = " or ".join([", ".join(suffixes[:-1]), suffixes[-1]] if len(suffixes) > 1 else suffixes)
+        raise OutputError(f"{path}: the name of {what} must end in {allowed}")
 
 
 def check_place(path: Path) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from .mistakes import folder_told
 from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_result
-from .paths import check_output
+from .paths import check_output, check_suffix
 
 
 def add_replay(commands: Commands) -> None:
@@ -35,12 +35,15 @@ def _replay(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.hit import hit_text
     from warpimpact.campaign.replay import replay
     from warpimpact.plotting.animation import save_animation, writer_for
-    from warpimpact.plotting.trajectory import save_figures
+    from warpimpact.plotting.trajectory import FIGURES, save_figures
     from warpimpact.results import files
 
     result, path, film = files.read(arguments.result), arguments.result, arguments.animation
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
     check_output(output, overwrite=arguments.overwrite)
+    check_suffix(output, "a history", ".nc")
+    for figure in FIGURES:
+        check_output(output.with_name(f"{output.stem}_{figure.__name__}.png"), overwrite=arguments.overwrite)
     if film:
         writer_for(film)
         check_output(film, overwrite=arguments.overwrite)

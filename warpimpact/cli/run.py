@@ -5,13 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpimpact.results import attributes as attr
-from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
-from .paths import check_place
+from .paths import check_place, check_suffix
 from .plain import say
-from .progress import show_standing, warn
+from .progress import show_standing, tell_tolerance, warn
 
 if TYPE_CHECKING:
     import xarray
@@ -46,10 +45,12 @@ def _run(arguments: argparse.Namespace) -> int:
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
+    check_suffix(output, "a result", ".nc")
+    tell_tolerance(campaign.numerics)
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
-    with memory_told(arguments.campaign), terminated_as_interrupted(), show_standing() as progress:
+    with memory_told(arguments.campaign), show_standing() as progress:
         run_to_file(
             campaign,
             output,

@@ -1,11 +1,12 @@
 """The commands inspect, plot and plate: text and figures of results and plates."""
 
 import argparse
+import re
 from pathlib import Path
 
 from warpimpact.results import attributes as attr
 
-from .options import Commands, add_campaign, add_command, add_output, add_result, add_results
+from .options import Commands, add_campaign, add_command, add_output, add_overwrite, add_result, add_results
 from .paths import check_folder, check_picture, named
 
 
@@ -44,6 +45,7 @@ def add_plot(commands: Commands) -> None:
     )
     add_results(parser)
     add_output(parser, "FOLDER", "existing folder (default: the folder of the result)")
+    add_overwrite(parser, "existing pictures")
     parser.add_argument(
         "--probability",
         metavar="QUANTITY",
@@ -67,12 +69,25 @@ def _plot(arguments: argparse.Namespace) -> None:
             figure = probability_map(dataset, arguments.probability)
         except ValueError as error:
             raise files.ResultError(f"--probability: {error}") from None
-        picture = folder / f"{stem}_probability.png"
+        picture = folder / f"{stem}_{_file_name(arguments.probability)}.png"
+        check_picture(picture, overwrite=arguments.overwrite)
         figure.savefig(picture, dpi=150)
         print(picture)
         return
-    for path in save_beside(datasets, folder, stem) if others else save_maps(dataset, folder, stem):
+    overwrite = arguments.overwrite
+    saved = (
+        save_beside(datasets, folder, stem, overwrite=overwrite)
+        if others
+        else save_maps(dataset, folder, stem, overwrite=overwrite)
+    )
+    for path in saved:
         print(path)
+
+
+def _file_name(quantity: str) -> str:
+    """A part of a file name that tells a probability, such as "P_tilt_130mm_above_30_deg"."""
+    spoken = quantity.replace(">", " above ").replace("<", " below ")
+    return "_".join(re.findall(r"[\w.]+", spoken))
 
 
 def add_plate(commands: Commands) -> None:
@@ -87,6 +102,7 @@ def add_plate(commands: Commands) -> None:
     )
     add_campaign(parser)
     add_output(parser, "PLATE.png", "picture file (default: the campaign's name with _plate, in this folder)")
+    add_overwrite(parser, "an existing picture")
 
 
 def _plate(arguments: argparse.Namespace) -> None:
@@ -95,7 +111,7 @@ def _plate(arguments: argparse.Namespace) -> None:
     from warpimpact.plotting import plate_figure
 
     output = arguments.output or Path(arguments.campaign.stem + "_plate.png")
-    check_picture(output)
+    check_picture(output, overwrite=arguments.overwrite)
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
     plate_figure(plate, campaign.core, campaign.title).savefig(output, dpi=150)

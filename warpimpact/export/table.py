@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import xarray
 
 from warpimpact.analysis.summary import slices
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import status_codes
+from warpimpact.results.dataset import hit_numbers, status_codes
 from warpimpact.results.files import aside
 
 
@@ -19,34 +21,50 @@ def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     A variable with stand-offs or axes gets one column for each: ``tilt_130mm``, ``angular_velocity_x``. ``status`` is a
     word.
     """
-    columns = {}
+    columns: dict[str, Any] = {name: array.values for name, array in _columns(dataset)}
+    words = {code: word for word, code in status_codes(dataset).items()}
+    columns[v.STATUS] = pd.Categorical.from_codes(columns[v.STATUS].astype(int), categories=pd.Index(words.values()))
+    return pd.DataFrame(columns, index=pd.Index(hit_numbers(dataset), name=v.HIT))
+
+
+def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
+    """Columns of the table by their names, each of shape [hits]."""
     for name in (v.HIT_Y, v.HIT_Z, *dataset.data_vars):
         array = dataset[name]
         if array.dims == ("hit",):
-            columns[str(name)] = array.values
+            yield str(name), array
         elif array.dims == ("hit", "standoff"):
             for index, standoff in enumerate(dataset[v.STANDOFF].values):
-                columns[f"{name}_{standoff * 1e3:g}mm"] = array.values[:, index]
+                yield f"{name}_{standoff * 1e3:g}mm", array[:, index]
         elif array.dims == ("hit", "axis"):
             for index, axis in enumerate(dataset[v.AXIS].values):
-                columns[f"{name}_{axis}"] = array.values[:, index]
-    words = {code: word for word, code in status_codes(dataset).items()}
-    columns[v.STATUS] = pd.Categorical.from_codes(columns[v.STATUS].astype(int), categories=pd.Index(words.values()))
-    return pd.DataFrame(columns).rename_axis(index="hit")
+                yield f"{name}_{axis}", array[:, index]
+
+
+def _units(dataset: xarray.Dataset) -> dict[str, str]:
+    """Units of the columns; a status is a word."""
+    return {name: "1" if name == v.STATUS else array.attrs["units"] for name, array in _columns(dataset)}
 
 
 def write_csv(dataset: xarray.Dataset, path: Path) -> None:
     """Write `to_dataframe` as CSV, whole or not at all. Of an open file, one slice at a time is in memory.
 
-    Numbers have all significant digits; a missing value is empty.
+    A header is a name and its unit, as in ``hit_y [m]``; a campaign can take the file as its list of hits. Numbers have
+    all significant digits; a missing value is empty.
 
     Raises:
         OutputError: the file cannot be written; an existing file stays as it is.
     """
-    first = 0
+    is_first = True
     with aside(path) as file:
         for part in slices(dataset):
             frame = to_dataframe(part)
-            frame.index += first
-            frame.to_csv(file, mode="a" if first else "w", header=not first)
-            first += len(frame)
+            header = [_header(name, unit) for name, unit in _units(part).items()] if is_first else False
+            frame.to_csv(file, mode="w" if is_first else "a", header=header)
+            is_first = False
+
+
+def _header(name: str, unit: str) -> str:
+    """Such as "spin [rad/s]"; without brackets where there is no unit."""
+    shown = unit.replace(" s-1", "/s").replace("degree", "deg")
+    return name if shown == "1" else f"{name} [{shown}]"

@@ -134,14 +134,17 @@ class LimitMap(HitMap):
         dataset.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {self.quantity}"
         return with_limits(dataset, self.quantity, limits, images)
 
-    def promise_of(self, campaign: Campaign, device: str = "auto") -> LimitPromise | None:
+    def promise_of(
+        self, campaign: Campaign, device: str = "auto", progress: Progress | None = None
+    ) -> LimitPromise | None:
         """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
         if campaign.numerics.explicit is not None:
             return None
         pilot = pilot_of(campaign, PILOT)
+        follow = progress and (lambda done, total: progress(0, len(pilot)))  # nothing new, but a place to stop
 
         def search(fidelity: Fidelity) -> Limits:
-            return self._search(campaign, pilot, fidelity, device=device)
+            return self._search(campaign, pilot, fidelity, device=device, progress=follow)
 
         return keep_limits(search, campaign.numerics, squared=self.quantity == "thickness")
 

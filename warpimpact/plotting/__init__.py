@@ -11,16 +11,21 @@ from warpimpact.plotting.distribution import dispersion, marginals, probability_
 from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.study import study_figure
+from warpimpact.plotting.trajectory import course, flight, largest_load, passage
 
 mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error
 
 __all__ = [
     "comparison_figure",
+    "course",
     "dispersion",
+    "flight",
     "hit_map",
     "hit_maps",
+    "largest_load",
     "marginals",
     "overview",
+    "passage",
     "plate_figure",
     "probability_map",
     "save_beside",

@@ -20,6 +20,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
+from warpimpact.analysis.hit_map import at_standoff, hit_points
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import outlines, passed, status_codes
@@ -39,7 +40,7 @@ FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail tha
 WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2
 GREY = "0.62"  # for hits without a value
 # Colours of Okabe and Ito: they differ in every kind of colour blindness.
-STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00")
+STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00", "#0072B2")
 
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW}
 _BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them, too, but in front of the plate
@@ -92,19 +93,10 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None)
 
 
 def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None) -> xarray.DataArray:
-    """The variable, shape [hits], at one stand-off if it has stand-offs."""
     mapped = [name for name in (*v.HIT_NUMBERS, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR) if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
-    array = dataset[variable]
-    if "standoff" not in array.dims:
-        return array
-    distances = dataset[v.STANDOFF].values
-    index = distances.size - 1 if standoff is None else int(np.argmin(np.abs(distances - standoff)))
-    if standoff is not None and not np.isclose(distances[index], standoff):
-        known = ", ".join(f"{distance:g}" for distance in distances)
-        raise ValueError(f"the result has no stand-off of {standoff:g} m; it has {known} m")
-    return array.isel(standoff=index)
+    return at_standoff(dataset, variable, standoff)
 
 
 def words(name: str) -> str:
@@ -129,11 +121,6 @@ def limits(dataset: xarray.Dataset) -> Array:
     half = np.asarray(dataset.attrs[attr.PLATE_PERIOD]) / 2
     hits = hit_points(dataset)
     return np.stack([np.minimum(-half, hits.min(axis=0)), np.maximum(half, hits.max(axis=0))], axis=1) * _MM
-
-
-def hit_points(dataset: xarray.Dataset) -> Array:
-    """Hit points [m], shape [hits, 2]."""
-    return np.stack([dataset[v.HIT_Y].values, dataset[v.HIT_Z].values], axis=-1)
 
 
 def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:

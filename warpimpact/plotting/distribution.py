@@ -8,11 +8,11 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
     draw_holes,
     draw_values,
-    hit_points,
     limits,
     nearest_hits,
     paint_pixels,
@@ -75,7 +75,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
         histogram.set(ylim=artist.get_clim() if np.ptp(values) else None, xlabel="hits", ylabel=column.label)
         histogram.yaxis.tick_right()
         histogram.yaxis.set_label_position("right")
-    figure.supxlabel(shots_text(dataset), fontsize="small", color="0.3")
+    figure.supxlabel(f"{shots_text(dataset)}; seen from behind the plate", fontsize="small", color="0.3")
     return figure
 
 
@@ -90,6 +90,8 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
     for axes, values, orientation in ((above, tilt, "vertical"), (beside, velocity, "horizontal")):
         axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
         axes.label_outer()
+    above.set_ylabel("hits")
+    beside.set_xlabel("hits")
     figure.supxlabel(shots_text(dataset), fontsize="small", color="0.3")
     return figure
 
@@ -101,7 +103,7 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
     x, y = tilt.values[both], velocity.values[both]
     if len(x) > _MOST_POINTS:
         density = axes.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
-        axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per cell", format="{x:g}")
+        axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per hexagon", format="{x:g}")
     else:
         axes.scatter(x, y, s=7, color=_BLUE, alpha=0.4, linewidths=0)
     if len(x):
@@ -191,7 +193,8 @@ def _two_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], tit
     for axes, image, label in zip(panels, images, labels, strict=True):
         figure.colorbar(paint_pixels(axes, dataset, image, scale_of([image.ravel()])), ax=axes, label=label)
         draw_holes(axes, dataset)
-    figure.supxlabel(f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}", fontsize="small", color="0.3")
+    note = f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}; seen from behind the plate"
+    figure.supxlabel(note, fontsize="small", color="0.3")
     return figure
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.hit_map import hit_points
 from warpimpact.optimisation.limit import QUANTILES, promise_line, quantiles
-from warpimpact.plotting.cell import draw_values, hit_points, limits, scale_of, shown
+from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 

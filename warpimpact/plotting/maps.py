@@ -10,12 +10,15 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown
+from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
 from warpimpact.plotting.distribution import dispersion, is_uncertain, marginals, uncertainty
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.dataset import status_codes
+from warpimpact.results.files import OutputError
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
     from warpimpact.plotting.cell import Scale
@@ -27,6 +30,7 @@ _LONGER_SIDE = 4.2
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.75, 1.15, 0.55, 1.2
 _NARROWEST_PANEL = 5.4  # holds the legend
 _HEAD, _FOOT = 0.5, 0.3
+_BELOW_NO_LEGEND, _FOOT_WITH_LEGEND = 0.65, 0.85
 _MOST_COLUMNS = 3
 
 
@@ -49,8 +53,10 @@ def hit_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: fl
     figure, panels = _sheet(list(datasets.values()), columns=min(_MOST_COLUMNS, len(datasets)))
     columns = [shown(dataset, variable, standoff) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
-    for axes, (name, dataset), column in zip(panels, datasets.items(), columns, strict=True):
-        _draw(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}"), scale)
+    last = len(panels) - 1
+    for place, (axes, (name, dataset), column) in enumerate(zip(panels, datasets.items(), columns, strict=True)):
+        _draw(axes, dataset, column._replace(title=f"{name}\n{shots_text(dataset)}"), scale, bar=place == last)
+    _share_legend(figure, panels)
     title, *_ = columns[0].title.splitlines()
     _inscribe(figure, title, "seen from behind the plates; colours and lengths to the same scale")
     return figure
@@ -64,16 +70,32 @@ def status_map(dataset: xarray.Dataset) -> Figure:
 
 
 def overview(dataset: xarray.Dataset) -> Figure:
-    """Residual velocity, deflection, tilt at the largest stand-off, and status on one page."""
-    figure, (*panels, last) = _sheet_of_one(dataset, maps=4, columns=2)
-    for axes, variable in zip(panels, _MAIN, strict=True):
-        _draw(axes, dataset, shown(dataset, variable))
-    draw_status(last, dataset)
+    """Residual velocity, deflection, tilt at the largest stand-off, and status on one page, with one legend.
+
+    If all shots ended alike, the tilt at the smallest stand-off stands in place of the status, and the note says how
+    they ended.
+    """
+    statuses, standoffs = np.unique(dataset[v.STATUS].values), dataset[v.STANDOFF].values
+    columns = [shown(dataset, variable) for variable in _MAIN]
+    if len(statuses) == 1 and len(standoffs) > 1:
+        columns.insert(2, shown(dataset, v.TILT, float(standoffs[0])))
+    names = {code: words(name) for name, code in status_codes(dataset).items()}
+    alike = f"; all {names[int(statuses[0])]}" if len(statuses) == 1 else ""
+    figure, panels = _sheet_of_one(dataset, maps=len(columns) + (not alike), columns=2, note=alike)
+    for axes, column in zip(panels, columns, strict=False):
+        _draw(axes, dataset, column)
+    if not alike:
+        draw_status(panels[-1], dataset)
+    _share_legend(figure, panels)
     return figure
 
 
-def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
-    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths."""
+def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bool = False) -> list[Path]:
+    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths.
+
+    Raises:
+        OutputError: one of them exists, and must not be replaced.
+    """
     figures: dict[str, Figure] = {
         "overview": overview(dataset),
         "status": status_map(dataset),
@@ -86,29 +108,36 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
     if is_uncertain(dataset, v.RESIDUAL_VELOCITY):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
-    return _saved(figures, folder, stem)
+    return _saved(figures, folder, stem, overwrite=overwrite)
 
 
-def save_beside(datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str) -> list[Path]:
-    """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths."""
+def save_beside(
+    datasets: Mapping[str, xarray.Dataset], folder: Path, stem: str, *, overwrite: bool = False
+) -> list[Path]:
+    """Write maps of several results side by side as PNG files ``<stem>_<map>.png`` and return their paths.
+
+    Raises:
+        OutputError: one of them exists, and must not be replaced.
+    """
     figures: dict[str, Figure] = {variable: hit_maps(datasets, variable) for variable in _MAIN}
-    return _saved(figures, folder, stem)
+    return _saved(figures, folder, stem, overwrite=overwrite)
 
 
-def _saved(figures: Mapping[str, Figure], folder: Path, stem: str) -> list[Path]:
+def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite: bool) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for name, figure in figures.items():
-        paths.append(folder / f"{stem}_{name}.png")
-        figure.savefig(paths[-1], dpi=150)
-    return paths
+    paths = {folder / f"{stem}_{name}.png": figure for name, figure in figures.items()}
+    if not overwrite and (existing := next(filter(Path.exists, paths), None)):
+        raise OutputError(f"{existing}: exists already; name another folder or give --overwrite")
+    for path, figure in paths.items():
+        figure.savefig(path, dpi=150)
+    return list(paths)
 
 
-def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int) -> tuple[Figure, list[Axes]]:
+def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
     """A sheet of several maps of one result, which says what it shows."""
     figure, panels = _sheet([dataset] * maps, columns=columns)
-    note = f"{shots_text(dataset)}; seen from behind the plate"
-    _inscribe(figure, dataset.attrs.get(attr.TITLE, ""), note)
+    told = f"{shots_text(dataset)}; seen from behind the plate{note}"
+    _inscribe(figure, dataset.attrs.get(attr.TITLE, ""), told)
     return figure, panels
 
 
@@ -118,18 +147,19 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure,
     The maps show the whole cell and every hit. Their size follows from that extent; the room round them is
     the same on every figure, so that maps of one plate can be laid side by side.
     """
+    below, foot = (_BELOW, _FOOT) if len(datasets) == 1 else (_BELOW_NO_LEGEND, _FOOT_WITH_LEGEND)
     extents = np.array([np.ptp(limits(dataset), axis=1) for dataset in datasets])
     sizes = _LONGER_SIDE * extents / extents.max()
     rows, (widest, tallest) = -(-len(datasets) // columns), sizes.max(axis=0)
     panel_width = max(_LEFT + widest + _RIGHT, _NARROWEST_PANEL)
-    panel_height = _ABOVE + tallest + _BELOW
-    width, height = columns * panel_width, _HEAD + rows * panel_height + _FOOT
+    panel_height = _ABOVE + tallest + below
+    width, height = columns * panel_width, _HEAD + rows * panel_height + foot
     figure = Figure(figsize=(width, height))
     panels = []
     for number, (map_width, map_height) in enumerate(sizes):
         row, column = divmod(number, columns)
         left = column * panel_width + _LEFT + (panel_width - _LEFT - map_width - _RIGHT) / 2
-        bottom = _FOOT + (rows - 1 - row) * panel_height + _BELOW + (tallest - map_height) / 2
+        bottom = foot + (rows - 1 - row) * panel_height + below + (tallest - map_height) / 2
         panels.append(figure.add_axes((left / width, bottom / height, map_width / width, map_height / height)))
     return figure, panels
 
@@ -140,13 +170,27 @@ def _inscribe(figure: Figure, title: str, note: str) -> None:
     figure.supxlabel(note, y=0.12 / height, va="bottom", fontsize="small", color="0.3")
 
 
-def _draw(axes: Axes, dataset: xarray.Dataset, column: Shown, scale: Scale | None = None) -> None:
+def _share_legend(figure: Figure, panels: Sequence[Axes]) -> None:
+    """One legend above the note for all maps, with every entry once, in place of one below each map."""
+    entries: dict[str, Artist] = {}
+    for legend in filter(None, (axes.get_legend() for axes in panels)):
+        labels = (text.get_text() for text in legend.get_texts())
+        entries |= {label: handle for label, handle in zip(labels, legend.legend_handles, strict=True) if handle}
+        legend.remove()
+    if entries:
+        place = (0.5, 0.3 / figure.get_figheight())
+        figure.legend(
+            entries.values(), entries, loc="lower center", bbox_to_anchor=place, ncols=len(entries), frameon=False
+        )
+
+
+def _draw(axes: Axes, dataset: xarray.Dataset, column: Shown, scale: Scale | None = None, *, bar: bool = True) -> None:
     """Draw one variable with its title, and with a colour bar beside the map and as high as it."""
     scale = scale or scale_of([column.values], signed=column.signed)
     artist = draw_values(axes, dataset, column.values, scale)
     axes.set_title(column.title, fontsize="medium")
-    if np.isfinite(column.values).any():
+    if bar and np.isfinite(column.values).any():
         figure, place = axes.figure, axes.get_position()
         inch = figure.dpi / figure.bbox.width
-        bar = figure.add_axes((place.x1 + 0.18 * inch, place.y0, 0.17 * inch, place.height))
-        figure.colorbar(artist, cax=bar, label=column.label)
+        beside = figure.add_axes((place.x1 + 0.18 * inch, place.y0, 0.17 * inch, place.height))
+        figure.colorbar(artist, cax=beside, label=column.label)

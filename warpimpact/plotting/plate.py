@@ -16,6 +16,7 @@ from matplotlib.patches import Circle, Patch, PathPatch, Rectangle
 from matplotlib.path import Path
 
 from warpimpact.analysis.plate import plate_numbers
+from warpimpact.plotting.dimensions import draw_dimensions
 from warpimpact.scene import NoPattern
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def plate_figure(plate: Plate, core: Core | None = None, title: str = "") -> Fig
     patches = [*_holes(plate, axes), *_frames(plate), *([] if core is None else [_section(core)])]
     for patch in patches:
         axes.add_patch(patch)
+    draw_dimensions(axes, plate)
     steel = Patch(facecolor=_STEEL, edgecolor="black", label=f"plate, {plate.thickness * _MM:g} mm thick")
     numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
@@ -57,7 +59,7 @@ def plate_figure(plate: Plate, core: Core | None = None, title: str = "") -> Fig
         ncols=2,
         frameon=False,
     )
-    note = "to scale, seen from behind the plate"
+    note = "to scale, dimensions in mm, smallest ligament in pink; seen from behind the plate"
     figure.supxlabel(note, y=0.12 * inch, va="bottom", fontsize="small", color="0.3")
     return figure
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray
@@ -19,6 +19,7 @@ from matplotlib.patheffects import Normal, Stroke
 from scipy.spatial import ConvexHull
 
 from warpimpact.analysis.slabs import depth_of, slabs
+from warpimpact.analysis.surface import pressed
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.pressure import pressure
 from warpimpact.results import attributes as attr
@@ -39,7 +40,8 @@ _COMPONENTS = {"x": "black", "y": "#0072B2", "z": "#D55E00"}  # colours of Okabe
 # Blue and green as in the paper's fig. 5, but light, because the core is dark.
 _LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
 _STEEL = "0.8"
-_ARROW = 12.0  # length of a load's arrow [mm]
+_ARROW = 12.0  # length of the arrow of a force that lies in the view [mm]
+_ARC, _ARC_RADIUS = 300.0, 4.5  # angle [degree] and radius [mm] of the arc of a moment across the view
 _AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
 
 
@@ -85,31 +87,57 @@ def flight(dataset: xarray.Dataset) -> Figure:
 
 
 def largest_load(dataset: xarray.Dataset) -> Figure:
-    """The core at its largest force, with force and moment as arrows (the paper's fig. 5b)."""
+    """The core at its largest force, with force and moment (the paper's fig. 5b).
+
+    The force is an arrow from the middle of the pressed surface (`analysis.surface.pressed`). In each view an arc about
+    the centre of mass turns with the moment about the axis across the view.
+    """
     step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
     pose = pose_at_step(dataset, step)
     what = f"under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
     figure, views = two_views(dataset, [pose], what, room=_ARROW)
     for view, axes in views.items():
         axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor="0.55", edgecolor="black"))
-        start = pose.position[[0, "xyz".index(view)]] * _MM
-        for name, (colour, unit, factor) in _LOADS.items():
-            load = dataset[name][step]
-            size = float(np.linalg.norm(load))
-            arrow = load.sel(axis=["x", view]).values * (_ARROW / size if size else 0.0)
-            axes.quiver(
-                *start,
-                *arrow,
-                angles="xy",
-                scale_units="xy",
-                scale=1.0,
-                width=0.006,
-                color=colour,
-                zorder=3,
-                label=f"{name} {size * factor:.3g} {unit}",
-            )
+        _draw_force(axes, dataset, step, view)
+        _draw_moment(axes, dataset, step, view)
     _add_legend(figure, views["y"])
     return figure
+
+
+def _draw_force(axes: Axes, dataset: xarray.Dataset, step: int, view: str) -> None:
+    """The force as an arrow from the middle of the pressed surface; its length shows its share in the view."""
+    colour, unit, factor = _LOADS[v.FORCE]
+    surface, force = pressed(dataset, step), dataset[v.FORCE][step]
+    weight, size = surface.stress * surface.area, float(np.linalg.norm(force))
+    if not (size and weight.any()):
+        return
+    middle = np.average(surface.point.reshape(-1, 3), axis=0, weights=weight.ravel())[[0, "xyz".index(view)]] * _MM
+    arrow = force.sel(axis=["x", view]).values * (_ARROW / size)
+    label = f"force {size * factor:.3g} {unit} at the contact ({_ARROW:g} mm)"
+    style: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.006, "zorder": 4}
+    axes.quiver(*middle, *arrow, color=colour, label=label, **style)
+
+
+def _draw_moment(axes: Axes, dataset: xarray.Dataset, step: int, view: str) -> None:
+    """The moment about the axis across a view as an arc about the centre of mass."""
+    colour, unit, factor = _LOADS[v.MOMENT]
+    moment = dataset[v.MOMENT][step]
+    size, across = float(np.linalg.norm(moment)), {"y": "z", "z": "y"}[view]
+    centre = dataset[v.PLATE_POSITION][step].sel(axis=["x", view]).values * _MM
+    axes.plot(*centre, "o", color=colour, ms=4, zorder=5)
+    if not size:
+        return
+    # z points at the reader of the view x-y, and y away from the reader of the view x-z.
+    turn = float(moment.sel(axis=across)) * (1.0 if across == "z" else -1.0)
+    angle = np.linspace(0.0, np.radians(_ARC) * turn / size, 61)
+    arc = centre + _ARC_RADIUS * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    label = f"moment {size * factor:.3g} {unit} (an arc of {_ARC:g}°)"
+    axes.plot(*arc.T, color=colour, lw=2.0, zorder=4, label=label)
+    if abs(turn) > 0.02 * size:
+        style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 16.0, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate("", arc[-1], arc[-4], arrowprops=style, zorder=5)
+    text = f"about {across}: {float(moment.sel(axis=across)) * factor:.3g} {unit}".replace("-", "−")
+    axes.text(0.99, 0.97, text, transform=axes.transAxes, ha="right", va="top", color=colour)
 
 
 def course(dataset: xarray.Dataset) -> Figure:
@@ -137,7 +165,10 @@ def course(dataset: xarray.Dataset) -> Figure:
 
 
 def plate(dataset: xarray.Dataset) -> Figure:
-    """Resistance left in the plate, from the first contact to the end, seen from behind (the paper's fig. 6)."""
+    """Resistance left in the plate, from the first contact to the end, seen from behind (the paper's fig. 6).
+
+    Each cell of the plate is shown as a share of its own at the start, which a cell at the edge of a hole has less of.
+    """
     share = dataset[v.RESISTANCE_SHARE]
     columns = min(3, share.sizes["snapshot"])
     rows = -(-share.sizes["snapshot"] // columns)
@@ -147,7 +178,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
     figure.suptitle(_title(dataset, "resistance left in the plate, seen from behind"))
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     y, z = (_cell_edges(dataset[v.CELL[axis]]) for axis in "yz")
-    for panel, snapshot in zip(panels.flat, share.where(share[0] >= 0.5), strict=False):
+    for panel, snapshot in zip(panels.flat, (share / share[0]).where(share[0] >= 0.5), strict=False):
         image = panel.imshow(
             snapshot.T, origin="lower", extent=(*y, *z), cmap="viridis", vmin=0.0, vmax=1.0, interpolation="nearest"
         )
@@ -169,10 +200,13 @@ def plate(dataset: xarray.Dataset) -> Figure:
     return figure
 
 
+FIGURES = (passage, flight, largest_load, pressure, course, plate)
+
+
 def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     """Write the figures of a history as PNG files ``<stem>_<figure>.png`` and return their paths."""
     paths = []
-    for draw in (passage, flight, largest_load, pressure, course, plate):
+    for draw in FIGURES:
         paths.append(folder / f"{stem}_{draw.__name__}.png")
         draw(dataset).savefig(paths[-1], dpi=150)
     return paths

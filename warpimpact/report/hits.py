@@ -10,9 +10,10 @@ import xarray
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
+from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.slabs import slabs
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.cell import STATUS_COLOURS, Shown, hit_points, limits, nearest_hits, shown, words
+from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits, shown, words
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v

@@ -55,7 +55,7 @@ def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
 
 
 def unusable(dataset: xarray.Dataset) -> str | None:
-    """What keeps a Dataset that was chosen from a result from being used as one, as a sentence; None if nothing does."""
+    """What keeps hits that were chosen from a result from being used as one, as a sentence; None if nothing does."""
     if v.HIT not in dataset.sizes:
         return "holds one hit without its dimension; choose hits as a list, as in isel(hit=[5])"
     if v.STANDOFF not in dataset.sizes:

@@ -83,7 +83,7 @@ def to_dataset(
         zero = np.zeros(len(shots))
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
-    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES, *v.LAYER_SCATTER)
+    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES)
     optional = (*v.EXIT_VARIABLES, *v.SCATTER_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layers)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:

@@ -219,7 +219,8 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 "one, keep its attributes"
             )
         if not is_history(dataset):
-            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES))
+            optional = (*v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES, *v.LAYER_VARIABLES, *v.LAYER_FACES)
+            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
 
 

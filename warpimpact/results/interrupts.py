@@ -1,24 +1,45 @@
-"""Ctrl-C and the SIGTERM of a batch system: both stop in the same way, and both wait for the end of a protected
-block."""
+"""Ctrl-C and the SIGTERM of a batch system: both stop in the same way, both wait for the end of a protected block, and
+neither is lost."""
 
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+_asked: list[int] = []
+"""Signals that asked this process to stop, since `terminated_as_interrupted` began."""
+
 
 @contextmanager
 def terminated_as_interrupted() -> Iterator[None]:
-    """Treat SIGTERM like Ctrl-C. A batch system sends it to a job whose time is used up."""
+    """Treat SIGTERM like Ctrl-C. A batch system sends it to a job whose time is used up.
 
-    def interrupt(*_: object) -> None:
+    Both are remembered: the exception is lost where it is raised in code that ignores exceptions, for instance while an
+    object is deleted or a module is imported (`stop_if_asked`).
+    """
+    if threading.current_thread() is not threading.main_thread():  # signals reach the main thread only
+        yield
+        return
+
+    def interrupt(number: int, _: object) -> None:
+        _asked.append(number)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, interrupt)
+    # A background job of a shell ignores SIGINT, and goes on doing so.
+    numbers = [number for number in _STOPPING if signal.getsignal(number) is not signal.SIG_IGN]
+    before = {number: signal.signal(number, interrupt) for number in numbers}
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        _asked.clear()
+
+
+def stop_if_asked() -> None:
+    """Raise KeyboardInterrupt if a signal asked for it."""
+    if _asked:
+        raise KeyboardInterrupt
 
 
 @contextmanager
@@ -32,7 +53,7 @@ def uninterrupted() -> Iterator[None]:
         yield
         return
     caught: list[int] = []
-    handlers = {number: signal.signal(number, lambda got, _: caught.append(got)) for number in _HELD_BACK}
+    handlers = {number: signal.signal(number, lambda got, _: caught.append(got)) for number in _STOPPING}
     try:
         yield
     finally:
@@ -42,4 +63,4 @@ def uninterrupted() -> Iterator[None]:
             signal.raise_signal(caught[0])
 
 
-_HELD_BACK = (signal.SIGINT, signal.SIGTERM)
+_STOPPING = (signal.SIGINT, signal.SIGTERM)

@@ -71,7 +71,7 @@ class Variable(str):
         return self.flags is None and self.units != "1" and self.dims in {("hit",), ("hit", "standoff")}
 
 
-_HIT, _AT_STANDOFF = ("hit",), ("hit", "standoff")
+_HIT, _AT_STANDOFF, _IN_LAYER = ("hit",), ("hit", "standoff"), ("hit", "layer")
 _MAIN = ("run", "inspect", "plot", "report")
 
 # --- Coordinates of a hit map ---
@@ -105,7 +105,16 @@ THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
 MASS = Variable("mass", _HIT, "kg", "mass of the core")
 STRENGTH = Variable("strength", _HIT, "Pa", "strength of the core, a nominal bending stress")
 
-SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH)
+LAYER_SCATTER = (
+    Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer"),
+    Variable("layer_resistance", _IN_LAYER, "Pa", "resistance of each layer"),
+    Variable("layer_shear_coefficient", _IN_LAYER, "1", "friction per normal stress of each layer"),
+    Variable("layer_degradation", _IN_LAYER, "1", "share of the resistance left after contact, of each layer"),
+    Variable("layer_offset_y", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, y"),
+    Variable("layer_offset_z", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, z"),
+)
+
+SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH, *LAYER_SCATTER)
 """Present only in a campaign in which they differ from shot to shot."""
 
 # --- How the shot ended ---
@@ -174,7 +183,6 @@ BENDING_STRESS_SECTION = Variable("bending_stress_section", _HIT, "m", "distance
 BENDING_VARIABLES = (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION)
 """Present only with `output.bending`."""
 
-_IN_LAYER = ("hit", "layer")
 LAYER_STATUS = Variable("layer_status", _IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus)
 LAYER_RESIDUAL_VELOCITY = Variable(
     "layer_residual_velocity", _IN_LAYER, "m s-1", "velocity when the last point of the core leaves the layer"
@@ -196,16 +204,6 @@ LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, fr
 
 LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
 """Likewise; of the means where thicknesses scatter."""
-
-LAYER_SCATTER = (
-    Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer"),
-    Variable("layer_resistance", _IN_LAYER, "Pa", "resistance of each layer"),
-    Variable("layer_shear_coefficient", _IN_LAYER, "1", "friction per normal stress of each layer"),
-    Variable("layer_degradation", _IN_LAYER, "1", "share of the resistance left after contact, of each layer"),
-    Variable("layer_offset_y", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, y"),
-    Variable("layer_offset_z", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, z"),
-)
-"""Present only in a campaign in which they differ from shot to shot in a layer behind the plate."""
 
 RESIDUAL_VELOCITY_ERROR = Variable("residual_velocity_error", _HIT, "m s-1", "estimated error of the residual velocity")
 TILT_ERROR = Variable("tilt_error", _AT_STANDOFF, "degree", "estimated error of the tilt")
@@ -415,7 +413,7 @@ def shown_by(command: str) -> tuple[Variable, ...]:
 
 def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables of the impact, and of plate and core where they differ; hit points are not included."""
-    return [*SHOT_VARIABLES, *(name for name in (*SCATTER_VARIABLES, *LAYER_SCATTER) if name in dataset)]
+    return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
 
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:

@@ -2,11 +2,12 @@
 
 import csv
 import math
+import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
@@ -16,6 +17,7 @@ from .units import brief, quoted
 
 _LONGEST_PATH = 255
 """That is quoted whole."""
+_NAME_AND_UNIT = re.compile(r"(\w+)\s*(?:\[\s*([^\[\]]*?)\s*\])?")
 _MOST_BYTES, _MOST_ROWS = 2**28, 2**22
 """Of a table."""
 
@@ -66,26 +68,49 @@ def read_table(path: Path, columns: tuple[str, ...]) -> Array:
     with _open_table(path) as (header, reader):
         if header != columns:
             raise ValueError(f"{path.name}, line 1: {_got(header, columns)}the header must be {','.join(columns)}")
-        return _rows(path, columns, reader)
+        return _rows(path, columns, reader, range(len(columns)))
 
 
-def read_columns(path: Path, required: tuple[str, ...], optional: tuple[str, ...]) -> dict[str, Array]:
+class Column(NamedTuple):
+    """A column of numbers, shape [rows], read-only; `unit` is what its header gives in brackets, or empty."""
+
+    values: Array
+    unit: str
+
+
+def read_columns(
+    path: Path, required: tuple[str, ...], optional: tuple[str, ...], exported: Mapping[str, str]
+) -> dict[str, Column]:
     """Columns of a CSV file by their names: the required ones first in its header, then any of the optional ones.
 
-    Returns:
-        Arrays of shape [rows], read-only.
+    A name may be followed by its unit, as in "hit_y [mm]". A file whose first column is "hit" is one that
+    `warpimpact export` wrote: its columns may stand in any order, and those that are neither required nor optional are
+    left out.
+
+    Args:
+        exported: names in an exported file, and what they are called here.
 
     Raises:
         ValueError: names the file, the line and what is wrong with it.
     """
     with _open_table(path) as (header, reader):
-        more = header[len(required) :]
-        if header[: len(required)] != required or not set(more) <= set(optional) or len(set(more)) < len(more):
+        matches = [_NAME_AND_UNIT.fullmatch(column) for column in header]
+        names, units = ([match[group] or "" if match else "" for match in matches] for group in (1, 2))
+        if names[:1] == ["hit"]:
+            names = [exported.get(name, name) for name in names]
+            wanted = [place for place, name in enumerate(names) if name in (*required, *optional)]
+            found = [names[place] for place in wanted]
+            is_known = set(required) <= set(found)
+        else:
+            wanted, found = list(range(len(header))), names
+            is_known = tuple(names[: len(required)]) == required and set(names[len(required) :]) <= set(optional)
+        if not is_known or len(set(found)) < len(found):
             raise ValueError(
                 f"{path.name}, line 1: {_got(header, (*required, *optional))}the header must be {','.join(required)} "
                 f"and then any of {', '.join(optional)}"
             )
-        return dict(zip(header, _rows(path, header, reader).T, strict=True))
+        rows = _rows(path, header, reader, wanted).T
+        return {name: Column(row, units[place]) for name, row, place in zip(found, rows, wanted, strict=True)}
 
 
 def _got(header: tuple[str, ...], known: tuple[str, ...]) -> str:
@@ -105,24 +130,25 @@ def _open_table(path: Path) -> Iterator[tuple[tuple[str, ...], Any]]:
         raise ValueError(f"{path.name} cannot be read as a table: {error}") from None
 
 
-def _rows(path: Path, columns: tuple[str, ...], reader: Any) -> Array:
+def _rows(path: Path, columns: tuple[str, ...], reader: Any, wanted: Sequence[int]) -> Array:
+    """Numbers of the columns at the places `wanted`."""
     rows = array("d")
     for row in reader:
         if row:
-            rows.extend(_numbers(row, columns, f"{path.name}, line {reader.line_num}"))
-        if len(rows) > _MOST_ROWS * len(columns):
+            rows.extend(_numbers(row, columns, f"{path.name}, line {reader.line_num}", wanted))
+        if len(rows) > _MOST_ROWS * len(wanted):
             raise ValueError(f"{path.name} has more than {_MOST_ROWS} rows")
     if not rows:
         raise ValueError(f"{path.name} has no rows below its header")
-    table = np.array(rows).reshape(-1, len(columns))
+    table = np.array(rows).reshape(-1, len(wanted))
     table.setflags(write=False)
     return table
 
 
-def _numbers(row: list[str], columns: tuple[str, ...], place: str) -> list[float]:
+def _numbers(row: list[str], columns: tuple[str, ...], place: str, wanted: Sequence[int]) -> list[float]:
     if len(row) != len(columns):
         raise ValueError(f'{place}: got "{brief(",".join(row))}", but a row has {len(columns)} finite numbers')
-    return [_finite(text, f"{place}: {name}") for text, name in zip(row, columns, strict=True)]
+    return [_finite(row[column], f"{place}: {columns[column]}") for column in wanted]
 
 
 def _finite(text: str, place: str) -> float:

@@ -16,8 +16,8 @@ class Interaction(Model):
         static: A, share of the resistance Y.
         linear: C, of √(ρY)·v_n.
         quadratic: B, of ρ·v_n².
-        onset: κ, the closing speed over which contact sets in, as a share of the speed of the centre of mass. Normal
-            stress, friction and exposure are multiplied by min(1, v_n / (κ |v|)). With 0 contact jumps. Where a wall
+        onset: κ, the closing speed over which contact sets in, as a share of the speed v of the centre of mass. Normal
+            stress, friction and exposure are multiplied by min(1, v_n / (κ v)). With 0 contact jumps. Where a wall
             with friction slides along itself, as a shank does, the outcome then has no limit: it depends on the
             numerics.
     """

@@ -34,9 +34,9 @@ class Plate(Model):
             law has no rate: outcomes depend on Y/v² alone.
         degradation_length: ℓ, how far around a contact the material weakens [m].
         density: of the material [kg/m³].
-        size: extent along y and z of a finite plate centred on the origin [m]; None is unbounded.
-        margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out. None
-            lets the rim cut holes.
+        size: extent along y and z of a finite plate centred on the origin [m]; a plate without it is unbounded.
+        margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out.
+            Without a margin the rim cuts holes.
         pattern: shape and lattice of the holes; with a margin, only the holes that are left on the plate.
     """
 

@@ -4,17 +4,17 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from .files import InputFile, read_columns
+from .files import Column, InputFile, read_columns
 from .model import Array, Model
 from .plate import Plate
-from .units import Angle, AngularVelocity, PositiveSpeed
+from .units import Angle, AngularVelocity, Length, Mass, Number, PositiveSpeed, Speed, Stress, quantity
 
 _RIGHT_ANGLE = np.pi / 2
 
@@ -42,6 +42,34 @@ Tilt = Annotated[
     Angle, AfterValidator(_is_tilt), Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90})
 ]
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
+
+
+EXPORTED = {"impact_velocity": "velocity", "impact_pitch": "pitch", "impact_yaw": "yaw"}
+"""Names of columns in an exported result, and those of a list of hits."""
+_UNITS: dict[str, Any] = {
+    **dict.fromkeys(("hit_y", "hit_z", "thickness"), Length),
+    **dict.fromkeys(_ANGLES, Angle),
+    "velocity": Speed,
+    "spin": AngularVelocity,
+    "resistance": Stress,
+    "mass": Mass,
+    "shear_coefficient": Number,
+    "degradation": Number,
+}
+
+
+def _in_si(name: str, column: Column, file: str) -> Array:
+    """Values of a column of a list of hits in SI and radians; a number without a unit is degrees for an angle."""
+    kind = _UNITS[name]
+    if not column.unit:
+        return np.radians(column.values) if kind is Angle else column.values
+    try:
+        factor = quantity(kind)(f"1 {column.unit}")
+    except ValueError as error:
+        raise ValueError(f"{file}, line 1: {name}: {error}") from None
+    values: Array = column.values * factor
+    values.setflags(write=False)
+    return values
 
 
 class Impact(Model):
@@ -86,7 +114,8 @@ class Hits(Model):
         count: how many; a grid takes the most that a rectangle of nearly square cells gives.
         seed: of all that is drawn.
         file: CSV file of a list, with the header hit_y,hit_z in metres; more columns, named as in `Shots`, override
-            those quantities: angles in degrees, all else in SI.
+            those quantities: angles in degrees, all else in SI, or in the unit behind the name, as in "hit_y [mm]".
+            A result that `warpimpact export` wrote is such a list, too.
         repeats: how often every hit of a grid or a list is shot, each time with other draws of what scatters.
         replicates: independent scramblings that the shots of a sobol sampling are dealt out to in turn, a power of
             two; 16 unless given. Their spread tells how certain a mean is.
@@ -125,8 +154,8 @@ class Hits(Model):
         if self.file is None:
             return None
         required = ("hit_y", "hit_z")
-        columns = read_columns(self.file, required, _listable(required))
-        return {name: np.radians(column) if name in _ANGLES else column for name, column in columns.items()}
+        columns = read_columns(self.file, required, _listable(required), EXPORTED)
+        return {name: _in_si(name, column, self.file.name) for name, column in columns.items()}
 
     @property
     def scramblings(self) -> int:

@@ -224,6 +224,7 @@ Energy = Annotated[Read, _quantity("an energy", "J", "10 J")]
 Inertia = Annotated[Read, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]
 
 PositiveLength = Annotated[Length, Field(gt=0)]
+NonNegativeLength = Annotated[Length, Field(ge=0)]
 PositiveMass = Annotated[Mass, Field(gt=0)]
 PositiveTime = Annotated[Time, Field(gt=0)]
 PositiveDensity = Annotated[Density, Field(gt=0)]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from functools import partial
 from queue import SimpleQueue
 from typing import Any, TypeVar
@@ -29,8 +30,10 @@ Progress = Callable[[int, int], None]
 Progress1 = Callable[[int], None]
 Scratch = TypeVar("Scratch")
 
-CPU_CHUNK = 32
-"""Most shots per launch on the CPU: few enough for a smooth progress bar and an even load of the threads."""
+CPU_CHUNK = 64
+"""Most shots per launch on the CPU: few enough for an even load of the threads."""
+CPU_LAUNCH = 0.25
+"""Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
 CUDA_CHUNK = 65536
 WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
 """Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
@@ -292,18 +295,31 @@ class March:
         for scratch in slots:
             idle.put(scratch)
 
-        def work(chunk: tuple[int, int]) -> int:
-            scratch = idle.get()
+        def work(first: int, count: int) -> tuple[int, float]:
+            scratch, begin = idle.get(), time.perf_counter()
             try:
-                return launch(scratch, 1, *chunk)
+                return launch(scratch, 1, first, count), time.perf_counter() - begin
             finally:
                 idle.put(scratch)
 
-        done = 0
+        # The first launches are of one shot each: some scenes take seconds per shot.
+        most, count, begun, done = max(1, min(CPU_CHUNK, total // (4 * len(slots)))), 1, 0, 0
+        waiting: set[Future[tuple[int, float]]] = set()
         with ThreadPoolExecutor(len(slots)) as pool:
-            for count in pool.map(work, _chunks(total, max(1, min(CPU_CHUNK, total // (4 * len(slots)))))):
-                done += count
-                progress(done)
+            try:
+                while done < total:
+                    while begun < total and len(waiting) < 2 * len(slots):
+                        count = min(count, total - begun)
+                        waiting.add(pool.submit(work, begun, count))
+                        begun += count
+                    ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                    for shots, seconds in (future.result() for future in ended):
+                        done += shots
+                        count = min(most, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
+                    progress(done)
+            finally:
+                for future in waiting:
+                    future.cancel()
 
 
 def _exits(contact: Any, status: NDArray[np.int8]) -> dict[str, Array]:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Numerics, Scene, Shots, Tolerance
+from warpimpact.solver.marching import Progress
 from warpimpact.solver.refinement import Change
 from warpimpact.solver.resolution import LADDER, Fidelity, level
 from warpimpact.solver.simulate import Outcomes, simulate
@@ -70,12 +71,16 @@ class Promise:
         return f"accuracy {errors} for 90 % of the hits{'' if self.kept else ', not as promised'}"
 
 
-def keep(scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto") -> Promise:
+def keep(
+    scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto", progress: Progress | None = None
+) -> Promise:
     """Find the coarsest level of resolution that keeps the promise of a named fidelity.
 
     Args:
         numerics: its fidelity and precision count; single settings would promise nothing (`Numerics.explicit`).
         pilot: shots like those that are to be computed, some PILOT of them.
+        device: as in `simulate`.
+        progress: called with (0, shots) while a level is computed; an exception that it raises ends the search.
 
     Returns:
         The promise, kept; or if no level keeps it, the finest level that has a finer one to compare with.
@@ -85,13 +90,16 @@ def keep(scene: Scene, numerics: Numerics, pilot: Shots, *, device: str = "auto"
     """
     tolerance, first = PROMISES[numerics.fidelity]
     known: dict[int, Outcomes] = {}
+    follow = progress and (lambda _, total: progress(0, total))
     found = Promise(level(first, numerics), False, math.inf, math.inf)
     for index in range(first, len(LADDER) - 1):
         finer = min(index + 2, len(LADDER) - 1)
         try:
             for needed in (index, finer):
                 if needed not in known:
-                    known[needed] = simulate(scene, pilot, numerics=level(needed, numerics), device=device)
+                    known[needed] = simulate(
+                        scene, pilot, numerics=level(needed, numerics), device=device, progress=follow
+                    )
         except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
             break
         errors = MARGIN[finer - index] * _errors(known[index], known[finer])

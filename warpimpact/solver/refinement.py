@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
@@ -16,7 +18,9 @@ from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
 Array = NDArray[np.float64]
 
 LEVELS = (0, 2, 4, 6, 8)
-"""Levels of LADDER that a shot goes through, each some four times as expensive as the one before."""
+"""Levels of LADDER that a shot goes through."""
+GROWTH = 4.0
+"""How many times as much a level costs as the one before, about."""
 CLOSE, FAR = 0.25, 1.0
 """A shot has converged where its last change is at most CLOSE of the tolerance; or where its last change is within the
 tolerance and the change from two levels before within FAR times that. Two levels may agree by chance, three rarely."""
@@ -39,6 +43,24 @@ class Estimates:
     level: NDArray[np.int8]
 
 
+@dataclass(frozen=True)
+class Refining:
+    """How far some shots are on their way to a tolerance.
+
+    Attributes:
+        level, levels: the one under way, 1 the coarsest, and how many there are: a shot that has not converged on the
+            last one ends there.
+        pending: shots that it computes.
+        seconds_left: about the longest time that they may still take, if all of them need the last level; None before
+            the first level has been measured.
+    """
+
+    level: int
+    levels: int
+    pending: int
+    seconds_left: float | None
+
+
 def simulate_to_tolerance(
     scene: Scene,
     shots: Shots,
@@ -47,6 +69,7 @@ def simulate_to_tolerance(
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
+    refining: Callable[[Refining], None] | None = None,
 ) -> tuple[Outcomes, Estimates]:
     """Compute every shot on the first two levels, and on finer ones until it has converged (CLOSE, FAR).
 
@@ -55,6 +78,7 @@ def simulate_to_tolerance(
 
     Args:
         numerics: its tolerance and precision; the others as in `simulate`.
+        refining: called with the level under way whenever `progress` is, and before.
 
     Raises:
         ValueError: the numerics have no tolerance.
@@ -62,17 +86,18 @@ def simulate_to_tolerance(
     """
     if numerics.tolerance is None:
         raise ValueError("the numerics have no tolerance")
-    tolerance = numerics.tolerance
+    tolerance, cost = numerics.tolerance, _Cost()
 
     def on(index: int, which: NDArray[np.int64]) -> Outcomes:
-        return simulate(
-            scene,
-            shots[which],
-            numerics=level(index, numerics),
-            device=device,
-            threads=threads,
-            progress=lambda *_: show(len(shots) - len(pending)),  # nothing new, but a chance to end the computation
-        )
+        def follow(done: int, _: int) -> None:
+            if refining is not None:
+                refining(cost.after(done))
+            show(len(shots) - len(pending))  # nothing new, but a chance to end the computation
+
+        cost.begin(index, len(which))
+        follow(0, 0)
+        fidelity = level(index, numerics)
+        return simulate(scene, shots[which], numerics=fidelity, device=device, threads=threads, progress=follow)
 
     def show(done: int) -> None:
         if progress is not None:
@@ -102,6 +127,30 @@ def simulate_to_tolerance(
             break
     show(len(shots))
     return outcomes, estimates
+
+
+class _Cost:
+    """Measures what a level costs, and tells what the others may cost yet."""
+
+    def __init__(self) -> None:
+        self._place, self._pending, self._begin = 0, 0, 0.0
+        self._per_shot: float | None = None
+
+    def begin(self, index: int, pending: int) -> None:
+        """A level of LADDER begins, for so many shots."""
+        if self._per_shot is not None:
+            self._per_shot *= GROWTH
+        self._place, self._pending, self._begin = LEVELS.index(index), pending, time.perf_counter()
+
+    def after(self, done: int) -> Refining:
+        """Where the shots are when so many of them are through the level."""
+        if done:
+            self._per_shot = (time.perf_counter() - self._begin) / done
+        finer = sum(GROWTH**k for k in range(1, len(LEVELS) - self._place))
+        left = None
+        if self._per_shot is not None:
+            left = self._per_shot * (self._pending - done + finer * self._pending)
+        return Refining(self._place + 1, len(LEVELS), self._pending, left)
 
 
 @dataclass(frozen=True)

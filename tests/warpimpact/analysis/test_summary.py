@@ -28,6 +28,7 @@ def test_counts_every_status(mixed):
         "unfinished": 1,
         "left_window": 0,
         "not_finite": 0,
+        "gained_energy": 0,
     }
 
 

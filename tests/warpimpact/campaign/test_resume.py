@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import netCDF4
@@ -78,9 +79,12 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
     moments, output, kills, completed = random.Random(1), tmp_path / "a.nc", 0, 0
 
     def saved() -> int:
-        return len(list(tmp_path.glob("a.nc.parts/hits_*.nc")))
+        with suppress(FileNotFoundError):  # a run that ends takes the folder away meanwhile
+            return sum(path.match("hits_*.nc") for path in map(Path, os.listdir(folder_of(output))))
+        return 0
 
-    while kills < KILLS or not output.exists():
+    # The last kill, too, may come when the result is there and its shards are not yet gone.
+    while kills < KILLS or not output.exists() or folder_of(output).exists():
         # Progress on the disk says when, whatever the speed: up to five shards on, and a moment after.
         wanted, later = saved() + moments.randint(0, 5), moments.uniform(0.0, 0.05)
         run_process = processes.Process(target=main, args=(command(output),))
@@ -487,3 +491,55 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
     assert last.startswith("warpimpact: interrupted; ")
     assert last.endswith(f"shards are saved in {output}.parts; continue with --resume")
     shutil.rmtree(f"{output}.parts")
+
+
+HOST_WORK = """
+import sys, time
+from warpimpact.campaign import team
+from warpimpact.cli import command
+
+def host_work(*_, **__):  # a ligament, or the compilation of a kernel: one call, which nothing can break off
+    print("at work", flush=True)
+    time.sleep(120.0)
+
+team.{name} = host_work
+command()
+"""
+
+
+@pytest.mark.parametrize("name", ["promise_of", "compute"])
+@pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
+def test_a_first_signal_ends_a_run_that_is_at_work_on_the_host(
+    name: str, by: signal.Signals, campaign_file: Path, tmp_path: Path
+) -> None:
+    listen = _after("signal.signal(signal.SIGINT, signal.SIG_DFL)")
+    run_it = [sys.executable, "-c", HOST_WORK.format(name=name), "run", str(campaign_file)]
+    with subprocess.Popen(
+        [*listen, *run_it, "-o", str(tmp_path / "a.nc"), "--device", "cpu"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        while process.stdout.readline() != "at work\n":
+            assert process.poll() is None
+        begin = time.monotonic()
+        process.send_signal(by)
+        _, shown = process.communicate(timeout=PATIENCE)
+    assert time.monotonic() - begin < 60.0  # two seconds on an idle machine; half of the work in any case
+    assert process.returncode == 130
+    assert shown.splitlines()[-1] == "warpimpact: interrupted; nothing is saved"
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_signal_that_is_lost_on_the_way_still_ends_the_run(
+    campaign_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def deaf(*_: object, **__: object) -> None:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr("warpimpact.campaign.run.manifest", lambda *given: (deaf(), parts.manifest(*given))[1])
+    assert main(["run", str(campaign_file), "-o", str(tmp_path / "a.nc"), "--device", "cpu"]) == 130
+    assert "interrupted" in capsys.readouterr().err
+    assert not (tmp_path / "a.nc").exists()

@@ -195,7 +195,7 @@ def test_the_command_tells_what_was_computed(
         Path("a.toml").write_text(text.replace('"825 m/s"', impact))
         assert main(["run", "a.toml", "--count", "64", "--device", "cpu", "--overwrite"]) == 0
         assert sentence in capsys.readouterr().out
-        assert main(["plot", "a.nc"]) == 0
+        assert main(["plot", "a.nc", "--overwrite"]) == 0
         assert main(["replay", "a.nc", "--hit", "63", "--overwrite"]) == 0
         assert "The end is bit-identical to the stored outcome.\n" in capsys.readouterr().out
     rim = '[plate]\nsize = ["40 mm", "40 mm"]'

@@ -233,7 +233,6 @@ def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) ->
         lambda d: d.assign_attrs(title=7),
         lambda d: d.assign(status=d["status"].astype(str)),
         lambda d: d.assign(tilt=("standoff", np.zeros(2)), deflection=("standoff", np.zeros(2))),
-        lambda d: d.isel(hit=slice(0)),
         lambda d: d.assign(tilt=d["tilt"].assign_attrs(units="furlong")),
     ],
 )

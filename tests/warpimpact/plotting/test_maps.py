@@ -234,8 +234,22 @@ def test_overview_shows_four_aligned_maps(covered):
     assert titles == ["residual velocity", "deflection", "tilt, 130 mm behind the plate", "status"]
     boxes = [axes.get_position().bounds for axes in figure.axes if axes.get_title()]
     np.testing.assert_allclose([box[2:] for box in boxes], [boxes[0][2:]] * 4)
-    assert boxes[0][0] == boxes[2][0]
-    assert boxes[2][1] == boxes[3][1]
+    assert boxes[0][0] == pytest.approx(boxes[2][0])
+    assert boxes[2][1] == pytest.approx(boxes[3][1])
+    assert all(axes.get_legend() is None for axes in figure.axes)
+    (legend,) = figure.legends
+    entries = [text.get_text() for text in legend.get_texts()]
+    statuses = [f"{name} 25.0%" for name in ("perforated", "arrested", "ricocheted", "missed")]
+    assert sorted(entries) == sorted(["arrested, ricocheted", "edge of hole", *statuses])
+
+
+def test_overview_has_no_map_of_one_colour(perforated):
+    figure = overview(perforated)
+    titles = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
+    behind = [f"tilt, {distance} mm behind the plate" for distance in (50, 130)]
+    assert titles == ["residual velocity", "deflection", *behind]
+    assert figure.get_supxlabel().endswith("seen from behind the plate; all perforated")
+    assert len(overview(perforated.isel(standoff=[1])).axes) == 6  # three maps, each with its colour bar
 
 
 @pytest.mark.parametrize("status", [Status.PERFORATED, Status.ARRESTED, Status.NOT_FINITE])
@@ -300,7 +314,7 @@ def test_maps_beside_each_other_have_one_scale_of_colour_and_of_length(make_resu
     assert [axes.get_title().split("\n")[0] for axes in maps_] == ["wide", "small"]
     norms = [axes.images[0].norm for axes in maps_]
     assert [(norm.vmin, norm.vmax) for norm in norms] == [pytest.approx((410.0, 800.0))] * 2
-    assert [bar.get_ylim() for bar in bars] == [pytest.approx((410.0, 800.0))] * 2
+    assert [bar.get_ylim() for bar in bars] == [pytest.approx((410.0, 800.0))]  # one bar for equal scales
     figure.draw_without_rendering()
     lengths = [np.diff(axes.transData.transform([(0, 0), (1, 0)])[:, 0]).item() for axes in maps_]
     assert lengths[0] == pytest.approx(lengths[1])

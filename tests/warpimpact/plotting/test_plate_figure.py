@@ -12,6 +12,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure
+from warpimpact.plotting.dimensions import hole_dimensions, smallest_ligament
 from warpimpact.scene import ConeCore, MaskPattern, NoPattern, Plate, SlotPattern
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -69,6 +70,19 @@ def test_numbers_stand_above_the_picture() -> None:
     title = plate_figure(plate()).axes[0].get_title()
     # (32 + 4π)/128 of 31.4 kg/m² is hole.
     assert " ".join(title.split()) == "open area 34.8%, smallest ligament 4.00 mm, areal density 20.5 kg/m²"
+
+
+def test_dimensions_are_those_of_the_plate() -> None:
+    assert [dimension.text for dimension in hole_dimensions(plate())] == ["4", "12", "16", "16"]
+    ligament = smallest_ligament(plate())
+    assert ligament is not None
+    assert ligament.text == "4"
+    middle = 0.5 * (ligament.start + ligament.end)
+    assert plate().is_solid(*middle)
+    assert not plate().is_solid(*(middle + 0.52 * (ligament.end - ligament.start)))
+    assert (smallest_ligament(plate(pattern=NoPattern())), hole_dimensions(plate(pattern=NoPattern()))) == (None, [])
+    shown = [text.get_text() for text in plate_figure(plate()).axes[0].texts]
+    assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
 
 
 def test_islands_of_a_mask_are_steel_and_its_resolution_is_told(tmp_path: Path) -> None:

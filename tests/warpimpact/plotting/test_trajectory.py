@@ -123,13 +123,21 @@ def test_largest_load_is_drawn_at_its_instant(history: xarray.Dataset) -> None:
     size = np.linalg.norm(history["force"], axis=1)
     step = int(size.argmax())
     assert f"{float(history['time'][step]) * 1e6:.1f} µs" in figure.get_suptitle()
-    _, force, moment = figure.axes[0].collections
-    assert (force.get_label(), moment.get_label()) == (
-        f"force {size[step] / 1e3:.3g} kN",
-        f"moment {np.linalg.norm(history['moment'][step]):.3g} N m",
-    )
-    drawn = np.array([force.U[0], force.V[0]]) / 12.0
-    np.testing.assert_allclose(drawn, history["force"].values[step, :2] / size[step], rtol=1e-6)
+    moment = history["moment"].values[step]
+    for view, (component, across) in enumerate(((1, 2), (2, 1))):
+        axes = figure.axes[view]
+        _, force = axes.collections
+        assert force.get_label().startswith(f"force {size[step] / 1e3:.3g} kN")
+        drawn = np.array([force.U[0], force.V[0]]) / 12.0
+        np.testing.assert_allclose(drawn, history["force"].values[step, [0, component]] / size[step], rtol=1e-6)
+        assert 0.0 <= force.X[0] <= 4.0  # in the plate
+        (arc,) = [line for line in axes.lines if line.get_label().startswith("moment")]
+        y = arc.get_ydata() - history["plate_position"].values[step, component] * 1e3
+        x = arc.get_xdata() - history["plate_position"].values[step, 0] * 1e3
+        angle = np.degrees(np.unwrap(np.arctan2(y, x)))
+        share = moment[across] / np.linalg.norm(moment)  # y points away from the reader of x-z: positive is clockwise
+        assert angle[-1] - angle[0] == pytest.approx(300.0 * share * (1 if across == 2 else -1), abs=0.1)
+        assert axes.texts[-1].get_text() == f"about {'xyz'[across]}: {moment[across]:.3g} N m".replace("-", "−")
 
 
 def test_course_shows_what_the_history_holds(history: xarray.Dataset) -> None:
@@ -160,7 +168,9 @@ def test_plate_is_shown_at_every_snapshot_with_holes_left_out(history: xarray.Da
         assert (right - left, top - bottom) == pytest.approx((cell * snapshot.shape[0], cell * snapshot.shape[1]))
         drawn = image.get_array().T
         np.testing.assert_array_equal(np.ma.getmaskarray(drawn), share.values[0] < 0.5)
-        np.testing.assert_array_equal(drawn[share.values[0] >= 0.5], snapshot[share.values[0] >= 0.5])
+        shown = share.values[0] >= 0.5
+        np.testing.assert_allclose(drawn[shown], (snapshot / share.values[0])[shown])
+    assert (panels[0].images[0].get_array().compressed() == 1.0).all()  # nothing is weakened at the first touch
 
 
 def test_figures_are_written(history: xarray.Dataset, tmp_path: Path) -> None:

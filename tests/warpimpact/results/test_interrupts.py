@@ -2,10 +2,11 @@
 
 import signal
 import threading
+from contextlib import suppress
 
 import pytest
 
-from warpimpact.results.interrupts import uninterrupted
+from warpimpact.results.interrupts import stop_if_asked, terminated_as_interrupted, uninterrupted
 
 
 @pytest.fixture
@@ -49,3 +50,21 @@ def test_other_threads_need_no_signals() -> None:
     thread.start()
     thread.join()
     assert done == [True]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_comes_where_exceptions_are_ignored_is_not_lost(
+    number: signal.Signals, interrupted: None
+) -> None:
+    with pytest.raises(KeyboardInterrupt), terminated_as_interrupted():  # noqa: PT012
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(number)  # as in code that ignores all exceptions: a destructor, some imports
+        stop_if_asked()
+    stop_if_asked()  # of the next command nobody has asked anything
+
+
+def test_a_background_job_goes_on_ignoring_ctrl_c(interrupted: None) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with terminated_as_interrupted():
+        signal.raise_signal(signal.SIGINT)
+        stop_if_asked()

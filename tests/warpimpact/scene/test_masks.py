@@ -2,6 +2,7 @@
 
 import math
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +62,9 @@ def _png(path: Path, cells: np.ndarray) -> None:
 
 def _huge_png(path: Path) -> None:
     """Only a header, of an image that would take 10 GB."""
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 100_000, 100_000))
+    header = b"IHDR" + struct.pack(">II5B", 100_000, 100_000, 8, 0, 0, 0, 0)
+    chunks = (struct.pack(">I", len(one) - 4) + one + struct.pack(">I", zlib.crc32(one)) for one in (header, b"IDAT"))
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(chunks))
 
 
 def _cut_png(path: Path) -> None:

@@ -20,7 +20,7 @@ from warpimpact.scene import (
     SlotPattern,
     make_shots,
 )
-from warpimpact.solver.refinement import LEVELS, simulate_to_tolerance
+from warpimpact.solver.refinement import LEVELS, Refining, simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER, resolve
 from warpimpact.solver.rings import rings_of
 from warpimpact.solver.simulate import Outcomes, simulate
@@ -117,3 +117,18 @@ def test_a_campaign_carries_estimates_and_replays_on_the_level_of_each_hit(tmp_p
     finest = int(dataset.level.values.argmax())
     assert dataset.level[finest] > 1
     assert replay(dataset, finest, folder=tmp_path).attrs["agreement"] == "bit-identical"
+
+
+def test_progress_tells_the_level_the_pending_shots_and_the_longest_time_left() -> None:
+    seen: list[Refining] = []
+    numerics = Numerics(tolerance={"residual_velocity": "1e-6 m/s", "tilt": "1e-6 deg"})
+    _, estimates = simulate_to_tolerance(SCENE, shots(2), numerics=numerics, device="cpu", refining=seen.append)
+    assert seen[0] == Refining(1, len(LEVELS), 2, None)
+    levels = [found.level for found in seen]
+    assert levels == sorted(levels)
+    assert set(levels) == set(range(1, len(LEVELS) + 1))
+    assert all(found.seconds_left is not None for found in seen if found.level > 1)
+    assert seen[-1].pending == np.count_nonzero(estimates.level == LEVELS[-1])
+    assert seen[-1].seconds_left == 0.0
+    first, last = (next(found for found in seen if found.level == level) for level in (2, len(LEVELS)))
+    assert first.seconds_left > last.seconds_left > 0.0

@@ -1,6 +1,5 @@
 """Files that masks come from: images, arrays and drawings."""
 
-import struct
 import xml.etree.ElementTree as xml
 from functools import reduce
 from pathlib import Path
@@ -59,19 +58,19 @@ def _material(path: Path, cells: NDArray[Any]) -> BoolArray:
 
 
 def _read_png(path: Path) -> NDArray[Any]:
-    with path.open("rb") as stream:
-        header = stream.read(24)
-    if len(header) < 24 or not header.startswith(b"\x89PNG\r\n\x1a\n"):
-        raise ValueError(f"{path.name} is not a PNG image")
-    _check_size(path, struct.unpack(">II", header[16:]))  # before anything is decoded
-    from PIL import Image
+    from PIL.PngImagePlugin import PngImageFile
 
     try:
-        with Image.open(path, formats=("PNG",)) as image:
+        image = PngImageFile(path)  # reads the header; nothing is decoded yet
+    except Exception:  # Pillow lets errors of many classes through
+        raise ValueError(f"{path.name} is not a PNG image") from None
+    with image:
+        _check_size(path, image.size)
+        try:
             mode = image.mode
             cells = np.asarray(image.convert("L"))[::-1].T
-    except Exception as error:  # Pillow lets errors of many classes through
-        raise ValueError(f"{path.name} is a damaged PNG image: {brief(str(error))}") from None
+        except Exception as error:
+            raise ValueError(f"{path.name} is a damaged PNG image: {brief(str(error))}") from None
     if mode not in ("1", "L", "P", "RGB"):
         raise ValueError(f"{path.name} is not a mask: give a grey or 1-bit image, not {mode}")
     return cells

@@ -14,9 +14,11 @@ _QUARTER = 16
 
 def area(spine: Array, rounding: float) -> float:
     """Area of the shape [m²] (Steiner's formula)."""
-    step = np.roll(spine, -1, axis=0) - spine
-    enclosed = 0.5 * float((spine[:, 0] * step[:, 1] - spine[:, 1] * step[:, 0]).sum())
-    return enclosed + rounding * float(np.hypot(*step.T).sum()) + np.pi * rounding**2
+    import shapely
+
+    shape = geometries(spine[None])[0]
+    around = shape.length * (2.0 if len(spine) == 2 else 1.0)  # of a line there and back
+    return float(shapely.area(shape) + rounding * around + np.pi * rounding**2)
 
 
 def distance(spine: Array, y: Array, z: Array) -> Array:

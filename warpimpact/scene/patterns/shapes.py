@@ -4,10 +4,9 @@ from abc import abstractmethod
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 from ..model import Array
-from ..units import Length, PositiveLength
+from ..units import NonNegativeLength, PositiveLength
 from .lattice import LatticePattern
 
 _ELLIPSE_CHORDS = 720
@@ -110,7 +109,7 @@ class _PolygonPattern(LatticePattern):
         corner_radius: of the rounded corners [m].
     """
 
-    corner_radius: Length = Field(default=0.0, ge=0)
+    corner_radius: NonNegativeLength = 0.0
 
     @property
     @abstractmethod

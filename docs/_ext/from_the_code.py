@@ -1,0 +1,343 @@
+"""Directives whose text is made from the code: keys of campaigns, commands, variables, public names, device code."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+CHECKOUT = Path(__file__).parents[2]
+
+
+class FromTheCode(SphinxDirective):
+    """Markdown that a function makes, as if it stood in the page."""
+
+    def lines(self) -> Iterator[str]:
+        raise NotImplementedError
+
+    def run(self) -> list[nodes.Node]:
+        self.env.note_reread()  # the code may have changed
+        return self.parse_text_to_nodes("\n".join(self.lines()), allow_section_headings=True)
+
+
+def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> Iterator[str]:
+    """A table of Markdown."""
+    for row in (header, tuple("---" for _ in header), *rows):
+        yield "| " + " | ".join(cell.replace("|", "\\|").replace("\n", " ") for cell in row) + " |"
+    yield ""
+
+
+def code(text: object) -> str:
+    return f"`{text}`"
+
+
+# --- Keys of a campaign ---
+
+
+class CampaignReference(FromTheCode):
+    """Every key of a campaign file, table by table, from its JSON schema."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.campaign.schema import campaign_schema
+
+        self.schema = campaign_schema()
+        yield from ["## Tables of the file", ""]
+        yield from self.keys(self.schema)
+        for name, part in self.schema["properties"].items():
+            yield from self.of_table(name, part)
+        yield from ["## Distributions", "", self.definition("Distribution")["description"], ""]
+        for one in self.chosen(self.definition("Distribution")):
+            yield from self.variant(one, "distribution")
+
+    def definition(self, reference: str) -> dict[str, Any]:
+        found: dict[str, Any] = self.schema["$defs"][reference.rpartition("/")[2]]
+        return found
+
+    def chosen(self, part: dict[str, Any]) -> list[dict[str, Any]]:
+        """The models that a part of the schema may be."""
+        options = [part, *part.get("oneOf", []), *part.get("anyOf", [])]
+        options += [option["items"] for option in options if "items" in option]
+        return [self.definition(option["$ref"]) for option in options if "$ref" in option]
+
+    def of_table(self, name: str, part: dict[str, Any], depth: str = "##") -> Iterator[str]:
+        """A table of the file, and those within it."""
+        models = [one for one in self.chosen(part) if "properties" in one]
+        if not models:
+            return
+        yield from [f"{depth} `[{name}]`", "", part.get("description", "").capitalize(), ""]
+        if len(models) > 1 and "shape" in models[0]["properties"]:
+            shared = self.shared(models)
+            yield from self.keys(shared)
+            for model in models:
+                model["properties"] = {k: v for k, v in model["properties"].items() if k not in shared["properties"]}
+                yield from self.variant(model, "shape", depth + "#")
+            return
+        for model in models:
+            if model is not models[0]:
+                new = {key for key in model["properties"] if key not in models[0]["properties"]}
+                yield f"With several, each has besides these: {', '.join(map(code, sorted(new)))}."
+                yield ""
+                continue
+            yield from [model.get("description", ""), ""]
+            yield from self.keys(model)
+            for key, inner in model["properties"].items():
+                if not any("distribution" in one.get("properties", {}) or "oneOf" in one for one in self.chosen(inner)):
+                    yield from self.of_table(f"{name}.{key}", inner, depth)
+
+    def shared(self, models: list[dict[str, Any]]) -> dict[str, Any]:
+        """The keys that all of some models have alike."""
+        first, *others = models
+        alike = {
+            key: part
+            for key, part in first["properties"].items()
+            if all(other["properties"].get(key) == part for other in others)
+        }
+        required = [key for key in first.get("required", []) if all(key in one.get("required", []) for one in others)]
+        return {"properties": alike, "required": required}
+
+    def variant(self, model: dict[str, Any], key: str, depth: str = "###") -> Iterator[str]:
+        name = model["properties"][key]["const"]
+        yield from [f'{depth} `{key} = "{name}"`', "", model.get("description", ""), ""]
+        yield from self.keys(model, without=key)
+
+    def keys(self, model: dict[str, Any], without: str = "") -> Iterator[str]:
+        required = model.get("required", [])
+        rows = [
+            (
+                code(key),
+                self.kind(part),
+                "**required**" if key in required else self.default(part),
+                self.bounds(part),
+                self.meaning(part),
+            )
+            for key, part in model["properties"].items()
+            if key != without
+        ]
+        if rows:
+            yield from table(("key", "unit or type", "default", "allowed", "meaning"), rows)
+
+    def leaf(self, part: dict[str, Any]) -> dict[str, Any]:
+        """The value itself, where a distribution may take its place."""
+        return next((one for one in part.get("anyOf", []) if "type" in one), part)
+
+    def kind(self, part: dict[str, Any]) -> str:
+        if "items" not in part and any("properties" in one for one in self.chosen(part)):
+            return "table"
+        part = self.leaf(part)
+        if "unit" in part:
+            return str(part["unit"])
+        if "enum" in part or "const" in part:
+            return "word" if isinstance(part.get("const", part.get("enum", [""])[0]), str) else "integer"
+        if part.get("type") == "array":
+            inner = part.get("items") or part["prefixItems"][0]
+            return f"list of {self.kind(inner)}"
+        if "$ref" in part and "properties" not in self.definition(part["$ref"]):
+            return self.kind(self.definition(part["$ref"]))
+        kinds = part.get("type", "string")
+        return "number" if isinstance(kinds, list) else {"string": "text", "boolean": "true or false"}.get(kinds, kinds)
+
+    def default(self, part: dict[str, Any]) -> str:
+        default = part.get("default")
+        if default is None or isinstance(default, dict):
+            return ""
+        unit = self.leaf(part).get("unit", "") or self.leaf(part).get("items", {}).get("unit", "")
+        told = str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""
+        if not told and isinstance(default, list):
+            told = ", ".join(f"{one:g}" for one in default)
+        return code(f"{told or format(default, 'g')} {unit if default != 0 else ''}".strip())
+
+    def bounds(self, part: dict[str, Any]) -> str:
+        part = self.leaf(part)
+        inner = (part.get("items") or part.get("prefixItems", [{}])[0]) if part.get("type") == "array" else part
+        words = [f'"{one}"' if isinstance(one, str) else str(one) for one in inner.get("enum", [])]
+        told = [", ".join(map(code, words))] if words else []
+        for name, sign in (("exclusiveMinimum", ">"), ("minimum", "≥"), ("exclusiveMaximum", "<"), ("maximum", "≤")):
+            if name in inner:
+                told.append(f"{sign} {short(inner[name])}")
+        if "multipleOf" in inner:
+            told.append(f"a multiple of {inner['multipleOf']}")
+        if "maxItems" in part and part["maxItems"] == part.get("minItems"):
+            told.append(f"{part['maxItems']} items")
+        elif "maxItems" in part:
+            told.append(f"at most {part['maxItems']} items")
+        return ", ".join(told)
+
+    def meaning(self, part: dict[str, Any]) -> str:
+        told = str(part.get("description", ""))
+        scatters = any(one.get("$ref", "").endswith("/Distribution") for one in part.get("anyOf", []))
+        return f"{told} May [scatter](#distributions)." if scatters else told
+
+
+def short(number: float) -> str:
+    power = math.log2(number) if number > 0 else 0.5
+    return f"2^{power:g}" if power >= 16 and power == int(power) else f"{number:g}"
+
+
+# --- Commands ---
+
+
+class CommandReference(FromTheCode):
+    """Every command with its arguments, from the parsers."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.cli import parser
+
+        for action in parser()._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                for name, command in action.choices.items():
+                    yield from self.of_command(name, command)
+
+    def of_command(self, name: str, command: argparse.ArgumentParser) -> Iterator[str]:
+        usage = " ".join(command.format_usage().removeprefix("usage: ").split())
+        yield from [f"## {name}", "", prose(command.description or ""), "", "```text", usage, "```", ""]
+        rows = [(self.written(one), prose(self.helped(one))) for one in command._actions if one.dest != "help"]
+        yield from table(("argument", "meaning"), rows)
+        if command.epilog:
+            yield from ["```text", command.epilog.removeprefix("example: "), "```", ""]
+
+    def written(self, action: argparse.Action) -> str:
+        value = str(action.metavar or "") or ("|".join(map(str, action.choices)) if action.choices else "")
+        names = action.option_strings or [value]
+        return ", ".join(code(f"{name} {value}".strip() if action.option_strings else name) for name in names)
+
+    def helped(self, action: argparse.Action) -> str:
+        return (action.help or "") % (vars(action) | {"prog": "warpimpact"})
+
+
+def prose(text: str) -> str:
+    """Text of a help as Markdown: what Markdown would take for marks is spelt out."""
+    return re.sub(r"([*_\[\]<>])", r"\\\1", text)
+
+
+# --- Variables of results ---
+
+
+class VariableReference(FromTheCode):
+    """Variables of a hit map, with dimensions and units."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.results import variables
+
+        groups = {
+            "Coordinates": variables.COORDINATES,
+            "Impact": variables.SHOT_VARIABLES,
+            "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
+            "How the shot ended": variables.OUTCOME_VARIABLES,
+            "With `output.bending`": variables.BENDING_VARIABLES,
+            "With a tolerance": variables.ESTIMATE_VARIABLES,
+        }
+        for title, group in groups.items():
+            yield from [f"## {title}", ""]
+            rows = [(code(str(one)), ", ".join(one.dims), one.units, one.long_name) for one in group]
+            yield from table(("variable", "dimensions", "units", "meaning"), rows)
+
+
+class StatusReference(FromTheCode):
+    """How a shot may end."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.kernels.status import Status
+
+        rows = [(code(status.name.lower()), str(status.value), status.sentence) for status in Status]
+        yield from table(("status", "code", "meaning"), rows)
+
+
+# --- Names in Python ---
+
+
+class PublicReference(FromTheCode):
+    """All names of warpimpact, in groups by their kind."""
+
+    def lines(self) -> Iterator[str]:
+        from pydantic import BaseModel
+
+        import warpimpact
+
+        named = {name: getattr(warpimpact, name) for name in warpimpact.__all__ if not name.startswith("_")}
+        kinds: dict[str, list[str]] = {"Functions": [], "Models": [], "Results and values": [], "Errors": []}
+        for name, one in named.items():
+            if inspect.isfunction(one):
+                kinds["Functions"].append(name)
+            elif issubclass(one, Exception):
+                kinds["Errors"].append(name)
+            else:
+                kinds["Models" if issubclass(one, BaseModel) else "Results and values"].append(name)
+        for title, names in kinds.items():
+            yield from [f"## {title}", "", "```{eval-rst}"]
+            for name in names:
+                kind = "autofunction" if title == "Functions" else "autoexception" if title == "Errors" else "autoclass"
+                yield from [f".. {kind}:: warpimpact.{name}", ""]
+                if title in ("Models", "Results and values"):
+                    yield from ["   :members:", "   :exclude-members: model_copy, model_config, model_post_init", ""]
+            yield from ["```", ""]
+
+
+def signature_of_a_model(
+    app: Sphinx, what: str, name: str, obj: Any, options: Any, signature: str | None, returned: str | None
+) -> tuple[str | None, str | None] | None:
+    """Fields of a model by their names; the docstring tells what they take."""
+    from pydantic import BaseModel
+
+    if what == "class" and isinstance(obj, type) and issubclass(obj, BaseModel):
+        fields = (key if one.is_required() else f"{key}=…" for key, one in obj.model_fields.items())
+        return f"({', '.join(('*', *fields))})", None
+    return None
+
+
+# --- Device code ---
+
+
+class KernelReference(FromTheCode):
+    """Functions and structures of the device code, from their source: Warp replaces them when it builds them."""
+
+    def lines(self) -> Iterator[str]:
+        for path in sorted((CHECKOUT / "kernels").glob("*.py")):
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            if path.stem == "__init__":
+                continue
+            yield from [f"## {path.stem}", "", ast.get_docstring(tree) or "", ""]
+            for node in ast.walk(tree):
+                if isinstance(node, ast.FunctionDef | ast.ClassDef) and (mark := device_mark(node)):
+                    yield from self.entry(node, mark)
+
+    def entry(self, node: ast.FunctionDef | ast.ClassDef, mark: str) -> Iterator[str]:
+        if isinstance(node, ast.ClassDef):
+            fields = [one for one in node.body if isinstance(one, ast.AnnAssign)]
+            signature = ", ".join(ast.unparse(one).replace("'", "") for one in fields)
+        else:
+            signature = ast.unparse(node.args)
+        kind = {"struct": "structure", "kernel": "kernel"}.get(mark, "function")
+        yield from [f"`{node.name}` ({kind})", "", f": {' '.join((ast.get_docstring(node) or '').split())}", ""]
+        yield from [f"  `{node.name}({signature})`", ""]
+
+
+def device_mark(node: ast.FunctionDef | ast.ClassDef) -> str | None:
+    """Which decorator of Warp a definition has: func, func_native, struct or kernel."""
+    for one in node.decorator_list:
+        call = one.func if isinstance(one, ast.Call) else one
+        if isinstance(call, ast.Attribute) and ast.unparse(call.value) == "wp":
+            return call.attr
+    return None
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    for name, directive in {
+        "campaign-reference": CampaignReference,
+        "command-reference": CommandReference,
+        "variable-reference": VariableReference,
+        "status-reference": StatusReference,
+        "public-reference": PublicReference,
+        "kernel-reference": KernelReference,
+    }.items():
+        app.add_directive(name, directive)
+    app.connect("autodoc-process-signature", signature_of_a_model)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,63 @@
+"""Sphinx: how the pages of this folder become one."""
+
+import os
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "_ext"))
+# Tutorials call the command of the environment that builds them, and say no progress.
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+os.environ["PYDEVD_DISABLE_FILE_VALIDATION"] = "1"
+
+project = "warpimpact"
+author = "The warpimpact developers"
+copyright = author
+release = version_of("warpimpact")
+
+extensions = [
+    "myst_nb",
+    "sphinx_design",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.doctest",
+    "sphinx.ext.mathjax",
+    "from_the_code",
+]
+exclude_patterns = ["_build", "_ext"]
+nitpicky = False
+default_role = "code"
+
+myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence", "deflist", "fieldlist"]
+myst_heading_anchors = 3
+myst_dmath_double_inline = True
+
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_show_tb = True
+nb_execution_timeout = 300
+nb_execution_in_temp = True
+nb_merge_streams = True
+nb_output_stderr = "remove"
+suppress_warnings = ["myst-nb.lexer"]  # of pages that are not executed, where their examples alone are checked
+
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+autodoc_class_signature = "mixed"
+napoleon_google_docstring = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+
+html_theme = "pydata_sphinx_theme"
+html_title = "warpimpact"
+html_theme_options = {
+    "show_toc_level": 2,
+    "navigation_with_keys": False,
+    "secondary_sidebar_items": ["page-toc"],
+    "pygments_light_style": "default",
+    "show_prev_next": True,
+}
+html_sourcelink_suffix = ""
+html_show_sourcelink = False

@@ -1,0 +1,96 @@
+"""The pages are built without a warning, tutorials are executed, and what is generated is whole."""
+
+import html
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import warpimpact
+from warpimpact.campaign.schema import campaign_schema
+from warpimpact.cli import parser
+from warpimpact.results import variables
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def build(builder: str, folder: Path, *options: str) -> None:
+    """Build the pages into a folder; a warning is an error."""
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-j", "auto", "-b", builder, *options]
+    environment = os.environ | {"MPLBACKEND": "module://matplotlib_inline.backend_inline"}
+    done = subprocess.run(
+        [*command, "-d", folder / "trees", DOCS, folder], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-5000:] + done.stdout[-2000:]
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("pages")
+    build("html", folder)
+    return folder
+
+
+def text(page: Path) -> str:
+    """What a person reads on a page."""
+    (article,) = re.findall(r"<article.*?</article>", page.read_text(encoding="utf-8"), re.DOTALL)
+    return html.unescape(re.sub(r"<[^>]*>", "", article))
+
+
+def test_every_key_of_a_campaign_is_on_its_page(pages: Path) -> None:
+    shown, schema = text(pages / "reference" / "campaign.html"), campaign_schema()
+    keys = {key for one in (schema, *schema["$defs"].values()) for key in one.get("properties", {})}
+    assert len(keys) > 60
+    assert not [key for key in keys if not re.search(rf"\b{key}\b", shown)]
+    assert "title" in shown.partition("[core]")[0]
+    assert "2^30" in shown  # of hits.count
+    assert "7850 kg/m^3" in shown  # default with its unit
+
+
+def test_every_command_is_on_its_page(pages: Path) -> None:
+    shown = text(pages / "reference" / "commands.html")
+    (commands,) = [action.choices for action in parser()._actions if hasattr(action.choices, "items")]
+    for name, command in commands.items():
+        assert f"warpimpact {name}" in shown
+        assert all(option in shown for action in command._actions for option in action.option_strings)
+    assert all(re.search(rf"^{code}$", shown, re.MULTILINE) for code in (0, 2, 3, 70, 130, 141))
+
+
+def test_every_public_name_and_every_variable_is_on_its_page(pages: Path) -> None:
+    shown = text(pages / "reference" / "python.html")
+    assert not [name for name in warpimpact.__all__ if not name.startswith("_") and name not in shown]
+    shown = text(pages / "reference" / "results.html")
+    assert not [one for one in variables.OUTCOME_VARIABLES if one not in shown]
+
+
+def test_device_functions_are_on_their_page(pages: Path) -> None:
+    shown = text(pages / "reference" / "device.html")
+    source = "".join(path.read_text(encoding="utf-8") for path in (DOCS.parent / "kernels").glob("*.py"))
+    functions = re.findall(r"@wp\.func\n\s+def (\w+)", source)
+    assert len(functions) > 50
+    assert not [name for name in functions if name not in shown]
+
+
+def test_tutorials_were_executed(pages: Path) -> None:
+    shown = text(pages / "tutorials" / "first_map.html")
+    assert "hits per second" in shown
+    assert "bit-identical" in shown
+    pictures = [page.stem for page in (DOCS / "tutorials").glob("*.md") if "<img" not in html_of(pages, page.stem)]
+    assert pictures == ["index"]
+
+
+def html_of(pages: Path, name: str) -> str:
+    (article,) = re.findall(
+        r"<article.*?</article>", (pages / "tutorials" / f"{name}.html").read_text(encoding="utf-8"), re.DOTALL
+    )
+    return article
+
+
+def test_examples_in_pages_are_right(tmp_path: Path) -> None:
+    build("doctest", tmp_path, "-D", "nb_execution_mode=off")
+    found = re.search(r"(\d+) tests?\n *0 failures in tests", (tmp_path / "output.txt").read_text(encoding="utf-8"))
+    assert found
+    assert int(found[1]) >= 5

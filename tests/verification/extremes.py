@@ -1,0 +1,216 @@
+"""Scenes far beyond any realistic shot, and what holds for each of them: a finite outcome or a named status, kinetic
+energy that grows in no step, a unit quaternion, and an end.
+
+The envelope: speeds 1 to 5000 m/s, Y 0 to 1e12 Pa, β 0 and 1 included, Δt_β 1 ns to 1 s or Δs_β 1 nm to 10 m, η 0 to
+10, κ 0 to 10, thickness 0.1 to 200 mm, obliquity 0 to 89°, any attitude, spin ±1e5 rad/s, cores of 1 to 100 mm from
+needle to disc, of 1 to 1e5 kg/m³, with moments of inertia of a tenth to ten times those of their shape, holes from
+hairline to wider than the core, finite plates hit at the rim, hits 10 m away from the origin, both precisions.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from warpimpact.kernels.status import Status
+from warpimpact.scene import (
+    AnyPattern,
+    CirclePattern,
+    Core,
+    Interaction,
+    NoPattern,
+    Numerics,
+    Plate,
+    ProfileCore,
+    Record,
+    Scene,
+    Shots,
+    SlotPattern,
+)
+from warpimpact.solver.device import find_device
+from warpimpact.solver.history import History
+from warpimpact.solver.marching import March
+
+from .scenes import shots_at
+
+STEEL = 7850.0
+MOST_RISE = 64.0
+"""Largest rise of the kinetic energy in a step, in ε of the precision and of the impact energy: rounding."""
+MOST_STRETCH = 4.0
+"""Largest difference of a quaternion's length from 1, in ε."""
+WIDEST = 300.0
+"""Degradation lengths that a straight shot may sweep: the memory and time of a window grow with their square."""
+
+
+class Extreme(NamedTuple):
+    """A scene, shots at it that differ in hit and attitude, and the precision of the numerics."""
+
+    scene: Scene
+    shots: Shots
+    precision: Any
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came of the shots of a scene, in shots, and of the steps of those that did not fail.
+
+    Attributes:
+        variant: the build of the kernels.
+        statuses: how the shots ended.
+        steps: of all shots.
+        rise: largest rise of the kinetic energy in a step, in ε and impact energies.
+        gain: largest energy above that of the impact, in impact energies.
+        stretch: largest difference of a quaternion's length from 1, in ε.
+        undefined: shots whose outcome lacks a value that their status promises, or has one that it excludes.
+    """
+
+    variant: str
+    statuses: list[Status]
+    steps: int
+    rise: float
+    gain: float
+    stretch: float
+    undefined: int
+
+
+def drawn(share: Callable[[], float], hits: int) -> Extreme:
+    """A scene from a source of numbers within [0, 1]."""
+    draw = _Draw(share)
+    core = _core(draw)
+    diameter = 2.0 * core.max_radius
+    side = draw.one_of(None, draw.between(0.5, 3.0) * diameter)
+    obliquity, azimuth = draw.between(0.0, 89.0), draw.between(-180.0, 180.0)
+    thickness = draw.spread(1e-4, 0.2)
+    steep = math.radians(obliquity)
+    swept = core.bounding_radius + core.max_radius / math.cos(steep) + thickness * math.tan(steep)
+    interval, distance = draw.spread(1e-9, 1.0), draw.spread(1e-9, 10.0)
+    by_time = {"degradation_interval": interval}
+    plate = Plate(
+        thickness=thickness,
+        resistance=draw.one_of(0.0, *[draw.spread(1e3, 1e12)] * 7),
+        shear_coefficient=draw.one_of(0.0, draw.spread(1e-3, 10.0)),
+        degradation=draw.one_of(0.0, 0.8, 1.0, 1.0, draw.between(0.0, 1.0), draw.spread(1e-30, 1.0)),
+        degradation_length=max(diameter * draw.spread(0.05, 1.0), swept / WIDEST),
+        pattern=_pattern(draw, diameter),
+        size=None if side is None else (side, side),
+        **draw.one_of(by_time, by_time, {"degradation_distance": distance}),
+    )
+    interaction = Interaction(
+        linear=draw.one_of(0.0, 0.0, 1.0),
+        quadratic=draw.one_of(0.0, 0.0, 1.0),
+        onset=draw.one_of(0.005, 0.005, 0.0, draw.spread(1e-6, 10.0)),
+    )
+    flight = np.degrees(np.arctan(math.tan(steep) * np.array([_sine(azimuth), _sine(azimuth + 90.0)])))
+    away = draw.one_of(0.0, 10.0) if side is None else 0.0
+    aim = diameter if side is None else 0.5 * side
+    shots = shots_at(
+        [away + aim * draw.between(-1.0, 1.0) for _ in range(hits)],
+        [away + aim * draw.between(-1.0, 1.0) for _ in range(hits)],
+        velocity=draw.spread(1.0, 5000.0),
+        obliquity=obliquity,
+        azimuth=azimuth,
+        pitch=[draw.between(-89.9, 89.9) - flight[0] for _ in range(hits)],  # any projected attitude of the axis
+        yaw=[draw.between(-89.9, 89.9) - flight[1] for _ in range(hits)],
+        spin=draw.one_of(0.0, -1e5, 1e5, draw.between(-1e5, 1e5)),
+    )
+    scene = Scene(core=core, target=plate, interaction=interaction, record=Record(standoffs=(1.0,)))
+    return Extreme(scene, shots, draw.one_of("single", "single", "single", "double"))
+
+
+def found(extreme: Extreme) -> Found:
+    """Compute the shots of a scene with their histories, at draft, on one thread of the CPU."""
+    scene, shots, precision = extreme
+    numerics = Numerics(fidelity="draft", precision=precision)
+    march = March(scene, numerics, shots, find_device("cpu"), threads=1, traced=True)
+    contact = march.march()
+    report, traces = march.report(contact), march.traces(contact)
+    statuses = [Status(int(code)) for code in report["status"]]
+    properties = scene.core.mass_properties
+    rises, gains, stretches = [0.0], [0.0], [0.0]
+    epsilon = np.finfo(np.float32 if precision == "single" else np.float64).eps
+    spinning = properties.inertia_axial * shots.spin**2
+    for status, steps, impact in zip(
+        statuses, traces, 0.5 * (properties.mass * shots.velocity**2 + spinning), strict=True
+    ):
+        if status not in (Status.NOT_FINITE, Status.GAINED_ENERGY):
+            history = History.from_trace(steps, properties)
+            energy = np.append(impact, history.translational_energy + history.rotational_energy) / impact
+            rises.append(np.diff(energy).max() / epsilon)
+            gains.append(energy.max() - 1.0)
+            stretches.append(np.abs(np.linalg.norm(history.attitude, axis=1) - 1.0).max() / epsilon)
+    return Found(
+        variant=march.variant.name,
+        statuses=statuses,
+        steps=sum(map(len, traces)),
+        rise=float(np.max(rises)),
+        gain=float(np.max(gains)),
+        stretch=float(np.max(stretches)),
+        undefined=sum(not _defined(report, shot, status) for shot, status in enumerate(statuses)),
+    )
+
+
+def _defined(report: dict[str, Any], shot: int, status: Status) -> bool:
+    """Whether an outcome has the values that its status promises, and no other ones."""
+    scalars = np.array([report[name][shot] for name in ("residual_velocity", "energy_loss", "contact_duration")])
+    seen = np.isfinite(report["tilt"][shot]).all()
+    if status.failed:
+        return bool(np.isnan(scalars).all() and not seen)
+    passed = status is Status.PERFORATED
+    return bool(
+        np.isfinite(scalars).all()
+        and np.isfinite(report["angular_velocity"][shot]).all()
+        and (seen == passed or status is Status.MISSED)
+    )
+
+
+class _Draw:
+    """Values of any kind from a source of numbers within [0, 1]."""
+
+    def __init__(self, share: Callable[[], float]) -> None:
+        self.share = share
+
+    def between(self, low: float, high: float) -> float:
+        """Spread evenly, both ends included."""
+        return low + (high - low) * self.share()
+
+    def spread(self, low: float, high: float) -> float:
+        """Spread evenly in the logarithm, both ends included."""
+        return min(high, max(low, low * (high / low) ** self.share()))
+
+    def one_of(self, *choices: Any) -> Any:
+        return choices[min(len(choices) - 1, int(len(choices) * self.share()))]
+
+
+def _core(draw: _Draw) -> Core:
+    length, diameter = draw.spread(1e-3, 0.1), draw.spread(1e-3, 0.1)
+    diameter = draw.one_of(diameter, min(diameter, length / 20))  # a needle
+    shoulder = draw.between(0.05, 1.0) * length
+    nose, base = draw.between(0.0, 1.0), draw.between(0.0, 1.0)
+    stations = (0.0, shoulder, length) if shoulder < length else (0.0, length)
+    radii = (0.5 * nose * diameter, 0.5 * diameter, 0.5 * base * diameter)[: len(stations)]
+    core = ProfileCore(s=stations, r=radii, density=draw.one_of(STEEL, draw.spread(1.0, 1e5)))
+    own = core.mass_properties
+    axial, transverse = (draw.one_of(1.0, draw.spread(0.1, 10.0)) for _ in range(2))
+    inertia = {
+        "inertia_axial": axial * own.inertia_axial,
+        "inertia_transverse": transverse * own.inertia_transverse,
+    }
+    return core.model_copy(update=inertia)
+
+
+def _pattern(draw: _Draw, diameter: float) -> AnyPattern:
+    hole = draw.spread(0.01, 3.0) * diameter
+    gap_y, gap_z = draw.between(1.01, 3.0), draw.between(1.01, 3.0)
+    pattern: AnyPattern = draw.one_of(
+        NoPattern(),
+        CirclePattern(diameter=hole, spacing=(gap_y * hole, gap_z * hole)),
+        SlotPattern(length=2 * hole, width=hole, spacing=(gap_y * hole, 2 * gap_z * hole)),
+    )
+    return pattern
+
+
+def _sine(angle: float) -> float:
+    """Of an angle in degrees."""
+    return math.sin(math.radians(angle))

@@ -1,0 +1,42 @@
+"""Result files follow the CF conventions, as the IOOS compliance checker reads them."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.campaign.run import run
+from warpimpact.results import files
+
+pytest.importorskip("compliance_checker")
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def result() -> xarray.Dataset:
+    text = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("[output]", "[output]\nbending = true")
+    return run(Campaign.from_text(text, name="a", folder=Path(), count=16), device="cpu")
+
+
+def report(path: Path) -> str:
+    checker = Path(sys.executable).with_name("compliance-checker")
+    command = [str(checker), "--test", "cf:1.11", "--criteria", "strict", str(path)]
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout
+
+
+def test_a_hit_map_complies(result: xarray.Dataset, tmp_path: Path) -> None:
+    files.write(result, tmp_path / "a.nc")
+    told = report(tmp_path / "a.nc")
+    assert "All tests passed!" in told, told
+
+
+def test_the_checker_finds_what_does_not_comply(result: xarray.Dataset, tmp_path: Path) -> None:
+    wrong = result.copy()
+    wrong["tilt"].attrs["units"] = "slopes"
+    files.write(wrong, tmp_path / "a.nc")
+    told = report(tmp_path / "a.nc")
+    assert "tilt" in told
+    assert "All tests passed!" not in told

@@ -1,0 +1,149 @@
+"""Hits that were chosen from a result with plain xarray: small, readable, and still a result."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.cli import main
+from warpimpact.results import files
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import is_choice, outlines, solid_reference
+from warpimpact.results.measures import dealing
+
+SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+TEXT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "128")
+
+
+@pytest.fixture(scope="module")
+def result() -> xarray.Dataset:
+    return run(Campaign.from_text(TEXT, name="a", folder=Path()), device="cpu")
+
+
+@pytest.fixture
+def plain(result: xarray.Dataset, tmp_path: Path) -> xarray.Dataset:
+    """As plain xarray opens the file."""
+    files.write(result, tmp_path / "a.nc")
+    return xarray.load_dataset(tmp_path / "a.nc")
+
+
+def tilted(dataset: xarray.Dataset) -> xarray.Dataset:
+    return dataset.where(dataset["tilt"].isel(standoff=-1, drop=True) > 20.0, drop=True)
+
+
+def test_a_choice_is_no_larger_than_its_share(result: xarray.Dataset, plain: xarray.Dataset) -> None:
+    for dataset in (result, plain):
+        few = tilted(dataset)
+        assert 10 < few.sizes["hit"] < 118
+        assert few.nbytes < dataset.nbytes
+        assert all(few[name].dims == dataset[name].dims for name in dataset.variables)
+
+
+def test_a_choice_made_with_plain_xarray_is_still_a_result(
+    plain: xarray.Dataset, result: xarray.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = tilted(plain)
+    few.to_netcdf(tmp_path / "few.nc")
+    path, hit = str(tmp_path / "few.nc"), int(few["hit"][3])
+    assert main(["inspect", path]) == 0
+    shown = capsys.readouterr().out
+    assert f"These are {few.sizes['hit']} chosen hits of a larger result." in shown
+    assert "There is no solid plate to compare with" in shown
+    assert main(["plot", path]) == 0
+    assert main(["report", path, "--trajectories", "1"]) == 0
+    capsys.readouterr()
+    assert main(["replay", path, "--hit", str(hit)]) == 0
+    assert "The end is bit-identical to the stored outcome." in capsys.readouterr().out
+    with xarray.open_dataset(tmp_path / f"few_hit{hit}.nc") as history:
+        np.testing.assert_array_equal(history["tilt"], result["tilt"].sel(hit=hit))
+    missing = int(np.setdiff1d(result["hit"], few["hit"])[0])
+    assert main(["replay", path, "--hit", str(missing)]) == 2
+    assert f"hit: got {missing}, but the result has {few.sizes['hit']} of the hits" in capsys.readouterr().err
+
+
+def test_holes_follow_from_the_plate_where_the_outlines_were_left_behind(
+    result: xarray.Dataset, plain: xarray.Dataset
+) -> None:
+    assert v.OUTLINE_Y not in plain.variables
+    for axis, outline in outlines(plain).items():
+        np.testing.assert_allclose(outline, result[v.OUTLINE[axis]], rtol=1e-12)
+    without = plain.drop_attrs().assign_attrs(plate_period=plain.attrs["plate_period"])
+    assert [len(outline) for outline in outlines(without).values()] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("choose", "sentence"),
+    [
+        (lambda d: d.isel(hit=[]), "has no hits, so there is nothing to show"),
+        (lambda d: d.isel(hit=3), "holds one hit without its dimension; choose hits as a list"),
+        (lambda d: d.isel(standoff=0), "holds one stand-off without its dimension; choose stand-offs as a list"),
+        (lambda d: d.where(d["tilt"].isel(standoff=0, drop=True) > 20.0), "choose hits with where(..., drop=True)"),
+        (lambda d: d[["tilt"]], 'not a warpimpact result, it has no variable "angular_velocity"'),
+        (lambda d: d.drop_attrs(deep=False), 'no attribute "plate_period"; where it was chosen from one, keep its'),
+    ],
+)
+def test_what_a_choice_lacks_is_told_in_a_sentence(
+    plain: xarray.Dataset,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    choose: Callable[[xarray.Dataset], xarray.Dataset],
+    sentence: str,
+) -> None:
+    choose(plain).to_netcdf(tmp_path / "b.nc")
+    assert main(["inspect", str(tmp_path / "b.nc")]) == 2
+    told = capsys.readouterr().err
+    assert sentence in told
+    assert told.count("\n") == 1
+
+
+def test_chosen_hits_are_no_longer_dealt_out_in_turn(result: xarray.Dataset) -> None:
+    first = result.isel(hit=slice(64))
+    assert [is_choice(one) for one in (result, first, result.isel(hit=slice(1, None)))] == [False, False, True]
+    assert dealing(first)["replicates"] == 16
+    assert dealing(result.isel(hit=slice(None, None, 2)))["replicates"] == 1
+
+
+def test_a_number_names_the_same_hit_in_a_choice(result: xarray.Dataset) -> None:
+    worst = {measure.name: measure.hit for measure in effectiveness(result)}["residual_energy_fraction_worst_point"]
+    rest = result.isel(hit=slice(worst, None))
+    few = {measure.name: measure.hit for measure in effectiveness(rest)}
+    assert few["residual_energy_fraction_worst_point"] == worst == int(result["residual_velocity"].idxmax())
+
+
+def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
+    text = TEXT.replace('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } ')
+    result = run(Campaign.from_text(text, name="a", folder=Path(), count=64), device="cpu")
+    solid, later = solid_reference(result), solid_reference(result.isel(hit=slice(10, 50, 2)))
+    assert solid is not None
+    assert later is not None
+    chosen = solid.isel(hit=slice(10, 50, 2))
+    for name in ("residual_velocity", "tilt", "impact_velocity"):
+        np.testing.assert_array_equal(later[name], chosen[name])
+
+
+def test_files_of_the_first_version_are_read(result: xarray.Dataset, tmp_path: Path) -> None:
+    """They hold everything in the root, in double precision, without numbers of hits and without a plate."""
+    flat = result.drop_vars(["hit", *v.EXIT_VARIABLES]).reset_coords([*v.OUTLINE_VARIABLES, *v.SOLID_VARIABLES])
+    flat = flat.assign({name: flat[name].astype(float) for name in v.OUTCOME_VARIABLES if name != v.STATUS})
+    del flat.attrs["plate"]
+    flat.to_netcdf(tmp_path / "old.nc")
+    read = files.read(tmp_path / "old.nc")
+    assert set(read.variables) == set(result.variables) - set(v.EXIT_VARIABLES)
+    assert set(read.coords) == set(result.coords)
+    assert replay(read, 5, folder=tmp_path).attrs["agreement"] == "bit-identical"
+    assert [one.ratio for one in effectiveness(read)] == pytest.approx(
+        [one.ratio for one in effectiveness(result)], nan_ok=True
+    )
+
+
+def test_a_study_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    xarray.Dataset(coords={"setting": ["draft"]}).to_netcdf(tmp_path / "study.nc")
+    for command in ("inspect", "plot", "export"):
+        assert main([command, str(tmp_path / "study.nc")]) == 2
+        assert "is a study of the numerics, as warpimpact study writes, not a map of hits" in capsys.readouterr().err

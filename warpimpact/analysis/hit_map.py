@@ -1,0 +1,163 @@
+"""A variable of the hits as a regular map over the unit cell, which xarray itself can plot."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import xarray
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import KDTree
+
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import passed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+PIXELS = 200
+"""Along the longer side of a map."""
+_FARTHEST = 2.0
+"""A place farther than this from every hit, in mean hit spacings, has too few hits. Of random hits, 3e-6 of the places
+are."""
+_MARGIN = 4.0
+"""Width of the strip that continues a periodic cell, in mean hit spacings."""
+_BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}
+"""A core that ricocheted has them, too, but in front of the plate."""
+
+
+def hit_map(
+    result: xarray.Dataset,
+    variable: str,
+    *,
+    standoff: float | None = None,
+    method: Literal["nearest", "linear"] = "nearest",
+    pixels: int | None = None,
+) -> xarray.DataArray:
+    """One variable of a result over where the cores hit, on a regular grid of the unit cell.
+
+    A place has no value (NaN) where there are too few hits, or where the nearest hit has none; "linear" needs values of
+    all three hits around. Residual velocity and deflection are those of cores that passed the plate. The cell
+    continues across its edges unless the plate is finite.
+
+    Args:
+        result: the Dataset of a campaign, or hits chosen from it.
+        variable: name of a variable with one number per hit, or per hit and stand-off.
+        standoff: distance behind the plate [m] for a variable that has one; the largest if None.
+        method: "nearest" gives every place the value of the nearest hit. "linear" interpolates between three hits.
+        pixels: places along the longer side, 1 or more; None gives the places of the hits themselves if they were
+            sampled as a grid (mean of hits at the same place), else 200.
+
+    Returns:
+        Map of shape [hit_z, hit_y], with these coordinates [m] and the attributes of the variable.
+
+    Raises:
+        ValueError: the variable cannot be mapped, the result has no such stand-off, no hits, or hits outside the cell.
+    """
+    if method not in ("nearest", "linear"):
+        raise ValueError(f'method: got "{method}", but it must be "nearest" or "linear"')
+    if pixels is not None and pixels < 1:
+        raise ValueError(f"pixels: got {pixels}, but it must be at least 1")
+    array = at_standoff(result, variable, standoff)
+    if variable == v.STATUS and method == "linear":
+        raise ValueError('got "status" with method = "linear", but codes cannot be interpolated; use "nearest"')
+    values = array.values.astype(np.float64)
+    if variable in _BEHIND:
+        values = np.where(passed(result), values, np.nan)
+    period, hits = np.asarray(result.attrs[attr.PLATE_PERIOD]), hit_points(result)
+    if not len(hits):
+        raise ValueError("the result has no hits")
+    if np.any(np.abs(hits) > period / 2 * (1.0 + 1e-9)):
+        raise ValueError("the result has hits outside the cell, so a map of the cell cannot show them")
+    on_grid = _on_grid(result, hits, values) if pixels is None else None
+    if on_grid is None:
+        y, z = axes_of(period, pixels or PIXELS)
+        on_grid = y, z, _between(hits, values, _places(y, z), period, wraps=_is_periodic(result), method=method)
+    y, z, image = on_grid
+    coordinates = {name: (name, along, name.attributes) for name, along in ((v.HIT_Z, z), (v.HIT_Y, y))}
+    known = {name: array[name] for name in (v.STANDOFF,) if name in array.coords}
+    return xarray.DataArray(image, coordinates | known, (v.HIT_Z, v.HIT_Y), str(variable), array.attrs)
+
+
+def at_standoff(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> xarray.DataArray:
+    """A variable with one number per hit, shape [hits], at one stand-off [m] if it has stand-offs (None: the largest).
+
+    Raises:
+        ValueError: the variable is none of these, or the Dataset has no such stand-off.
+    """
+    array = dataset.get(variable)
+    if array is None or array.dims not in {("hit",), ("hit", "standoff")} or variable in (v.HIT, v.HIT_Y, v.HIT_Z):
+        raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mappable(dataset))}')
+    if v.STANDOFF not in array.dims:
+        return array
+    distances = dataset[v.STANDOFF].values
+    index = distances.size - 1 if standoff is None else int(np.argmin(np.abs(distances - standoff)))
+    if standoff is not None and not np.isclose(distances[index], standoff):
+        known = ", ".join(f"{distance:g}" for distance in distances)
+        raise ValueError(f"the result has no stand-off of {standoff:g} m; it has {known} m")
+    return array.isel(standoff=index)
+
+
+def mappable(dataset: xarray.Dataset) -> list[str]:
+    """Names of the variables with one number per hit, or per hit and stand-off."""
+    return [str(name) for name, array in dataset.data_vars.items() if array.dims in {("hit",), ("hit", "standoff")}]
+
+
+def hit_points(dataset: xarray.Dataset) -> Array:
+    """Hit points [m], shape [hits, 2]."""
+    return np.stack([dataset[v.HIT_Y].values, dataset[v.HIT_Z].values], axis=-1)
+
+
+def axes_of(period: Array, count: int) -> tuple[Array, Array]:
+    """Centres of nearly square pixels along y and z [m], `count` of them along the longer side of a cell."""
+    counts = np.ceil(count * period / period.max()).astype(int)
+    y, z = (((np.arange(n) + 0.5) / n - 0.5) * length for n, length in zip(counts, period, strict=True))
+    return y, z
+
+
+def _places(y: Array, z: Array) -> Array:
+    return np.stack(np.meshgrid(y, z), axis=-1)
+
+
+def _is_periodic(result: xarray.Dataset) -> bool:
+    """Whether the plate continues across the edges of the cell."""
+    return json.loads(result.attrs.get(attr.PLATE, "{}")).get("size") is None
+
+
+def _on_grid(result: xarray.Dataset, hits: Array, values: Array) -> tuple[Array, Array, Array] | None:
+    """Places along y and z and the values there, if the hits were sampled as a grid and are all of its places."""
+    if result.attrs.get(attr.SAMPLING) != "grid":
+        return None
+    (y, at_y), (z, at_z) = (np.unique(column, return_inverse=True) for column in hits.T)
+    place = at_z * len(y) + at_y
+    count = np.bincount(place, minlength=len(y) * len(z))
+    if not count.all():
+        return None
+    return y, z, (np.bincount(place, values, minlength=len(count)) / count).reshape(len(z), len(y))
+
+
+def _between(hits: Array, values: Array, places: Array, period: Array, *, wraps: bool, method: str) -> Array:
+    """Values at places [z, y, 2] from those of the hits."""
+    spacing = float(np.sqrt(period.prod() / len(hits)))
+    if wraps:
+        hits, values = _continued(hits, values, period, _MARGIN * spacing)
+    distance, nearest = KDTree(hits).query(places)
+    near = distance <= _FARTHEST * spacing
+    image = values[nearest]
+    if method == "linear":
+        if len(hits) < 3:
+            raise ValueError(f"the result has {len(hits)} hits, but a linear map needs three")
+        image = LinearNDInterpolator(hits, values)(places)
+    return np.where(near, image, np.nan)
+
+
+def _continued(hits: Array, values: Array, period: Array, margin: float) -> tuple[Array, Array]:
+    """Hits and values with those of the neighbouring cells that lie within a margin [m] of the cell."""
+    shifts = [np.array([i, j]) for i in (0, -1, 1) for j in (0, -1, 1)]
+    moved = np.concatenate([hits + shift * period for shift in shifts])
+    inside = np.all(np.abs(moved) <= period / 2 + margin, axis=1)
+    return moved[inside], np.tile(values, len(shifts))[inside]
