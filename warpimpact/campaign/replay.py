@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -17,8 +16,9 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
 from warpimpact.results.files import ResultError
-from warpimpact.scene import Numerics, Shots
+from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver import simulate
+from warpimpact.solver.limit import with_thickness, with_velocity
 from warpimpact.solver.resolution import Fidelity, level
 from warpimpact.solver.unfold import image_of
 
@@ -58,7 +58,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xar
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
     scene, group = campaign.scene, campaign.symmetries
     image = hit % len(group)
-    images = _at_their_limit(sampler.shots(hit - image, len(group)), result, place)
+    images = _at_their_limit(scene, sampler.shots(hit - image, len(group)), result, place)
     computed, shot = images[:1], images[image:][:1]
     if campaign.drawn is not None:
         ((_, scene),) = campaign.drawn.scenes(scene, computed)
@@ -85,13 +85,15 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xar
     return history_dataset(scene, end, again, attributes=attributes)
 
 
-def _at_their_limit(shots: Shots, result: xarray.Dataset, place: int) -> Shots:
+def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: int) -> Shots:
     """In a result of limits: the images of a hit as they just perforate."""
     if attr.LIMIT not in result.attrs:
         return shots
-    quantity = result.attrs[attr.LIMIT]
-    stored = v.IMPACT_VELOCITY if quantity == "velocity" else v.THICKNESS
-    return replace(shots, **{quantity: np.full(len(shots), float(result[stored][place]))})
+    layer = int(result.attrs[attr.LIMIT_LAYER])
+    if result.attrs[attr.LIMIT] == "velocity":
+        return with_velocity(shots, np.full(len(shots), float(result[v.IMPACT_VELOCITY][place])))
+    stored = result[v.THICKNESS][place] if layer == 0 else result["layer_thickness"][place, layer]
+    return with_thickness(scene, layer, shots, np.full(len(shots), float(stored)))
 
 
 def _numerics(campaign: Campaign, result: xarray.Dataset, place: int) -> Numerics | Fidelity:

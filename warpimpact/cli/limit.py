@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from .mistakes import memory_told
-from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
+from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite, at_least
 from .paths import check_picture, check_place
 from .progress import show_standing, warn
 from .run import failure_code
@@ -29,6 +29,13 @@ def add_limit(commands: Commands) -> None:
         choices=("velocity", "thickness"),
         default="velocity",
         help="what to find: the impact velocity, or the thickness of the plate (default: velocity)",
+    )
+    parser.add_argument(
+        "--layer",
+        type=at_least(0),
+        default=0,
+        metavar="N",
+        help="whose thickness to find: 0 is the plate (default), 1 the first layer behind it",
     )
     parser.add_argument(
         "--tolerance",
@@ -56,7 +63,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     picture = output.with_suffix(".png")
     check_place(output)
     check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
-    job = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments))
+    job = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
     if told := told_of(campaign, arguments.quantity):
         warn(told)
     if arguments.scheduler or arguments.workers:

@@ -30,6 +30,8 @@ from warpimpact.solver.limit import (
     check_arrests,
     limit_thickness,
     limit_velocity,
+    with_thickness,
+    with_velocity,
 )
 from warpimpact.solver.limit_promise import PILOT, LimitPromise, keep_limits
 from warpimpact.solver.marching import Progress
@@ -38,7 +40,6 @@ from warpimpact.statistics.intervals import Estimate, estimate_of
 
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
-_SEARCHES = {"velocity": limit_velocity, "thickness": limit_thickness}
 _UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 
 
@@ -50,15 +51,19 @@ class LimitMap(HitMap):
         quantity: "velocity" or "thickness".
         tolerance: how far the ends of a limit may lie apart [m/s] or [m].
         highest: largest value tried [m/s] or [m].
+        layer: whose thickness it is; 0 is the plate.
     """
 
     quantity: str
     tolerance: float
     highest: float
+    layer: int = 0
     takes_solid = False
 
     @classmethod
-    def of(cls, campaign: Campaign, quantity: str = "velocity", tolerance: float | None = None) -> LimitMap:
+    def of(
+        cls, campaign: Campaign, quantity: str = "velocity", tolerance: float | None = None, layer: int = 0
+    ) -> LimitMap:
         """The job for a campaign, with the usual tolerance where none is given.
 
         Raises:
@@ -76,12 +81,16 @@ class LimitMap(HitMap):
             raise CampaignError(str(error)) from None
         if quantity == "velocity":
             return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
-        return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * campaign.plate.thickness)
+        plates = campaign.target.plates
+        if layer >= len(plates):
+            raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
+        return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * plates[layer].thickness, layer)
 
     @property
     def content(self) -> Mapping[str, str]:  # type: ignore[override]
         """What decides the bits beside the campaign."""
-        return {"limit": f"{self.quantity} within {self.tolerance:g}, at most {self.highest:g}"}
+        of_layer = f" of layer {self.layer}" if self.layer else ""
+        return {"limit": f"{self.quantity}{of_layer} within {self.tolerance:g}, at most {self.highest:g}"}
 
     @property
     def measures(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -106,16 +115,16 @@ class LimitMap(HitMap):
             threads=how.get("threads"),
             progress=_of_images(how.get("progress"), images),
         )
-        own = {self.quantity: np.repeat(limits.shots.columns[self.quantity], images)}
         dataset = described(
             campaign,
-            replace(shots, **own),
+            self._put(campaign, shots, limits, images),
             limits.outcomes,
             numerics=campaign.numerics if promise is None else promise.fidelity,
             device=device,
             elapsed=time.perf_counter() - begin,
             attributes={
                 attr.LIMIT: self.quantity,
+                attr.LIMIT_LAYER: self.layer,
                 attr.LIMIT_TOLERANCE: self.tolerance,
                 attr.LIMIT_HIGHEST: self.highest,
             }
@@ -151,9 +160,23 @@ class LimitMap(HitMap):
             shown=told[attr.LIMIT_ERROR_SHOWN],
         )
 
+    def _put(self, campaign: Campaign, shots: Shots, limits: Limits, images: int) -> Shots:
+        """Shots, with their images, as they just perforate."""
+        if self.quantity == "velocity":
+            return with_velocity(shots, np.repeat(limits.shots.velocity, images))
+        if self.layer == 0:
+            tried = limits.shots.thickness
+        else:
+            columns = limits.shots.layer_thickness
+            tried = None if columns is None else columns[:, self.layer - 1]
+        assert tried is not None  # searched
+        return with_thickness(campaign.scene, self.layer, shots, np.repeat(tried, images))
+
     def _search(self, campaign: Campaign, shots: Shots, numerics: Any, **how: Any) -> Limits:
-        search = _SEARCHES[self.quantity]
-        return search(campaign.scene, shots, numerics=numerics, tolerance=self.tolerance, highest=self.highest, **how)
+        how |= {"numerics": numerics, "tolerance": self.tolerance}
+        if self.quantity == "velocity":
+            return limit_velocity(campaign.scene, shots, highest=self.highest, **how)
+        return limit_thickness(campaign.scene, shots, layer=self.layer, **how)
 
 
 def _of_images(progress: Progress | None, images: int) -> Progress | None:
@@ -234,7 +257,8 @@ def promise_line(dataset: xarray.Dataset) -> str:
     """How far off the limits are estimated to be."""
     told = dataset.attrs
     unit, factor = _UNITS[told[attr.LIMIT]]
-    ends = f"ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
+    of_layer = f"thickness of layer {told[attr.LIMIT_LAYER]}; " if told[attr.LIMIT_LAYER] else ""
+    ends = f"{of_layer}ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
     if attr.LIMIT_ERROR_SHOWN not in told:
         return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
     kept = "" if told[attr.LIMIT_PROMISE_KEPT] else ", more than the fidelity promises"

@@ -80,6 +80,8 @@ CONFIDENCE = "confidence"
 # A search of limits
 LIMIT = "limit"
 """The quantity: "velocity" or "thickness"."""
+LIMIT_LAYER = "limit_layer"
+"""Whose thickness was searched; 0 is the plate."""
 LIMIT_TOLERANCE = "limit_tolerance"
 LIMIT_HIGHEST = "limit_highest"
 LIMIT_RESOLUTION = "limit_resolution"

@@ -8,7 +8,9 @@ that does not weaken it is linear in v² and in the thickness, because the work 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,7 +98,7 @@ def limit_velocity(
     """
     compute = _Computing(scene, _in_short_steps(numerics), device, threads)
     search = _Search(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest)
-    return _searched(compute, shots, search, "velocity", progress)
+    return _searched(compute, shots, search, with_velocity, progress)
 
 
 def limit_thickness(
@@ -104,28 +106,47 @@ def limit_thickness(
     shots: Shots,
     *,
     numerics: Numerics | Fidelity | None = None,
+    layer: int = 0,
     tolerance: float = THICKNESS_TOLERANCE,
-    highest: float | None = None,
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Limits:
-    """Find the thickness of the plate that each shot just perforates, within MOST_RUNS runs of a shot.
+    """Find the thickness of a plate with which each shot just perforates the target, within MOST_RUNS runs of a shot.
+
+    It is at most THICKEST times the thickness in the scene. A lower end of 0 was not computed: where the rest of the
+    target stops a core, no thickness is found above 0.
 
     Args:
         shots: their own thicknesses, or the scene's, are the first ones tried.
+        layer: whose thickness it is; 0 is the plate, 1 the first layer behind it.
         tolerance: how far lower and upper may lie apart [m].
-        highest: largest thickness tried [m]; None is THICKEST times that of the plate.
         numerics, device, threads, progress: as in `limit_velocity`.
 
     Raises:
         ValueError, DeviceError: as `limit_velocity`.
     """
-    own = scene.target.plate.thickness
-    start = np.broadcast_to(shots.own("thickness", own), len(shots))
-    search = _Search(start, 0.0, shots.velocity**2, tolerance, THICKEST * own if highest is None else highest)
+    own = scene.target.plates[layer].thickness
+    start = shots.own("thickness", own) if layer == 0 else shots.own_of_layer("thickness", layer - 1, own)
+    start = np.broadcast_to(start, len(shots))
+    search = _Search(start, 0.0, shots.velocity**2, tolerance, THICKEST * own)
     compute = _Computing(scene, _in_short_steps(numerics), device, threads)
-    return _searched(compute, shots, search, "thickness", progress)
+    return _searched(compute, shots, search, partial(with_thickness, scene, layer), progress)
+
+
+def with_velocity(shots: Shots, values: Array) -> Shots:
+    """Shots with impact velocities of their own [m/s], shape [shots]."""
+    return replace(shots, velocity=values)
+
+
+def with_thickness(scene: Scene, layer: int, shots: Shots, values: Array) -> Shots:
+    """Shots with thicknesses of a layer of their own [m], shape [shots]; layer 0 is the plate."""
+    if layer == 0:
+        return replace(shots, thickness=values)
+    columns = shots.layer_thickness
+    columns = np.full((len(shots), len(scene.target.layers)), np.nan) if columns is None else columns.copy()
+    columns[:, layer - 1] = values
+    return replace(shots, layer_thickness=columns)
 
 
 def short_steps(fidelity: Fidelity) -> Fidelity:
@@ -181,7 +202,13 @@ class _Computing(NamedTuple):
         return simulate(rest.pop("scene"), shots, **rest, progress=progress)
 
 
-def _searched(compute: _Computing, shots: Shots, search: _Search, column: str, progress: Progress | None) -> Limits:
+def _searched(
+    compute: _Computing,
+    shots: Shots,
+    search: _Search,
+    put: Callable[[Shots, Array], Shots],
+    progress: Progress | None,
+) -> Limits:
     check_arrests(compute.scene, shots)
     total = len(shots)
 
@@ -189,16 +216,16 @@ def _searched(compute: _Computing, shots: Shots, search: _Search, column: str, p
         if progress is not None:
             progress(total - len(search.pending), total)
 
-    kept, outcomes = replace(shots, **{column: search.trial(np.arange(total))}), None
+    kept, outcomes = np.empty(total), None
     while len(which := search.pending):
-        tried = replace(shots[which], **{column: search.trial(which)})
-        ended = compute(tried, show)
-        telling = search.learn(which, tried.columns[column], ended)
+        tried = search.trial(which)
+        ended = compute(put(shots[which], tried), show)
+        telling = search.learn(which, tried, ended)
         outcomes = ended if outcomes is None else with_rows(outcomes, which[telling], picked(ended, telling))
-        kept.columns[column][which[telling]] = tried.columns[column][telling]
+        kept[which[telling]] = tried[telling]
         show()
     assert outcomes is not None  # there is a shot
-    return Limits(search.value(), *search.ends(), search.runs, search.converged, kept, outcomes)
+    return Limits(search.value(), *search.ends(), search.runs, search.converged, put(shots, kept), outcomes)
 
 
 class _Search:

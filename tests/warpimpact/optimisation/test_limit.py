@@ -142,6 +142,31 @@ def test_thickness_of_a_campaign(tmp_path: Path) -> None:
     assert "mm" in limits_text(found)
 
 
+LAYER = """
+[[layer]]
+gap = "100 mm"
+thickness = "6 mm"
+resistance = "1 GPa"
+shear_coefficient = 0.05
+"""
+
+
+def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None:
+    given = TEXT.replace("count = 64", "count = 4").replace('[numerics]\nfidelity = "draft"\n', GIVEN)
+    behind = campaign(given + LAYER)
+    job = LimitMap.of(behind, "thickness", layer=1)
+    run_to_file(behind, tmp_path / "base.nc", team=local_team(behind, "cpu", job))
+    found = files.read(tmp_path / "base.nc")
+    passed = (found["status"] == Status.PERFORATED).values
+    assert passed.any()
+    last = found["layer_thickness"].values[:, 1]
+    assert (last[passed] == found["limit_thickness_lower"].values[passed]).all()
+    assert "thickness of layer 1" in limits_text(found)
+    assert replay(found, 2, folder=Path()).attrs["agreement"] == "bit-identical"
+    with pytest.raises(CampaignError, match=r"got layer 2, but the target has layers 0 \(the plate\) to 1"):
+        LimitMap.of(behind, "thickness", layer=2)
+
+
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from warpimpact.scene import CirclePattern, OgiveCore, Plate, Scene, Shots
+from warpimpact.scene import CirclePattern, Layer, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver.limit import MOST_RUNS, limit_thickness, limit_velocity
 
 CORE = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
@@ -59,10 +59,40 @@ def test_a_limit_beyond_the_largest_value_tried_is_infinite() -> None:
     strong = PLATE.model_copy(update={"thickness": 0.2})
     velocity = limit_velocity(Scene(core=CORE, target=strong), shots(1), highest=1000.0, device="cpu")
     assert (velocity.value.item(), velocity.lower.item(), velocity.upper.item()) == (np.inf, 1000.0, np.inf)
-    thickness = limit_thickness(Scene(core=CORE, target=PLATE), shots(1), highest=5e-3, device="cpu")
-    assert (thickness.value.item(), thickness.lower.item(), thickness.upper.item()) == (np.inf, 5e-3, np.inf)
+    thin = PLATE.model_copy(update={"thickness": 0.1e-3})
+    thickness = limit_thickness(Scene(core=CORE, target=thin), shots(1), device="cpu")
+    assert (thickness.value.item(), thickness.lower.item(), thickness.upper.item()) == (np.inf, 1.6e-3, np.inf)
     assert velocity.converged.item()
     assert thickness.converged.item()
+
+
+def test_thickness_of_a_layer_of_its_own() -> None:
+    # Solid plates far apart take their work one after the other: what the front leaves to do is done by the base.
+    base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
+    scene = Scene(core=CORE, target=Target(plate=PLATE, layers=(base,)))
+    alone = limit_thickness(Scene(core=CORE, target=PLATE), shots(1), device="cpu").value.item()
+    behind = limit_thickness(scene, shots(1), layer=1, device="cpu")
+    assert behind.converged.all()
+    assert behind.value.item() == pytest.approx(alone - 4e-3, rel=0.03)
+    assert behind.shots.layer_thickness is not None
+    assert behind.shots.layer_thickness[0, 0] == behind.lower.item()
+
+
+def test_the_limit_velocity_of_a_target_of_layers_adds_their_work() -> None:
+    base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
+    scene = Scene(core=CORE, target=Target(plate=PLATE, layers=(base,)))
+    whole = limit_velocity(scene, shots(1), device="cpu").value.item()
+    parts = [
+        limit_velocity(Scene(core=CORE, target=PLATE), shots(1, thickness=np.full(1, h)), device="cpu").value.item()
+        for h in (4e-3, 3e-3)
+    ]
+    assert whole == pytest.approx(np.hypot(*parts), rel=0.01)
+
+
+def test_a_layer_that_weakens_by_time_is_refused() -> None:
+    base = Layer(thickness=3e-3, resistance=1e9, degradation=0.8, gap=0.1)
+    with pytest.raises(ValueError, match=r"layer\[0\]: got a plate that weakens by time"):
+        limit_velocity(Scene(core=CORE, target=Target(plate=PLATE, layers=(base,))), shots(1))
 
 
 def test_a_plate_without_resistance_is_passed_at_any_velocity() -> None:
