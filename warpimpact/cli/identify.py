@@ -13,7 +13,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_command, add_device, add_output, add_overwrite
 from .paths import check_place
-from .progress import warn
+from .progress import is_quiet, warn
 
 if TYPE_CHECKING:
     from warpimpact.identification.identify import Standing
@@ -74,6 +74,9 @@ def _identify(arguments: argparse.Namespace) -> int:
 @contextmanager
 def _show() -> "Iterator[Callable[[Standing], None]]":
     """Show the progress of a fit: a bar on a terminal, a line per tenth of the sets in a log."""
+    if is_quiet():
+        yield lambda standing: None
+        return
     if not sys.stderr.isatty():
         shown = -1
 

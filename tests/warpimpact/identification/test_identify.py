@@ -127,6 +127,11 @@ def test_the_command(
     assert "written to fit.nc" in shown.out
     assert "sets; " in shown.err
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["fit_hits.png", "fit_measured.png", "fit_pairs.png"]
+    assert main(["report", "fit.nc"]) == 0
+    page = Path("fit.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 3
+    assert "resistance [GPa]" in page
+    capsys.readouterr()
     assert main(["identify", "fit.toml", "--device", "cpu"]) == 2
     assert "exists already" in capsys.readouterr().err
     Path("bad.toml").write_text(text.replace("between holes", "nowhere"), encoding="utf-8")
