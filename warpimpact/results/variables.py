@@ -1,4 +1,7 @@
-"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings."""
+"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings.
+
+Long because it is one table.
+"""
 
 from __future__ import annotations
 
