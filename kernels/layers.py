@@ -62,12 +62,14 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Stack:
         """Scratch of all slots, shape [slots × layers]: what a step can touch of each layer, the layer's window, the
-        place of the window's home relative to the hit [m], and whether the window is open."""
+        place of the window's home relative to the hit [m], whether the window is open, and whether the core was near
+        the layer in the last step."""
 
         found: wp.array(dtype=Footprint)
         window: wp.array(dtype=Window)
         home: wp.array(dtype=vec3)
         open: wp.array(dtype=wp.bool)
+        near: wp.array(dtype=wp.bool)
 
     @wp.struct
     class Reached:
@@ -102,6 +104,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """No layer is reached yet."""
         for k in range(layers.count):
             stack.open[slot * layers.count + k] = False
+            stack.near[slot * layers.count + k] = False
         passages.begin(passage, shot, layers.count)
 
     @wp.func
@@ -146,9 +149,10 @@ def build(variant: Variant) -> SimpleNamespace:
         pose: Pose,
         ahead: vec3,
     ):
-        """Open the window of a layer where the core will reach it. That of the plate is about the hit."""
+        """Open the window of a layer where the core will reach it, at first that of the plate about the hit."""
         home = vec3()
-        if layer > 0:
+        again = stack.open[slot * layers.count + layer]
+        if layer > 0 or again:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
         fields = fields_of(layers, common, layer)
         window = grid.window_at(
@@ -171,18 +175,6 @@ def build(variant: Variant) -> SimpleNamespace:
         stack.window[here] = window
         stack.home[here] = home
         stack.open[here] = True
-
-    @wp.func
-    def is_clear(plate: Plate, window: Window, found: Footprint):
-        """Whether the nodes around the rings in the slab lie in a hole or beside a finite layer, with a node to
-        spare."""
-        y = half * real(found.box.y_low + found.box.y_high - 2 * (window.cells_y // 2)) * plate.spacing
-        z = half * real(found.box.z_low + found.box.z_high - 2 * (window.cells_z // 2)) * plate.spacing
-        wide = half * real(found.box.y_high - found.box.y_low) + one
-        long = half * real(found.box.z_high - found.box.z_low) + one
-        reach = wp.sqrt(wide * wide + long * long) * plate.spacing
-        beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
-        return beside > reach or plate.clear[grid.tile_at(plate, window, y, z)] > reach
 
     @wp.func
     def reach(
@@ -222,15 +214,22 @@ def build(variant: Variant) -> SimpleNamespace:
             front = own_of(layers.front, k, shot)
             rear = front + own_of(layers.thickness, k, shot)
             found.through = low > rear  # in the end, that of the last layer
+            near = bool(False)
             if high > front and low < rear:
                 if not stack.open[here]:
                     ahead = real((front - pose.position[0]) / wp.max(state.velocity[0], one)) * state.velocity
                     ahead = wp.min(one, surface.bounding_radius / (wp.length(ahead) + tiny)) * ahead
                     open_layer(layers, stack, fields, shots, slot, k, shot, pose, ahead)
-                plate, window = layers.plates[k], stack.window[here]
-                touch = prints.footprint_of(surface, plate, window, in_layer(layers, stack, slot, k, shot, pose), dt)
+                plate = layers.plates[k]
+                seen = in_layer(layers, stack, slot, k, shot, pose)
+                touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
+                if not touch.inside and not stack.near[here] and prints.is_beside(stack.window[here], touch):
+                    open_layer(layers, stack, fields, shots, slot, k, shot, pose, vec3())
+                    seen = in_layer(layers, stack, slot, k, shot, pose)
+                    touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
+                window = stack.window[here]
                 if touch.last_ring >= 0:
-                    if is_clear(plate, window, touch):
+                    if prints.is_clear(plate, window, touch):
                         touch.last_ring = -1
                         touch.inside = True
                 if touch.last_ring >= 0:
@@ -239,8 +238,10 @@ def build(variant: Variant) -> SimpleNamespace:
                     found.last_ring = surface.rings - 1
                     found.inside = found.inside and (touch.inside or not window.weakens)
                 stack.found[here] = touch
+                near = True
             elif low > rear and not passages.has_left(passage, shot, k):
                 passages.leave(passage, body, shot, k, state, rearmost - rear, time, flight)
+            stack.near[here] = near
         return found, reached
 
     @wp.func

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from warpimpact.kernels.status import Status
 
-from .extremes import MOST_RISE, MOST_STRETCH, drawn, found
+from .extremes import MOST_STRETCH, drawn, found
 
 SHARES = st.lists(st.floats(0.0, 1.0), min_size=60, max_size=60)  # more than a scene of two hits takes
 
@@ -17,5 +17,5 @@ def test_extremes(shares: list[float]) -> None:
     assert Status.NOT_FINITE not in outcome.statuses
     assert Status.GAINED_ENERGY not in outcome.statuses
     assert outcome.undefined == 0
-    assert outcome.rise <= MOST_RISE
+    assert outcome.rise <= outcome.allowed
     assert outcome.stretch <= MOST_STRETCH

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
 from warpimpact.analysis.numbers import interval_text, of_each
@@ -15,16 +15,37 @@ if TYPE_CHECKING:
     from warpimpact.analysis.effectiveness import Measure
 
 
+class Ranking(NamedTuple):
+    """One measure of all plates.
+
+    Attributes:
+        title: measure, unit, and what is better.
+        rows: of every plate, the best first: rank, plate, areal density, value, interval, ratio and its interval.
+        differences: a sentence for every pair.
+    """
+
+    title: str
+    rows: list[tuple[str, ...]]
+    differences: list[str]
+
+
+RANKING_HEAD = ("rank", "plate", "kg/m²", "value", "95 % interval", "ratio to the solid plate", "")
+
+
 def comparison_text(comparison: Comparison) -> str:
     """Who is best at what, then every measure as a ranking with differences in words."""
-    measures = comparison.plates[0].measures
-    compared = [measure for measure in measures if measure.hit is None]
-    blocks = [_conditions(comparison), _best(comparison, compared)]
-    blocks += [_ranking(comparison, measure) for measure in compared]
+    best = best_rows(comparison)
+    width = max(len(label) for label, _ in best)
+    blocks = [
+        conditions(comparison),
+        [f"{'best at':<{width}}   plate", *(f"{label:<{width}}   {who}" for label, who in best)],
+        *(_ranking_lines(ranking) for ranking in rankings(comparison)),
+    ]
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
-def _conditions(comparison: Comparison) -> list[str]:
+def conditions(comparison: Comparison) -> list[str]:
+    """What was compared and how, a sentence each."""
     together = f"Differences of a measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
     chance = "The intervals describe the hits that were drawn, not what the model leaves out."
     return [*hits_used(comparison), together, chance, *comparison.notes]
@@ -51,16 +72,18 @@ def hits_used(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _best(comparison: Comparison, measures: Sequence[Measure]) -> list[str]:
-    width = max(len(measure.label) for measure in measures)
-    lines = [f"{'best at':<{width}}   plate"]
-    for measure in measures:
+def _compared(comparison: Comparison) -> list[Measure]:
+    return [measure for measure in comparison.plates[0].measures if measure.hit is None]
+
+
+def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
+    """Every measure and who is best at it."""
+    rows = []
+    for measure in _compared(comparison):
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
-        if len(first) == len(comparison.plates):
-            lines.append(f"{measure.label:<{width}}   cannot be told apart")
-        else:
-            lines.append(f"{measure.label:<{width}}   {_listed(first)}")
-    return lines
+        told_apart = len(first) < len(comparison.plates)
+        rows.append((measure.label, _listed(first) if told_apart else "cannot be told apart"))
+    return rows
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -68,30 +91,41 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def _ranking(comparison: Comparison, measure: Measure) -> list[str]:
+def rankings(comparison: Comparison) -> list[Ranking]:
+    """Every measure as a ranking."""
+    return [_ranking(comparison, measure) for measure in _compared(comparison)]
+
+
+def _ranking(comparison: Comparison, measure: Measure) -> Ranking:
     place = comparison.plates[0].measures.index(measure)
     ranks, better = comparison.ranks(measure.name), "higher" if measure.higher_is_better else "lower"
-    width = max(5, *(len(plate.name) for plate in comparison.plates))
-    lines = [
-        f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}",
-        f"rank  {'plate':<{width}}{'kg/m²':>8}{'value':>10}   {'95 % interval':<20}ratio to the solid plate",
-    ]
     sign, by_ratio = -1.0 if measure.higher_is_better else 1.0, measure.name in (comparison.at_equal_weight or ())
 
     def order(plate: Contestant) -> tuple[int, float]:
         told = plate.measures[place]
         return ranks[plate.name], sign * (told.ratio if by_ratio else told.value)
 
+    rows: list[tuple[str, ...]] = []
     for plate in sorted(comparison.plates, key=order):
         told = plate.measures[place]
-        interval = "" if math.isnan(told.ratio_low) else f"  {interval_text(told.ratio_low, told.ratio_high)}"
-        lines.append(
-            f"{ranks[plate.name]:>4}  {plate.name:<{width}}{plate.areal_density:>8.2f}{number(told.value):>10}   "
-            f"{interval_text(told.low, told.high):<20}{number(told.ratio)}{interval}"
-        )
+        against = "" if math.isnan(told.ratio_low) else interval_text(told.ratio_low, told.ratio_high)
+        value = (f"{plate.areal_density:.2f}", number(told.value), interval_text(told.low, told.high))
+        rows.append((str(ranks[plate.name]), plate.name, *value, number(told.ratio), against))
     what = " in the ratio to the solid plate" if by_ratio else ""
-    lines += [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name]
-    return lines
+    return Ranking(
+        f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}",
+        rows,
+        [_in_words(pair, measure, what) for pair in comparison.differences if pair.measure == measure.name],
+    )
+
+
+def _ranking_lines(ranking: Ranking) -> list[str]:
+    width = max(5, *(len(row[1]) for row in ranking.rows))
+    lines = [ranking.title]
+    for rank, plate, density, value, interval, ratio, against in (RANKING_HEAD, *ranking.rows):
+        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<20}{ratio}"
+        lines.append(f"{start}  {against}" if against else start)
+    return lines + ranking.differences
 
 
 def weighed(comparison: Comparison, measure: str) -> str:

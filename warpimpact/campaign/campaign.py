@@ -1,5 +1,6 @@
 """Campaign: one TOML file, validated, as one immutable value."""
 
+import json
 import math
 from contextlib import suppress
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
+from ..results.files import ResultError
 from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES
 from ..scene import (
     AnyCore,
@@ -25,6 +27,7 @@ from ..scene import (
     Target,
     symmetries_used,
 )
+from ..scene.files import InputFile
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
 from ..scene.symmetry import check_layers, check_scatter
@@ -33,6 +36,7 @@ from ..scene.units import Number, PositiveLength, Title
 from ..solver.bending import check_bending
 from ..solver.resolution import ONE_PLATE
 from .apart import with_scatter_apart
+from .drawn import DrawnSampler, Posterior, read_posterior
 from .plausible import warn_of
 from .problems import sentence
 from .stop import Stop
@@ -73,6 +77,7 @@ class Campaign(Model):
         numerics: how finely the shots are computed.
         output: what is reported.
         scatter: distributions of values that scatter. A file has them in the places of the values.
+        posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
     """
@@ -87,6 +92,7 @@ class Campaign(Model):
     numerics: Numerics = Numerics()
     output: Output = Output()
     scatter: Scatter = Scatter()
+    posterior: InputFile | None = None
     stop: Stop | None = None
     _source: str = PrivateAttr("")
 
@@ -96,18 +102,20 @@ class Campaign(Model):
         return self._source or self.model_dump_json()
 
     @classmethod
-    def from_toml(cls, path: str | Path, *, count: int | None = None) -> Self:
+    def from_toml(cls, path: str | Path, *, count: int | None = None, posterior: Path | None = None) -> Self:
         """Read a campaign file; file names in it count from its folder.
 
         Args:
             path: the TOML file.
             count: number of hits, in place of the file's.
+            posterior: file of `warpimpact identify`, beside what the file says; its text then names it.
 
         Raises:
             CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
         """
         path = Path(path)
-        return cls.from_text(read_text(path), name=str(path), folder=path.parent, count=count)
+        named = "" if posterior is None else f"posterior = {json.dumps(str(posterior.resolve()))}\n"
+        return cls.from_text(named + read_text(path), name=str(path), folder=path.parent, count=count)
 
     @classmethod
     def from_text(cls, text: str, *, name: str, folder: Path, count: int | None = None) -> Self:
@@ -165,7 +173,30 @@ class Campaign(Model):
 
     def sampler(self) -> Sampler:
         """Its shots."""
-        return Sampler(self.impact, self.hits, self.plate, self.scatter, self.replicates)
+        sampled = (self.impact, self.hits, self.plate, self.scatter, self.replicates)
+        if self.drawn is None:
+            return Sampler(*sampled)
+        return DrawnSampler(self.drawn, self.plate, self.hits.seed, len(self.symmetries), *sampled)
+
+    @property
+    def drawn(self) -> Posterior | None:
+        """The draws of its posterior, if it has one."""
+        return None if self.posterior is None else read_posterior(self.posterior)
+
+    @model_validator(mode="after")
+    def _posterior_fits(self) -> Self:
+        if self.posterior is None:
+            return self
+        try:
+            drawn = read_posterior(self.posterior)
+        except ResultError as error:
+            raise ValueError(f"posterior: {error}") from None
+        drawn.check(self.plate, self.interaction)
+        given = [name for name in self.scatter.given if ("plate", name) in drawn.values]
+        given += ["degradation"] * ("degradation" in self.scatter.given)
+        if given:
+            raise ValueError(f"got a distribution of plate.{given[0]} beside a posterior, which gives it")
+        return self
 
     @model_validator(mode="before")
     @classmethod

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.drawn import Posterior
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_dataset
@@ -62,7 +64,7 @@ def compute(
     numerics = campaign.numerics if promise is None else promise.fidelity
     _build(scene, computed, numerics, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining)
+    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining, campaign.drawn)
     elapsed = time.perf_counter() - begin
     dataset = described(
         campaign,
@@ -78,7 +80,7 @@ def compute(
         return dataset
     solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
     follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
-    outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow)
+    outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
     return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
 
 
@@ -254,8 +256,11 @@ def _outcomes(
     threads: int | None,
     progress: Progress | None = None,
     refining: Callable[[Refining], None] | None = None,
+    drawn: Posterior | None = None,
 ) -> tuple[Outcomes, Estimates | None]:
     """Outcomes, and estimates of their errors if the numerics have a tolerance."""
+    if drawn is not None and drawn.of_scene:
+        return _outcomes_of_scenes(scene, shots, (numerics, device, threads, progress), drawn)
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
         return simulate_to_tolerance(
             scene,
@@ -267,6 +272,29 @@ def _outcomes(
             refining=refining,
         )
     return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
+
+
+def _outcomes_of_scenes(
+    scene: Scene, shots: Shots, how: tuple[Any, ...], drawn: Posterior
+) -> tuple[Outcomes, Estimates | None]:
+    """Outcomes of shots whose draws of the posterior need scenes of their own."""
+    numerics, device, threads, progress = how
+    places: list[Any] = []
+    parts: list[tuple[Outcomes, Estimates | None]] = []
+    for which, own in drawn.scenes(scene, shots):
+        before = sum(map(len, places))
+        follow = progress and (lambda done, _, before=before: progress(before + done, len(shots)))
+        parts.append(_outcomes(own, shots[which], numerics, device, threads, follow))
+        places.append(which)
+    order = np.argsort(np.concatenate(places), kind="stable")
+    outcomes, estimates = zip(*parts, strict=True)
+    return _joined(outcomes, order), None if estimates[0] is None else _joined(estimates, order)
+
+
+def _joined(parts: Sequence[Any], order: NDArray[np.int64]) -> Any:
+    """Outcomes or estimates one after the other, then in this order."""
+    columns = {one.name: [getattr(part, one.name) for part in parts] for one in fields(parts[0])}
+    return type(parts[0])(**{name: np.concatenate(values)[order] for name, values in columns.items()})
 
 
 def _impact(campaign: Campaign) -> str:

@@ -60,6 +60,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xar
     image = hit % len(group)
     images = _at_their_limit(scene, sampler.shots(hit - image, len(group)), result, place)
     computed, shot = images[:1], images[image:][:1]
+    if campaign.drawn is not None:
+        ((_, scene),) = campaign.drawn.scenes(scene, computed)
     again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place))
     home, away = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)

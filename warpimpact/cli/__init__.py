@@ -18,6 +18,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
+from .identify import add_identify
 from .limit import add_limit
 from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
@@ -41,6 +42,7 @@ _COMMANDS = (
     add_report,
     add_study,
     add_validate,
+    add_identify,
     add_schema,
     add_completion,
 )

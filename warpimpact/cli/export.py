@@ -65,7 +65,8 @@ def add_report(commands: Commands) -> None:
         _report,
         summary="write a report as one HTML file",
         description="Write a report of one or several results as one HTML file that works offline. It shows the "
-        "campaign, the plates, interactive maps and trajectories, numbers with intervals, and the limits of the model.",
+        "campaign, the plates, interactive maps and trajectories, numbers with intervals, and the limits of the model. "
+        "A posterior is reported alone: its parameters, what they explain, and its figures.",
         example="report slotted.nc -o slotted.html",
     )
     add_results(parser)
@@ -85,11 +86,15 @@ def add_report(commands: Commands) -> None:
 def _report(arguments: argparse.Namespace) -> None:
     from warpimpact.report.report import write_report
     from warpimpact.results import files
+    from warpimpact.results.posterior import is_posterior
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
     check_suffix(output, "a report", ".html")
     check_output(output, overwrite=arguments.overwrite)
+    if any(map(is_posterior, paths)):
+        _report_posterior(paths, output)
+        return
     by_name = named(paths)
     with ExitStack() as stack:
         datasets = {name: stack.enter_context(files.opened(path)) for name, path in by_name.items()}
@@ -104,4 +109,16 @@ def _report(arguments: argparse.Namespace) -> None:
                 study=study,
                 progress=progress,
             )
+    print(output)
+
+
+def _report_posterior(paths: list[Path], output: Path) -> None:
+    from warpimpact.report.posterior import write_posterior_report
+    from warpimpact.results import files, posterior
+
+    if len(paths) > 1:
+        raise files.ResultError(
+            f"got {len(paths)} files with a posterior among them, but a posterior is reported alone"
+        )
+    write_posterior_report(posterior.read(paths[0]), output)
     print(output)

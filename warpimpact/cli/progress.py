@@ -50,6 +50,11 @@ def told(*, verbose: int, quiet: bool) -> Iterator[None]:
         logger.setLevel(before)
 
 
+def is_quiet() -> bool:
+    """Whether no progress is shown."""
+    return _quiet
+
+
 def warn(sentence: str) -> None:
     """Say on the terminal or in the log what a person should know, though the command goes on."""
     say(f"warning: {sentence}")

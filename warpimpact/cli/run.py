@@ -30,6 +30,13 @@ def add_run(commands: Commands) -> None:
     add_computing(parser)
     add_count(parser)
     parser.add_argument(
+        "--posterior",
+        type=Path,
+        metavar="POSTERIOR.nc",
+        help="draw the parameters of the material of every shot from this posterior, all of them together; written by "
+        "warpimpact identify",
+    )
+    parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; start a new one if there is none"
     )
     add_overwrite(parser, "an existing result or an interrupted run")
@@ -42,7 +49,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.team import cluster_team
     from warpimpact.results import files
 
-    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
     check_suffix(output, "a result", ".nc")

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-MOST_HITS = 20_000
-"""Most hits on a page, for all results together: about 3 MB."""
+MOST_HITS = 12_000
+"""Most hits on a page, for all results together: about 1 MB, compressed."""
 WORST_SHARE = 0.25
 """Share of the trajectories that show the worst hits; the others are spread evenly."""
 _PIXELS = 160
@@ -87,6 +87,7 @@ def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
         "statuses": [
             {"code": status.value, "label": words(status.name.lower()), "colour": STATUS_COLOURS[status]}
             for status in Status
+            if any((dataset[v.STATUS].values == status).any() for dataset in datasets)
         ],
         "results": [
             _map_data(dataset, {key: column[key].values for key in shared})

@@ -1,7 +1,18 @@
 "use strict";
 // Draws the maps of the page and the hits that the reader selects. All numbers come from #data.
-(() => {
-  const data = JSON.parse(document.getElementById("data").textContent);
+(async () => {
+  async function unpacked(id) {
+    const packed = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+    return new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  }
+  if (typeof DecompressionStream === "undefined") {
+    document.querySelectorAll(".note").forEach((note) => { note.textContent = "The maps need a browser of 2023 or newer."; });
+    return;
+  }
+  const data = JSON.parse(await unpacked("data"));
+  const library = document.createElement("script");
+  library.textContent = await unpacked("plotly");
+  document.head.append(library);
   const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const STATUS = "status", MISSING = "#9e9e9e", CHOSEN = "#d55e00";
   const font = { family: "system-ui, sans-serif", size: 12 };
@@ -29,7 +40,8 @@
   }
 
   function valuesOf(result, variable) {
-    return variable === STATUS ? result.status : result.columns[variable];
+    if (variable !== STATUS) return result.columns[variable];
+    return result.status.map((code) => data.statuses.findIndex((status) => status.code === code));
   }
 
   // One scale for all results makes maps comparable.
@@ -37,7 +49,7 @@
     if (variable === STATUS) {
       const count = data.statuses.length;
       const scale = data.statuses.flatMap(({ colour }, k) => [[k / count, colour], [(k + 1) / count, colour]]);
-      const bar = { tickvals: data.statuses.map(({ code }) => code), ticktext: data.statuses.map(({ label }) => label) };
+      const bar = { tickvals: data.statuses.map((_, k) => k), ticktext: data.statuses.map(({ label }) => label) };
       return { scale, low: -0.5, high: count - 0.5, bar };
     }
     const { signed, label } = data.variables.find(({ key }) => key === variable);
@@ -61,14 +73,14 @@
       z: result.nearest.map((row) => row.map((hit) => values[hit])),
       text: result.nearest.map((row) => row.map((hit) => texts[hit])),
       hovertemplate: "%{text}<extra></extra>", hoverongaps: true,
-      colorscale: scale, reversescale: reversed, zmin: low, zmax: high, colorbar: { thickness: 14, ...bar },
+      colorscale: scale, reversescale: reversed, zmin: low, zmax: high, colorbar: { thickness: 14, xpad: 5, ...bar },
     };
   }
 
   function pointTrace(result, values, texts, { scale, reversed, low, high, bar }) {
     const marker = {
       size: 9, line: { color: "black", width: 0.7 }, color: values.map((value) => (value === null ? NaN : value)),
-      colorscale: scale, reversescale: reversed, cmin: low, cmax: high, showscale: true, colorbar: { thickness: 14, ...bar },
+      colorscale: scale, reversescale: reversed, cmin: low, cmax: high, showscale: true, colorbar: { thickness: 14, xpad: 5, ...bar },
     };
     return {
       type: "scatter", mode: "markers", x: result.y, y: result.z, marker, text: texts,
@@ -96,11 +108,15 @@
         marker: { symbol: "circle-open", size: 16, color: CHOSEN, line: { width: 3 } },
       },
     ];
-    const [wide, tall] = result.limits.map(([low, high]) => high - low);
     const place = document.getElementById(`map-${result.index}`);
-    const room = place.clientWidth - 150;
+    // One scale of length for all maps: the widest fills its place, and the tallest stays on a screen.
+    const spans = data.results.map(({ limits }) => limits.map(([low, high]) => high - low));
+    const [widest, tallest] = [0, 1].map((axis) => Math.max(...spans.map((span) => span[axis])));
+    const bar = 90, perMm = Math.min((place.clientWidth - 60 - bar) / widest, 480 / tallest);
+    const [wide, tall] = spans[result.index];
     const layout = {
-      font, margin: { l: 50, r: 10, t: 30, b: 45 }, height: Math.min(560, Math.max(240, (room * tall) / wide + 80)),
+      font, margin: { l: 50, r: 10 + bar, t: 30, b: 45 }, width: wide * perMm + 60 + bar,
+      height: tall * perMm + 75, autosize: false,
       plot_bgcolor: MISSING, hoverlabel: { align: "left", bgcolor: "white", font: { color: "black" } },
       xaxis: { title: { text: "hit y [mm]" }, range: result.limits[0], constrain: "domain", zeroline: false, showgrid: false },
       yaxis: {

@@ -1,28 +1,32 @@
 """A report of one or several results: one HTML file that works without a network and without warpimpact.
 
-Plotly draws the maps; the file contains its JavaScript (4.8 MB). All text from a result or a campaign is escaped, and
-the page's security policy forbids it to load anything.
+Plotly draws the maps; the file contains its JavaScript and the data of the hits, both compressed, which the page
+unpacks. All text from a result or a campaign is escaped, and the page's security policy forbids it to load anything.
 """
 
 from __future__ import annotations
 
+import gzip
+import json
+from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
 from warpimpact.analysis.numbers import interval_text, number_text
-from warpimpact.analysis.study_text import study_text
 from warpimpact.campaign.replay import replay
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.report.words import compared, told
+from warpimpact.report.words import compared, study_table, told
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
 
 Progress = Callable[[int, int], None]
@@ -66,12 +70,12 @@ def write_report(
         drawn["trajectories"] = {
             hit: trajectory_data(replay(datasets[name], hit, folder=folders[name])) for hit in followed(hits)
         }
-        drawn["first"] = hits[0] if hits else None
+        drawn["first"] = telling(datasets[name], hits)
     page = _page(
         data=data,
         results=[result | {"shown": few.sizes["hit"]} for result, few in zip(results, shown, strict=True)],
         comparison=compared(datasets) if len(datasets) > 1 else None,
-        study=None if study is None else study.attrs | {"text": study_text(study)},
+        study=None if study is None else study_table(study),
     )
     with aside(path) as file:
         file.write_text(page, encoding="utf-8")
@@ -92,7 +96,21 @@ def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]]
     return follow
 
 
-def _page(*, results: Sequence[dict[str, Any]], **content: Any) -> str:
+def telling(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
+    """The one of some hits whose trajectory shows most: the largest tilt at the largest stand-off."""
+    if not hits:
+        return None
+    chosen = dataset[[v.TILT]].isel(hit=np.isin(hit_numbers(dataset), hits), standoff=-1).load()
+    tilt = chosen[v.TILT].values
+    return int(hit_numbers(chosen)[np.nanargmax(tilt)]) if np.isfinite(tilt).any() else hits[0]
+
+
+def _packed(text: str) -> str:
+    """A text compressed by gzip, as base64; the same text gives the same bytes."""
+    return b64encode(gzip.compress(text.encode(), mtime=0)).decode()
+
+
+def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content: Any) -> str:
     """Fill in page.html."""
     environment = Environment(
         loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
@@ -100,7 +118,9 @@ def _page(*, results: Sequence[dict[str, Any]], **content: Any) -> str:
     return environment.get_template("page.html").render(
         results=results,
         pixels_per_mm=_PLATE_WIDTH / max(result["plate"]["y"] for result in results),
-        plotly=Markup(get_plotlyjs()),
+        plotly=_packed(get_plotlyjs()),
+        packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
+        variables=data["variables"],
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
         texts={"number": number_text, "interval": interval_text, "units": SHOWN_UNITS},

@@ -13,10 +13,12 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import comparison_text
+from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text
+from warpimpact.analysis.study import QUANTITIES
+from warpimpact.analysis.study_text import study_text
+from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
@@ -60,6 +62,7 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "asked": _asked(dataset),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),
+        "caveats": _caveats(dataset),
         "tables": _tables(dataset),
         "statuses": list(_statuses(dataset)),
         "numbers": list(_numbers(dataset)),
@@ -70,15 +73,42 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     }
 
 
-def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, str]:
-    """The comparison of plates as text and as a picture; if there is none, the text gives the reason."""
+def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, Any]:
+    """The comparison of plates as sentences, tables and a picture; if there is none, a sentence gives the reason."""
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
-        return {"text": str(error), "picture": ""}
+        return {"conditions": [str(error)], "best": [], "rankings": [], "head": RANKING_HEAD, "picture": ""}
     picture = BytesIO()
     comparison_figure(comparison).savefig(picture, dpi=100)
-    return {"text": comparison_text(comparison), "picture": b64encode(picture.getvalue()).decode()}
+    return {
+        "conditions": conditions(comparison),
+        "best": best_rows(comparison),
+        "rankings": rankings(comparison),
+        "head": RANKING_HEAD,
+        "picture": b64encode(picture.getvalue()).decode(),
+    }
+
+
+def study_table(study: xarray.Dataset) -> dict[str, Any]:
+    """A study as head, rows from fast to slow, and what else there is to say."""
+    last = study.isel(standoff=-1).sortby(v.HITS_PER_SECOND, ascending=False)
+    quoted = [f"{share:.0%}" if share < 1.0 else "max" for share in last[v.QUANTILE].values]
+    units = {v.RESIDUAL_VELOCITY: "m/s", v.TILT: "°"}
+    head = [
+        "setting",
+        "hits/s",
+        *(f"{words(name)}, {share} [{units[name]}]" for name in QUANTITIES for share in quoted),
+    ]
+    rows = []
+    for index in range(last.sizes["setting"]):
+        one = last.isel(setting=index)
+        errors = [f"{value:.3f}" for name in QUANTITIES for value in one[v.ERRORS[name]].values]
+        rows.append([one[v.SETTING].item(), f"{one[v.HITS_PER_SECOND].item():.4g}", *errors])
+    return {"title": study.attrs[attr.TITLE], "device": study.attrs[attr.DEVICE], "head": head, "rows": rows} | {
+        "made": study.attrs[attr.HISTORY][:10],
+        "notes": [line for line in study_text(study).splitlines() if line.startswith(("converged", "left out"))],
+    }
 
 
 def _asked(dataset: xarray.Dataset) -> str:
@@ -93,6 +123,15 @@ def _asked(dataset: xarray.Dataset) -> str:
         told = dataset.attrs
         text += f" The plate has {told[attr.OPEN_AREA]:.1%} open area and weighs {told[attr.AREAL_DENSITY]:.3g} kg/m²."
     return text
+
+
+def _caveats(dataset: xarray.Dataset) -> list[str]:
+    """What limits the numbers of a result, a sentence each, beside every table of them."""
+    promise = promise_text(dataset)
+    numerics = "The error of the numerics is not known." if promise is None else f"Numerics: {promise}."
+    chance = "Intervals describe the hits that were drawn."
+    model = "The core is rigid: it neither breaks nor erodes, which overstates what comes through where cores break."
+    return [sentence for sentence in (chance, sampling_note(dataset), numerics, model) if sentence]
 
 
 def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray
 
+from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -44,6 +45,10 @@ _TOGETHER = (
 """Attributes of which the first needs the others."""
 
 
+_SLICE = 2**22
+"""Hits that are looked at together."""
+
+
 def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
     """What keeps a Dataset from being what it should be, as a phrase; None if nothing does.
 
@@ -51,7 +56,22 @@ def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
         known: the variables that may be in it.
     """
     found = (_variable_fault(dataset[str(one)], one) for one in known if one in dataset.variables)
-    return next(filter(None, found), None) or _attribute_fault(dataset.attrs)
+    return next(filter(None, found), None) or _map_fault(dataset, known) or _attribute_fault(dataset.attrs)
+
+
+def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
+    """What only a map of hits is held to."""
+    if "hit" not in dataset.sizes:
+        return None
+    for one in known:
+        if one in dataset.variables and dataset.variables[one].dims != one.dims:
+            return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
+    if dataset.sizes.get("standoff", 1) == 0:
+        return "it has no stand-offs"
+    status, codes = dataset[v.STATUS], [*Status]
+    if not all(np.isin(status[at : at + _SLICE].values, codes).all() for at in range(0, len(status), _SLICE)):
+        return f'its variable "{v.STATUS}" has codes that mean nothing'
+    return None
 
 
 def unusable(dataset: xarray.Dataset) -> str | None:

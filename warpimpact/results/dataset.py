@@ -75,7 +75,7 @@ def to_dataset(
         v.AXIS: ["x", "y", "z"],
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    values |= {name: shots.columns[name] for name in v.SCATTER_VARIABLES if name in shots.columns}
+    values |= {name: shots.columns[name] for name in (*v.SCATTER_VARIABLES, v.POSTERIOR_DRAW) if name in shots.columns}
     ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *v.LAYER_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
     values |= _of_layers(scene, shots)
@@ -83,8 +83,8 @@ def to_dataset(
         zero = np.zeros(len(shots))
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
-    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES)
-    optional = (*v.EXIT_VARIABLES, *v.SCATTER_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layers)
+    told = (*v.SCATTER_VARIABLES, v.POSTERIOR_DRAW, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
+    optional = (*told, *v.LAYER_VARIABLES, *v.LAYER_FACES)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES

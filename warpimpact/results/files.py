@@ -219,7 +219,13 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 "one, keep its attributes"
             )
         if not is_history(dataset):
-            optional = (*v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES, *v.LAYER_VARIABLES, *v.LAYER_FACES)
+            optional = (
+                *v.SCATTER_VARIABLES,
+                v.POSTERIOR_DRAW,
+                *v.ESTIMATE_VARIABLES,
+                *v.LAYER_VARIABLES,
+                *v.LAYER_FACES,
+            )
             _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
 

@@ -105,6 +105,9 @@ THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
 MASS = Variable("mass", _HIT, "kg", "mass of the core")
 STRENGTH = Variable("strength", _HIT, "Pa", "strength of the core, a nominal bending stress")
 
+POSTERIOR_DRAW = Variable("posterior_draw", _HIT, "1", "place of the shot's parameters in the posterior")
+"""Present only in a campaign with a posterior."""
+
 LAYER_SCATTER = (
     Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer"),
     Variable("layer_resistance", _IN_LAYER, "Pa", "resistance of each layer"),

@@ -253,7 +253,9 @@ class Shots:
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """One after the other; all have the same columns."""
-        return cls(**{name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns})
+        return type(parts[0])(
+            **{name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
+        )
 
 
 def _listable(required: tuple[str, ...]) -> tuple[str, ...]:

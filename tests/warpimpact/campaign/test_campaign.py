@@ -1,6 +1,7 @@
 """Campaign files: what is read, and one sentence for each mistake: file, field, value, cure."""
 
 import struct
+import zlib
 from pathlib import Path
 
 import pytest
@@ -237,8 +238,9 @@ MISTAKES = {
 def test_a_mistake_is_told_in_one_sentence(tmp_path: Path, right: str, wrong: str, sentence: str) -> None:
     assert CAMPAIGN.count(right) == 1
     (tmp_path / "bad_hits.csv").write_text("hit_y,hit_z\n0,0\n0,oops\n")
-    header = struct.pack(">I4sII", 13, b"IHDR", 10**6, 10**6)
-    (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + header)
+    parts = (b"IHDR" + struct.pack(">II5B", 10**6, 10**6, 8, 0, 0, 0, 0), b"IDAT")
+    chunks = (struct.pack(">I", len(part) - 4) + part + struct.pack(">I", zlib.crc32(part)) for part in parts)
+    (tmp_path / "huge.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(chunks))
     path = tmp_path / "wrong.toml"
     path.write_text(CAMPAIGN.replace(right, wrong))
     with pytest.raises(CampaignError) as caught:

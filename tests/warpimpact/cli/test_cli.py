@@ -23,7 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(
-    "command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"], ["plate"]]
+    "command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"], ["plate"], ["identify"]]
 )
 def test_help_shows_how(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:

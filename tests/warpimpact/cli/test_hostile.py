@@ -3,7 +3,9 @@
 import io
 import random
 import re
+import subprocess
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -21,6 +23,7 @@ from warpimpact.cli import main
 from warpimpact.cli.plain import Plain, say
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
+from warpimpact.scene.patterns.mask_files import read_mask
 from warpimpact.scene.units import Length, quantity, quoted
 from warpimpact.solver.tile import tile_of
 
@@ -145,6 +148,43 @@ def test_a_hostile_file_beside_a_campaign_is_refused_in_a_sentence(
     assert expected in said
     assert "secret" not in said
     assert "y" * 81 not in said
+
+
+def test_a_drawing_of_many_subpaths_takes_time_in_proportion(tmp_path: Path) -> None:
+    squares = "".join(f"M{i % 200 * 0.079:.3f} {i // 200 * 0.04:.3f}h.02v.02h-.02z" for i in range(4000))
+    (tmp_path / "a.svg").write_text(SVG.format(f'<path d="{squares}"/>'))
+    begin = time.process_time()
+    material = read_mask(tmp_path / "a.svg", 1e-4)
+    assert not material.all()
+    assert time.process_time() - begin < 20.0  # two seconds; a minute where each is joined to all before
+
+
+LIMITED = """
+import resource, sys
+from warpimpact.cli import main
+from warpimpact.campaign.run import run_to_file  # its imports take memory of their own
+from warpimpact.solver.device import find_device
+resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("case", ["a tiny length", "a long array", "a huge shape", "noise", "nested use"])
+def test_a_hostile_campaign_is_refused_within_a_gibibyte(case: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    if case in CAMPAIGNS:
+        text, expected = CAMPAIGNS[case]
+    else:
+        name, content, expected = FILES[case]
+        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+        text = listed(name) if name.endswith("csv") else masked(name)
+    path.write_text(text, encoding="utf-8")
+    command = [sys.executable, "-c", LIMITED, "run", str(path), "-o", str(tmp_path / "a.nc"), "--device", "cpu"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert expected in done.stderr
+    assert done.stderr.splitlines()[-1].startswith("warpimpact: error: ")
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", "x" * 5000, "y" * 300, "."])

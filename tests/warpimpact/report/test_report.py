@@ -1,9 +1,11 @@
 """The report: its choice of hits, its text, its escaping, and its use in a real browser."""
 
+import gzip
 import html
 import json
 import re
 import shutil
+from base64 import b64decode
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,7 +15,7 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import comparison_text
+from warpimpact.analysis.comparison_text import best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import effectiveness, number_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.replay import replay
@@ -31,8 +33,8 @@ ResultMaker = Callable[..., xarray.Dataset]
 
 def data_of(path: Path) -> dict:
     """The data that the page's script reads."""
-    (found,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', path.read_text())
-    return json.loads(found)
+    (found,) = re.findall(r'<script id="data" type="application/gzip">(.*?)</script>', path.read_text())
+    return json.loads(gzip.decompress(b64decode(found)))
 
 
 @pytest.fixture(scope="module")
@@ -99,24 +101,56 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     text = html.unescape((folder / "a.html").read_text())
     names = ["narrow", "<b>wide"]
     with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
-        assert comparison_text(compare([narrow, wide], names)) in text
+        comparison = compare([narrow, wide], names)
+    assert all(f"<p>{sentence}</p>" in text for sentence in conditions(comparison))
+    for label, who in best_rows(comparison):
+        assert f"<tr><td>{label}</td><td>{who}</td></tr>" in text
+    for ranking in rankings(comparison):
+        assert f"<caption>{ranking.title}</caption>" in text
+        for row in ranking.rows:
+            assert "".join(f'<td class="number">{cell}</td>' for cell in row) in text
+        assert all(sentence in text for sentence in ranking.differences)
     assert text.count('<img src="data:image/png;base64,') == 1
     files.write(make_result(100), tmp_path / "other.nc")
     page = tmp_path / "a.html"
     command = ["report", str(folder / "narrow.nc"), str(tmp_path / "other.nc"), "-o", str(page), "--trajectories", "0"]
     assert main(command) == 0
-    assert "<pre>other: " in page.read_text()
+    assert "<p>other: " in page.read_text()
+
+
+def test_page_says_what_was_compared_and_leads_to_its_parts(folder: Path) -> None:
+    text = (folder / "a.html").read_text()
+    assert "<title>Plates compared: narrow, &lt;b&gt;wide</title>" in text
+    anchors = re.findall(r'<a href="#(\w+)">', text)
+    assert len(anchors) == len(set(anchors)) >= 8
+    assert anchors == re.findall(r'<h2 id="(\w+)">', text)
+    assert text.count("Intervals describe the hits that were drawn.") == 4  # beside both tables of both plates
+    assert text.count("The core is rigid: it neither") == 4
+    assert len(text) < 3e6
+
+
+def test_a_page_of_many_hits_is_small(make_result: ResultMaker, tmp_path: Path) -> None:
+    files.write(make_result(hits.MOST_HITS), tmp_path / "a.nc")
+    assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == 0
+    assert (tmp_path / "a.html").stat().st_size < 3e6
+
+
+def test_the_first_trajectory_is_the_one_that_tilts_most_and_only_statuses_that_occur_are_told(folder: Path) -> None:
+    page = data_of(folder / "a.html")
+    tilt = files.read(folder / "narrow.nc")["tilt"][:, -1]
+    shown = [int(hit) for hit in page["results"][0]["trajectories"]]
+    assert page["results"][0]["first"] == shown[int(np.argmax(tilt.values[shown]))]
+    assert [status["label"] for status in page["statuses"]] == ["perforated"]
 
 
 def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
     text = (folder / "a.html").read_text()
     own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert not re.search(r'(src|href)="(?!data:)', own)
+    assert not re.search(r'(src|href)="(?!data:|#)', own)
     assert "default-src 'none'" in own
     assert "&lt;b&gt;wide" in own
     assert "<b>" not in own
-    assert own.count("</script>") == 1  # that of the data; titles contain others
-    assert len(text) < 10e6
+    assert own.count("</script>") == 2  # those of the data and of Plotly; titles contain others
 
 
 def test_large_results_are_thinned_evenly_and_it_is_said(
@@ -278,6 +312,10 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Brows
     assert f"Hit {picked} has no trajectory in this report. Shown is hit {nearest}," in browser.text("#note-0")
     for views, cores in (("#passage-0", 10), ("#flight-0", 6)):
         assert len(browser.find(f"{views} .scatterlayer .trace")) == cores
+    lengths = browser.driver.execute_script(
+        "return [0, 1].map((k) => document.getElementById(`map-${k}`)._fullLayout.xaxis._m)"
+    )
+    assert lengths[0] == pytest.approx(lengths[1], rel=0.02)  # pixels per mm
     assert browser.errors() == []
     page = browser.driver.execute_script("return document.documentElement.scrollWidth")
     assert page <= width

@@ -1,7 +1,6 @@
 """Files that masks come from: images, arrays and drawings."""
 
 import xml.etree.ElementTree as xml
-from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -136,12 +135,21 @@ def _svg_shapes(path: Path, extent: Array) -> Any:
     for shape in drawing.elements():
         if isinstance(shape, svgelements.Shape) and shape.fill is not None and shape.fill.value is not None:
             rings = [_flattened(part) for part in abs(svgelements.Path(shape)).as_subpaths()]
-            polygons = [_polygon(ring) for ring in rings if len(ring) > 2]
-            nothing: Any = shapely.Polygon()
-            filled.append(reduce(shapely.symmetric_difference, polygons, nothing))
+            filled.append(_in_odd_many([_polygon(ring) for ring in rings if len(ring) > 2]))
     if not filled:
         raise _NoShape(f"{path.name} has no filled shape, but filled shapes are the holes")
     return shapely.transform(shapely.union_all(filled), lambda points: points * (scale, -scale) + (0.0, extent[1]))
+
+
+def _in_odd_many(polygons: list[Any]) -> Any:
+    """What lies in an odd number of polygons. They are joined two by two: one after the other, a drawing of thousands
+    would take the square of its time."""
+    import shapely
+
+    while len(polygons) > 1:
+        pairs = [shapely.symmetric_difference(*pair) for pair in zip(polygons[::2], polygons[1::2], strict=False)]
+        polygons = pairs + polygons[2 * len(pairs) :]
+    return polygons[0] if polygons else shapely.Polygon()
 
 
 def _polygon(ring: Array) -> Any:

@@ -1,0 +1,164 @@
+"""Campaigns with a posterior: every shot draws its parameters from it, all together."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.campaign.text import CampaignError
+from warpimpact.cli import main
+from warpimpact.results import posterior as files
+from warpimpact.results.files import read
+from warpimpact.scene import Interaction, Plate, Shots
+from warpimpact.solver.simulate import simulate
+
+DRAWS = 50
+CAMPAIGN = """
+title = "drawn"
+[core]
+shape = "ogive"
+diameter = "6 mm"
+crh = 3
+length = "20 mm"
+mass = "4 g"
+[plate]
+thickness = "2 mm"
+resistance = "1 GPa"
+degradation = 0.8
+[plate.pattern]
+shape = "circle"
+diameter = "8 mm"
+spacing = ["12 mm", "12 mm"]
+[impact]
+velocity = "700 m/s"
+[hits]
+count = 256
+seed = 4
+replicates = 8
+[numerics]
+fidelity = "draft"
+time_step = "2 us"
+"""
+
+
+def posterior(folder: Path, **of_scene: float) -> Path:
+    """A posterior of resistance, friction and interval, where each tells the others; `of_scene` scatters lengths."""
+    rng = np.random.default_rng(0)
+    share = rng.random(DRAWS)
+    columns = {
+        "resistance": (["plate", "resistance"], 2e9 + 1e9 * share),
+        "shear_coefficient": (["plate", "shear_coefficient"], 0.1 * share),
+        "degradation_interval": (["plate", "degradation_interval"], 1e-6 * (1.0 + share)),
+        "spacing_y": (["plate", "pattern", "spacing", 0], 0.02 + share),
+        "discrepancy_velocity": (["discrepancy", "velocity"], share),
+    }
+    columns |= {name: (["plate", name], size * (1.0 + share)) for name, size in of_scene.items()}
+    draws = xarray.Dataset(
+        {
+            name: (("chain", "draw"), values[None], {"path": json.dumps(path), "units": "1"})
+            for name, (path, values) in columns.items()
+        }
+    )
+    material = {
+        "plate": Plate(thickness="9 mm", resistance="2 GPa", degradation=0.8).model_dump(exclude={"pattern"}),
+        "interaction": Interaction().model_dump(),
+    }
+    told = {files.FIT: "", files.MATERIAL: json.dumps(material), "warpimpact_version": "0"}
+    groups = {name: xarray.Dataset({"a": 1}) for name in files.GROUPS} | {"posterior": draws}
+    path = folder / "posterior.nc"
+    files.write(xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=told), **groups}), path)
+    return path
+
+
+def campaign(path: Path, *changes: tuple[str, str]) -> Campaign:
+    text = CAMPAIGN
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after)
+    return Campaign.from_text(f"posterior = {json.dumps(str(path))}\n{text}", name="c.toml", folder=path.parent)
+
+
+def test_parameters_are_drawn_together(tmp_path: Path) -> None:
+    shots = campaign(posterior(tmp_path)).sampler().shots(0, 256)
+    share = (shots.resistance - 2e9) / 1e9
+    assert len(np.unique(share)) > 40
+    assert shots.shear_coefficient == pytest.approx(0.1 * share)
+    assert np.log(shots.degradation) == pytest.approx(np.log(0.8) / (1.0 + share))  # per interval of the campaign
+    assert shots.thickness is None
+
+
+def test_a_draw_is_a_function_of_the_seed_and_the_number(tmp_path: Path) -> None:
+    sampler = campaign(posterior(tmp_path)).sampler()
+    whole = sampler.shots(0, 256)
+    parts = Shots.joined([sampler.shots(first, count) for first, count in ((0, 7), (7, 100), (107, 149))])
+    assert (whole.resistance == parts.resistance).all()
+    other = campaign(tmp_path / "posterior.nc", ("seed = 4", "seed = 5")).sampler().shots(0, 256)
+    assert (whole.resistance != other.resistance).mean() > 0.9
+
+
+def test_images_share_their_draw(tmp_path: Path) -> None:
+    drawn = campaign(posterior(tmp_path), ("[hits]", "[hits]\nirreducible = true"))
+    shots, images = drawn.sampler().shots(3, 90), len(drawn.symmetries)
+    assert images == 4
+    of = (np.arange(3, 93) // images)[:, None] == (np.arange(3, 93) // images)
+    assert (shots.resistance[:, None] == shots.resistance)[of].all()
+
+
+def test_a_result_holds_its_draws_and_replays(tmp_path: Path) -> None:
+    result = run(campaign(posterior(tmp_path)), device="cpu")
+    draws = xarray.open_datatree(tmp_path / "posterior.nc")["posterior"]
+    which = result["posterior_draw"].values.astype(int)
+    assert (result["resistance"].values == draws["resistance"].values[0][which]).all()
+    assert replay(result, 17, folder=tmp_path).attrs["agreement"] == "bit-identical"
+
+
+def test_lengths_make_scenes_of_their_own(tmp_path: Path) -> None:
+    path = posterior(tmp_path, degradation_length=3e-4)
+    drawn = campaign(path, ("count = 256", "count = 16"))
+    assert drawn.drawn is not None
+    shots, result = drawn.sampler().shots(0, 16), run(drawn, device="cpu")
+    lengths = drawn.drawn.values["plate", "degradation_length"]
+    for place in (0, 9):
+        length = float(lengths[int(result["posterior_draw"][place])])
+        plate = drawn.plate.model_copy(update={"degradation_length": length})
+        alone = simulate(
+            drawn.scene.model_copy(update={"target": plate}),
+            shots[place : place + 1],
+            numerics=drawn.numerics,
+            device="cpu",
+        )
+        assert float(result["residual_velocity"][place]) == pytest.approx(alone.residual_velocity[0], abs=1e-3)
+    assert replay(result, 9, folder=tmp_path).attrs["agreement"] == "bit-identical"
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (("degradation = 0.8", "degradation = 0.7"), "was found with plate.degradation = 0.8, but it is 0.7 here"),
+        (("[impact]", "[interaction]\nonset = 0.01\n[impact]"), "found with interaction.onset = 0.005, but it is 0.01"),
+        (("degradation = 0.8", 'degradation = 0.8\ndegradation_distance = "1 mm"'), "gives plate.degradation_interval"),
+        (
+            ('resistance = "1 GPa"', 'resistance = { distribution = "uniform", low = "1 GPa", high = "2 GPa" }'),
+            "got a distribution of plate.resistance beside a posterior, which gives it",
+        ),
+    ],
+)
+def test_another_material_is_refused(tmp_path: Path, change: tuple[str, str], sentence: str) -> None:
+    with pytest.raises(CampaignError) as caught:
+        campaign(posterior(tmp_path), change)
+    assert sentence in str(caught.value)
+
+
+def test_the_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = posterior(tmp_path)
+    Path("c.toml").write_text(CAMPAIGN, encoding="utf-8")
+    assert main(["run", "c.toml", "--posterior", path.name, "--device", "cpu"]) == 0
+    assert "posterior_draw" in read(Path("c.nc"))
+    assert main(["run", "c.toml", "--posterior", "c.nc", "-o", "d.nc"]) == 2
+    assert "not a posterior of warpimpact identify" in capsys.readouterr().err

@@ -1,0 +1,145 @@
+"""Fit files: what is read, and one sentence for what is not allowed."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact.identification.evaluate import benches
+from warpimpact.identification.fit import Fit
+from warpimpact.identification.identify import sample
+from warpimpact.identification.parameters import FitError
+
+FitMaker = Callable[..., Fit]
+RESISTANCE = 'resistance = { distribution = "uniform", low = "1 GPa", high = "4 GPa" }'
+ONE_SHOT = 'hit = "between holes"\nimpact = { velocity = "700 m/s" }'
+
+
+def test_priors_are_read_in_si(make_fit: FitMaker) -> None:
+    fit = make_fit()
+    names = [one.name for one in fit.parameters]
+    assert names == ["resistance", "shear_coefficient", "discrepancy_velocity", "discrepancy_angle"]
+    assert fit.parameters[0].at(np.array([0.0])) == pytest.approx(2.5e9)
+    assert fit.parameters[0].ends == pytest.approx((1e9, 4e9), rel=1e-6)
+    assert fit.scene_of(fit.shots[0]).target.plate.resistance == pytest.approx(2.5e9)
+
+
+def test_observations_are_in_si_and_have_their_standoff(make_fit: FitMaker) -> None:
+    velocity, tilt = make_fit().shots[0].observations
+    assert (velocity.name, velocity.value, velocity.std, velocity.label) == (
+        "residual_velocity",
+        600.0,
+        10.0,
+        "residual_velocity",
+    )
+    assert (tilt.label, tilt.value, tilt.std) == (
+        "tilt@50mm",
+        pytest.approx(np.radians(10)),
+        pytest.approx(np.radians(3)),
+    )
+
+
+def test_any_number_of_the_scene_may_be_a_parameter(make_fit: FitMaker) -> None:
+    more = (
+        RESISTANCE,
+        RESISTANCE + '\ndegradation_length = { distribution = "uniform", low = "0.3 mm", high = "0.6 mm" }\n'
+        '[prior.plate.pattern]\nspacing = [{ distribution = "uniform", low = "11 mm", high = "13 mm" }, "12 mm"]\n'
+        '[prior.interaction]\nonset = { distribution = "uniform", low = 0.002, high = 0.01 }\n'
+        '[prior.core]\nlength = { distribution = "uniform", low = "19 mm", high = "21 mm" }\n[prior.plate.x]',
+    )
+    fit = make_fit((more[0], more[1].replace("[prior.plate.x]", "")), ("shear_coefficient = {", "#"))
+    by_name = {one.name: one.path for one in fit.parameters}
+    assert by_name["spacing_y"] == ("plate", "pattern", "spacing", 0)
+    scene = fit.scene_of(
+        fit.shots[0], {by_name["spacing_y"]: 11.5e-3, by_name["onset"]: 0.004, by_name["length"]: 19.5e-3}
+    )
+    assert scene.target.plate.pattern.period == pytest.approx((11.5e-3, 12e-3))
+    assert (scene.interaction.onset, scene.core.length) == (0.004, 19.5e-3)
+    assert [one.is_column for one in fit.parameters] == sorted(one.is_column for one in fit.parameters)
+
+
+def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
+    fit = make_fit((ONE_SHOT, ONE_SHOT + '\nplate = { thickness = "5 mm", resistance = "2 GPa" }'))
+    values = {("plate", "resistance"): 1.5e9}
+    own, other = (fit.scene_of(shot, values).target.plate for shot in fit.shots)
+    assert (own.thickness, own.resistance) == (5e-3, 2e9)
+    assert (other.thickness, other.resistance) == (3e-3, 1.5e9)
+    assert len(benches(fit)) == 2
+    assert len(benches(make_fit())) == 1  # shots that differ in their class alone share their runs
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (
+            ("[prior.plate]", "[prior.plat]"),
+            'prior.plat.resistance: got the table "plat", but a prior belongs in one of',
+        ),
+        (("[prior.plate]\nres", "[prior.plate]\nrez"), 'got the unknown key "rezistance"; did you mean "resistance"?'),
+        (('low = "1 GPa"', 'low = "1 mm"'), 'low: got "1 mm", which is not a stress'),
+        (('low = "1 GPa"', 'low = "-1 GPa"'), "the priors reach plate.resistance = "),
+        (('hit = "between holes"', 'hit = "between hole"'), 'got "between hole", but it must be "unknown", "through a'),
+        (('hit = "between holes"', "hit = { y = 1 }"), "or a table with y and z"),
+        (('std = "10 m/s"', "std = 0"), "std: got 0, but no measurement is exact: it must be greater than 0"),
+        (("[10]", "[10, 20]"), "got 2 values and 2 std at 1 stand-offs"),
+        (("tilt = {", "tlit = {"), 'got the unknown key "tlit"; did you mean "tilt"?'),
+        (('title = "Two', 'tilte = "Two'), 'got the unknown key "tilte"'),
+        (("seed = 3", "sets = 3"), "sampling: sets: got 3, but it must be greater than or equal to 64"),
+        (("title =", 'selection = ["whole"]\ntitle ='), 'selection: got "whole", but it must be one of perforated'),
+        (('fidelity = "draft"', 'tolerance = { tilt = "1 deg" }'), "numerics"),
+        (
+            (RESISTANCE, "resistance = 2e9"),
+            "but a prior is a distribution such as",
+        ),
+        (("[[shot]]", "[discrepancy]\nvelocity = -1\n[[shot]]"), "discrepancy"),
+        (('pattern]\nshape = "circle"\ndiameter = "8 mm"\nspacing = ["12 mm", "12 mm"]', "pattern]"), "shape"),
+    ],
+)
+def test_a_mistake_gets_one_sentence(make_fit: FitMaker, change: tuple[str, str], sentence: str) -> None:
+    with pytest.raises((FitError, ValueError)) as caught:
+        make_fit(change)
+    told = str(caught.value)
+    assert told.startswith("fit.toml")
+    assert "\n" not in told
+    assert sentence in told
+
+
+def test_a_class_without_places_is_refused(make_fit: FitMaker) -> None:
+    solid = ('shape = "circle"\ndiameter = "8 mm"\nspacing = ["12 mm", "12 mm"]', 'shape = "none"')
+    with pytest.raises(FitError, match='got "through a hole", but no place of this plate is'):
+        make_fit(solid, ('hit = "between holes"', 'hit = "through a hole"'))
+
+
+def test_a_plate_that_weakens_by_time_has_no_limit_velocity(make_fit: FitMaker) -> None:
+    limit = ('residual_velocity = { value = "600', 'limit_velocity = { value = "600')
+    assert make_fit(limit).shots[0].observations[0].is_limit
+    with pytest.raises(FitError, match="which stops no core"):
+        make_fit(limit, ('thickness = "3 mm"', 'thickness = "3 mm"\ndegradation = 0.8'))
+
+
+def test_duplicated_shots_are_told(make_fit: FitMaker) -> None:
+    same = make_fit(('"anywhere"', '"again"\nhit = "between holes"'), ("640", "600"))
+    assert "are the same in every number: they count twice" in same.warnings[0]
+    assert make_fit().warnings == ()
+
+
+def test_more_parameters_than_numbers_are_told(make_fit: FitMaker, text: str) -> None:
+    first = text[: text.rindex("[[shot]]")]
+    second_number = first[first.index("tilt =") :]
+    fit = make_fit((text[text.rindex("[[shot]]") :], ""), (second_number, ""))
+    assert fit.warnings == (
+        "got 1 measured number against 2 parameters: the posterior keeps its prior in most directions",
+    )
+
+
+def test_priors_that_exclude_the_data_are_refused(make_fit: FitMaker) -> None:
+    fit = make_fit(("600 m/s", "200 m/s"), ("[sampling]", "[sampling]\nsets = 64"))
+    with pytest.raises(FitError, match=r'the priors exclude shot "between holes": the nearest of .* sets'):
+        sample(fit, device="cpu")
+
+
+def test_an_impossible_scene_is_found_before_anything_is_computed(make_fit: FitMaker) -> None:
+    wide: Any = (RESISTANCE, RESISTANCE + '\nthickness = { distribution = "normal", mean = "3 mm", std = "1 mm" }')
+    with pytest.raises(FitError, match="bound them, as uniform or truncated_normal do"):
+        make_fit(wide)

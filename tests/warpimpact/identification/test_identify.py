@@ -1,0 +1,148 @@
+"""From a fit file to a posterior file: groups, resume, figures, and the command."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.campaign.run import Interrupted
+from warpimpact.cli import main
+from warpimpact.identification import identify
+from warpimpact.identification.calibration import calibrate
+from warpimpact.identification.fit import Fit
+from warpimpact.identification.identify import Standing, identify_to_file, rounds
+from warpimpact.identification.posterior import learnt, parameters_of
+from warpimpact.identification.reading import fit_from
+from warpimpact.identification.text import posterior_text
+from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
+from warpimpact.results import posterior as files
+from warpimpact.results.files import OutputError, ResultError
+
+FitMaker = Callable[..., Fit]
+SMALL = ("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 100\neffective = 60\nhits = 32")
+
+
+@pytest.fixture(scope="module")
+def posterior(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    text = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
+    assert SMALL[0] in text
+    path = tmp_path_factory.mktemp("fit") / "posterior.nc"
+    identify_to_file(fit_from(text.replace(*SMALL), "fit.toml", Path()), path, device="cpu")
+    return path
+
+
+def test_the_file_has_the_groups_that_arviz_reads(posterior: Path) -> None:
+    tree = xarray.open_datatree(posterior)
+    assert set(files.GROUPS) == set(tree.children)
+    for group in ("posterior", "prior", "sample_stats", "log_likelihood", "posterior_predictive"):
+        assert {"chain", "draw"} <= set(tree[group].sizes)
+    assert tree["posterior"].sizes == {"chain": 1, "draw": 100, "shot": 2}
+    assert tree["observed_data"]["measured"].dims == ("observation",)
+    assert tree["posterior_predictive"]["measured"].dims == ("chain", "draw", "observation")
+    assert tree["posterior"]["resistance"].attrs["units"] == "Pa"
+    tree.close()
+
+
+def test_arviz_reads_it(posterior: Path) -> None:
+    arviz = pytest.importorskip("arviz_base")
+    drawn = arviz.extract(arviz.convert_to_datatree(str(posterior)))
+    assert drawn["resistance"].sizes == {"sample": 100}
+
+
+def test_draws_hold_together(posterior: Path) -> None:
+    """A draw has the numbers of the set that it is."""
+    tree = files.read(posterior)
+    which = tree["sample_stats"]["set"].values[0]
+    for name in parameters_of(tree):
+        assert tree["posterior"][name].values[0] == pytest.approx(tree["sets"][name].values[which])
+    weight = tree["sets"]["weight"].values
+    assert weight.sum() == pytest.approx(1.0)
+    # Systematic resampling gives every set its share within one draw.
+    assert np.bincount(which, minlength=len(weight)) == pytest.approx(100 * weight, abs=1.0)
+    assert float(tree["best"]["misfit"].sum()) == pytest.approx(tree["sets"]["misfit"].values.sum(axis=1).min())
+
+
+def test_the_resistance_is_learnt_and_told(posterior: Path) -> None:
+    tree = files.read(posterior)
+    resistance = learnt(tree)["resistance"]
+    assert resistance.quantiles[2] - resistance.quantiles[0] < 0.8 * (resistance.prior[2] - resistance.prior[0])
+    text = posterior_text(tree)
+    assert "resistance [GPa]" in text
+    assert "effective sample size" in text
+    assert ("NOT CONVERGED" in text) == (not tree.attrs[files.CONVERGED])
+
+
+def test_figures_are_drawn(posterior: Path) -> None:
+    tree = files.read(posterior)
+    assert len(pairs_figure(tree).axes) == 10
+    assert len(measured_figure(tree).axes) == 2
+    assert len(hits_figure(tree).axes) == 2
+
+
+def test_a_resumed_fit_equals_an_undisturbed_one(posterior: Path, make_fit: FitMaker, tmp_path: Path) -> None:
+    fit, path = make_fit(SMALL), tmp_path / "posterior.nc"
+
+    def stop(standing: Standing) -> None:
+        if standing.done >= 64 and not standing.resumed:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="batches are saved"):
+        identify_to_file(fit, path, device="cpu", progress=stop)
+    with pytest.raises(OutputError, match="continue it with --resume"):
+        identify_to_file(fit, path, device="cpu")
+    with pytest.raises(OutputError, match="cannot be resumed: fit was"):
+        identify_to_file(make_fit(SMALL, ("600 m/s", "601 m/s")), path, device="cpu", resume=True)
+    standings: list[Standing] = []
+    identify_to_file(fit, path, device="cpu", resume=True, progress=standings.append)
+    assert standings[-1].resumed >= 64
+    one, other = files.read(posterior), files.read(path)
+    for group in files.GROUPS:
+        assert one[group].to_dataset().equals(other[group].to_dataset()), group
+    assert not path.with_name("posterior.nc.parts").exists()
+
+
+def test_rounds_are_whole_blocks(make_fit: FitMaker) -> None:
+    plan = make_fit(SMALL).sampling
+    assert sum(rounds(plan)) <= plan.sets * identify.DISCREPANCIES
+    assert all(count % (plan.shared * identify.DISCREPANCIES) == 0 for count in rounds(plan))
+
+
+def test_another_file_is_no_posterior(tmp_path: Path) -> None:
+    path = tmp_path / "other.nc"
+    xarray.Dataset({"a": 1}).to_netcdf(path)
+    with pytest.raises(ResultError, match="not a posterior of warpimpact identify"):
+        files.read(path)
+    assert not files.is_posterior(path)
+
+
+def test_the_command(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("fit.toml").write_text(text.replace(*SMALL), encoding="utf-8")
+    assert main(["identify", "fit.toml", "--device", "cpu"]) == 0
+    shown = capsys.readouterr()
+    assert "written to fit.nc" in shown.out
+    assert "sets; " in shown.err
+    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["fit_hits.png", "fit_measured.png", "fit_pairs.png"]
+    assert main(["report", "fit.nc"]) == 0
+    page = Path("fit.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 3
+    assert "resistance [GPa]" in page
+    capsys.readouterr()
+    assert main(["identify", "fit.toml", "--device", "cpu"]) == 2
+    assert "exists already" in capsys.readouterr().err
+    Path("bad.toml").write_text(text.replace("between holes", "nowhere"), encoding="utf-8")
+    assert main(["identify", "bad.toml"]) == 2
+    assert 'hit: got "nowhere", but it must be "unknown"' in capsys.readouterr().err
+
+
+def test_posteriors_are_calibrated(make_fit: FitMaker) -> None:
+    """A small version of tests/validation/calibrate_fit.py: ranks are uniform, and 90 % intervals cover 90 %."""
+    found = calibrate(make_fit(("hits = 64", "hits = 32")), data_sets=60, library=512, device="cpu")
+    assert found.uniformity.min() > 0.001
+    # Binomial: 54 of 60 expected; 45 or fewer have a probability of 3e-4.
+    assert (60 * found.coverage).min() > 45
+    assert found.recovery[0] > 0.7  # the resistance

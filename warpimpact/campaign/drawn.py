@@ -1,0 +1,155 @@
+"""Parameters drawn from a posterior: every shot of a campaign gets one of its draws, all parameters together.
+
+The posterior says what the material resists with. Holes, thickness and core are those of the campaign, not those of the
+shots that the posterior was found from.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path as FilePath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.results import posterior as files
+from warpimpact.scene import Interaction, Plate, Sampler, Scene, Shots
+from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
+
+Array = NDArray[np.float64]
+
+OF_THE_MATERIAL: tuple[Path, ...] = (
+    ("plate", "resistance"),
+    ("plate", "shear_coefficient"),
+    ("plate", "degradation"),
+    *UNITS_OF_EXPOSURE,
+    ("plate", "degradation_length"),
+    *(("interaction", name) for name in Interaction.model_fields),
+)
+"""What a posterior gives; all else stays that of the campaign."""
+MOST_SCENES = 64
+"""Draws at most where a parameter needs a scene of its own, such as the degradation length."""
+_COLUMN = 2**20
+"""Of the random numbers that choose the draws; those of quantities that scatter have small ones."""
+
+
+@dataclass(frozen=True)
+class DrawnShots(Shots):
+    """Shots with the place of their parameters in the posterior, shape [shots]."""
+
+    posterior_draw: Array | None = None
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Draws of material parameters, SI, by path, each of shape [draws].
+
+    Attributes:
+        found_with: what else the material had in the fit, by table and key; a parameter is worth nothing without it.
+    """
+
+    values: Mapping[Path, Array]
+    found_with: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def draws(self) -> int:
+        """How many draws are used."""
+        (count,) = {len(column) for column in self.values.values()}
+        return min(count, MOST_SCENES) if self.of_scene else count
+
+    @property
+    def of_scene(self) -> tuple[Path, ...]:
+        """Parameters that need a scene of their own."""
+        return tuple(path for path in self.values if path not in COLUMNS and path not in UNITS_OF_EXPOSURE)
+
+    def check(self, plate: Plate, interaction: Interaction) -> None:
+        """Refuse a material that has other fixed values than that of the fit.
+
+        Raises:
+            ValueError: names the first difference.
+        """
+        own = {"plate": plate.model_dump(), "interaction": interaction.model_dump()}
+        for table, key in OF_THE_MATERIAL:
+            there = self.found_with[str(table)].get(str(key))
+            here = own[str(table)][str(key)]
+            if (table, key) in self.values:
+                if here is None:
+                    raise ValueError(f"the posterior gives {table}.{key}, which this plate does not have")
+            elif (table, key) != ("plate", "resistance") and here != there:
+                raise ValueError(
+                    f"the posterior was found with {table}.{key} = {there}, but it is {here} here; its draws hold only "
+                    "beside that value"
+                )
+
+    def which(self, seed: int, first: int, count: int) -> NDArray[np.int64]:
+        """Draws of shots from number `first` on: a function of the seed and the number of the shot."""
+        sequence = np.random.SeedSequence(seed, spawn_key=(_COLUMN,))
+        block, within = divmod(first, 4)  # Philox counts in blocks of four
+        uniform = np.random.Generator(np.random.Philox(sequence).advance(block)).random(within + count)[within:]
+        chosen: NDArray[np.int64] = (uniform * self.draws).astype(np.int64)
+        return chosen
+
+    def scenes(self, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:
+        """Places of the shots that share a scene, and that scene."""
+        draw = shots.posterior_draw if isinstance(shots, DrawnShots) else None
+        if draw is None or not self.of_scene:
+            yield np.arange(len(shots)), scene
+            return
+        for one in np.unique(draw):
+            yield np.flatnonzero(draw == one), self._scene(scene, int(one))
+
+    def _scene(self, scene: Scene, draw: int) -> Scene:
+        own: dict[str, dict[str, float]] = {"plate": {}, "interaction": {}}
+        for table, key in self.of_scene:
+            own[str(table)][str(key)] = float(self.values[table, key][draw])
+        target = scene.target.model_copy(update={"plate": scene.target.plate.model_copy(update=own["plate"])})
+        return scene.model_copy(
+            update={"target": target, "interaction": scene.interaction.model_copy(update=own["interaction"])}
+        )
+
+
+class DrawnSampler(Sampler):
+    """The shots of a campaign, each with a draw of the posterior; the images of a shot share theirs."""
+
+    def __init__(self, posterior: Posterior, plate: Plate, seed: int, images: int, *sampled: Any) -> None:
+        super().__init__(*sampled)
+        self._posterior, self._plate, self._seed, self._images = posterior, plate, seed, images
+
+    def shots(self, first: int, count: int) -> Shots:
+        """As those of a `Sampler`."""
+        shots = super().shots(first, count)
+        numbers = np.arange(first, first + len(shots)) // self._images
+        chosen = self._posterior.which(self._seed, int(numbers[0]), int(np.ptp(numbers)) + 1)[numbers - numbers[0]]
+        drawn = {path: column[chosen] for path, column in self._posterior.values.items()}
+        columns = columns_of(drawn, self._plate)
+        return DrawnShots(**shots.columns | columns, posterior_draw=chosen.astype(np.float64))
+
+
+def read_posterior(path: FilePath) -> Posterior:
+    """The material parameters of a posterior file.
+
+    Raises:
+        ResultError: it cannot be read.
+        ValueError: it has no parameter of a material.
+    """
+    stat = path.stat() if path.is_file() else None
+    return _read(path, None if stat is None else (stat.st_mtime_ns, stat.st_size))
+
+
+@lru_cache(maxsize=4)
+def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
+    tree = files.read(path)
+    draws = tree["posterior"].to_dataset()
+    values: dict[Path, Array] = {}
+    for array in draws.data_vars.values():
+        at = tuple(json.loads(str(array.attrs.get(files.PATH, "[]"))))
+        if at in OF_THE_MATERIAL:
+            values[at] = array.values.ravel().astype(np.float64)
+    if not values:
+        known = ", ".join(".".join(map(str, one)) for one in OF_THE_MATERIAL)
+        raise ValueError(f"{path.name}: has none of the parameters that a run can take from a posterior: {known}")
+    return Posterior(values, json.loads(str(tree.attrs[files.MATERIAL])))

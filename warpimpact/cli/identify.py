@@ -1,0 +1,109 @@
+"""The command identify: parameters with their uncertainty from measured shots."""
+
+import argparse
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpimpact.results.interrupts import terminated_as_interrupted
+
+from .mistakes import memory_told
+from .options import Commands, add_command, add_device, add_output, add_overwrite
+from .paths import check_place
+from .progress import is_quiet, warn
+
+if TYPE_CHECKING:
+    from warpimpact.identification.identify import Standing
+
+
+def add_identify(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "identify",
+        _identify,
+        summary="find parameters with their uncertainty from measured shots",
+        description="Find the parameters of plate, interaction and core that measured shots allow, each with its "
+        "uncertainty. Hit points that are not known are integrated out. Write the posterior as one netCDF file, which "
+        "ArviZ reads, and figures beside it. Print what the shots determine, and whether the computation has "
+        "converged.",
+        example="identify campaigns/paper_fit.toml -o paper_fit.nc",
+    )
+    parser.add_argument(
+        "fit", type=Path, metavar="FIT.toml", help="fit file: scene, measured shots, and priors of what is unknown"
+    )
+    add_output(parser, "POSTERIOR.nc", "file of the posterior (default: the fit's name, in this folder)")
+    add_device(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="continue an interrupted fit; start a new one if there is none"
+    )
+    add_overwrite(parser, "an existing posterior or an interrupted fit")
+
+
+def _identify(arguments: argparse.Namespace) -> int:
+    from warpimpact.identification.identify import identify_to_file
+    from warpimpact.identification.reading import read_fit
+    from warpimpact.identification.text import posterior_text
+    from warpimpact.plotting.posterior import save_posterior
+    from warpimpact.results import posterior as files
+
+    fit = read_fit(arguments.fit)
+    output = arguments.output or Path(arguments.fit.stem + ".nc")
+    check_place(output)
+    for sentence in fit.warnings:
+        warn(sentence)
+    with memory_told(arguments.fit), terminated_as_interrupted(), _show() as progress:
+        identify_to_file(
+            fit,
+            output,
+            device=arguments.device,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=progress,
+        )
+    tree = files.read(output)
+    print(posterior_text(tree))
+    print(f"written to {output}")
+    for picture in save_posterior(tree, output.parent, output.stem):
+        print(picture)
+    return 0
+
+
+@contextmanager
+def _show() -> "Iterator[Callable[[Standing], None]]":
+    """Show the progress of a fit: a bar on a terminal, a line per tenth of the sets in a log."""
+    if is_quiet():
+        yield lambda standing: None
+        return
+    if not sys.stderr.isatty():
+        shown = -1
+
+        def log(standing: "Standing") -> None:
+            nonlocal shown
+            if (tenths := 10 * standing.done // standing.total) > shown:
+                shown = tenths
+                print(f"{standing.done} of {standing.total} sets; {_running(standing)}", file=sys.stderr, flush=True)
+
+        yield log
+        return
+    from tqdm import tqdm
+
+    with tqdm(unit="set", dynamic_ncols=True) as bar:
+
+        def show(standing: "Standing") -> None:
+            bar.total = standing.total
+            bar.set_postfix_str(_running(standing), refresh=False)
+            bar.update(max(0, standing.done - bar.n))
+
+        yield show
+
+
+def _running(standing: "Standing") -> str:
+    parts = [f"smallest misfit {standing.misfit:.3g}"] if math.isfinite(standing.misfit) else []
+    if math.isfinite(standing.effective):
+        parts.append(f"effective sample size {standing.effective:.0f}, Pareto k {standing.pareto_k:.2f}")
+    if standing.resumed:
+        parts.append(f"{standing.resumed} from before")
+    return ", ".join(parts) or "drawn from the prior"

@@ -1,0 +1,179 @@
+"""Runs of a fit: the outcomes of every measured shot at some sets of parameters, and their score."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.identification.fit import Fit, MeasuredShot
+from warpimpact.identification.hits import Aim, Place, aim
+from warpimpact.identification.likelihood import Data, Score, score
+from warpimpact.identification.measured import WithLimit
+from warpimpact.scene import Scene, Shots
+from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
+from warpimpact.solver.limit import limit_velocity
+from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.unfold import unfolded
+
+Array = NDArray[np.float64]
+
+AT_A_TIME = 2**15
+"""Shots per computation at most, images not counted: what is kept of them fits into some ten megabytes."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Measured shots that are alike but for what was measured and in which class they hit: they share their runs.
+
+    Attributes:
+        shot: any of them.
+        which: their places in the fit.
+    """
+
+    shot: MeasuredShot
+    which: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Run:
+    """Outcomes of a bench at some sets of parameters.
+
+    Attributes:
+        which: the sets, shape [computed sets, sets alike]: those in a row differ in the scales of discrepancy alone.
+        scene: what was shot at what; quantities that differ from set to set are at their medians.
+        aim: the points, without a class.
+        outcomes: images included, shape [computed sets · points].
+    """
+
+    which: NDArray[np.int64]
+    scene: Scene
+    aim: Aim
+    outcomes: Outcomes
+
+
+def benches(fit: Fit) -> list[Bench]:
+    """The shots of a fit by what they share."""
+    found: dict[str, list[int]] = {}
+    for place, shot in enumerate(fit.shots):
+        hit = shot.hit if isinstance(shot.hit, Place) else "cell"
+        key = repr((hit, shot.impact, shot.scatter, shot.tables, sorted(map(str, shot.own))))
+        found.setdefault(key, []).append(place)
+    return [Bench(fit.shots[places[0]], tuple(places)) for places in found.values()]
+
+
+def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iterator[Run]:
+    """Compute a bench at sets of parameters.
+
+    Args:
+        points: standard normal numbers, one column per parameter of the fit, shape [sets, parameters].
+    """
+    alike = _alike(points[:, [one.path[0] != "discrepancy" for one in fit.parameters]])
+    values = {one.path: one.at(points[alike[:, 0], column]) for column, one in enumerate(fit.parameters)}
+    own = {one.path: values[one.path] for one in fit.scene_parameters if one.path not in bench.shot.own}
+    columns = _as_columns(fit, own)
+    of_scene = {path: column for path, column in own.items() if path not in columns}
+    for rows in _of_one_scene(of_scene, len(alike)):
+        scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in of_scene.items()})
+        targets = aim(bench.shot, scene.target.plate, scene.core, fit.sampling)
+        per_call = max(1, AT_A_TIME // len(targets.computed))
+        for first in range(0, len(rows), per_call):
+            some = rows[first : first + per_call]
+            of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.plate)
+            shots = repeated(targets.computed, of_sets, len(some))
+            outcomes = _outcomes(fit, bench, scene, shots, device)
+            yield Run(alike[some], scene, targets, unfolded(outcomes, targets.group))
+
+
+def _alike(points: Array) -> NDArray[np.int64]:
+    """Sets of equal numbers, shape [different sets, sets alike]; each on its own where they are not equally many."""
+    _, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    if (counts != counts[0]).any():
+        return np.arange(len(points))[:, None]
+    rows: NDArray[np.int64] = np.argsort(which.reshape(-1), kind="stable").reshape(-1, counts[0])
+    return rows
+
+
+def _outcomes(fit: Fit, bench: Bench, scene: Scene, shots: Shots, device: str) -> Outcomes:
+    """What the observations of a bench need: outcomes at impact velocity, limit velocities, or both."""
+    measured = [fit.shots[place] for place in bench.which]
+    observations = [one for shot in measured for one in shot.observations]
+    if not any(one.is_limit for one in observations):
+        return simulate(scene, shots, numerics=fit.numerics, device=device)
+    limits = limit_velocity(scene, shots, numerics=fit.numerics, device=device)
+    other = fit.selection or any(shot.status for shot in measured) or not all(one.is_limit for one in observations)
+    outcomes = simulate(scene, shots, numerics=fit.numerics, device=device) if other else limits.outcomes
+    plain = {one.name: getattr(outcomes, one.name) for one in fields(Outcomes)}
+    return WithLimit(**plain, limit_velocity=limits.value)
+
+
+def _as_columns(fit: Fit, own: Mapping[Path, Array]) -> dict[Path, Array]:
+    """Parameters that may differ from shot to shot: the literal scheme counts steps, so its interval may not."""
+    nodal = fit.numerics.scheme == "nodal"
+    return {path: own[path] for path in own if path in COLUMNS or (path in UNITS_OF_EXPOSURE and not nodal)}
+
+
+def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArray[np.int64]]:
+    """Rows that share one scene."""
+    if not of_scene:
+        yield np.arange(count)
+        return
+    _, which = np.unique(np.stack(list(of_scene.values()), axis=-1), axis=0, return_inverse=True)
+    which = which.reshape(-1)
+    for one in dict.fromkeys(which.tolist()):
+        yield np.flatnonzero(which == one)
+
+
+def repeated(shots: Shots, columns: Mapping[str, Array], sets: int) -> Shots:
+    """All shots with the quantities of the first set, then with those of the second, and so on.
+
+    Args:
+        columns: by the name of the quantity, each of shape [sets].
+    """
+    again = shots[np.tile(np.arange(len(shots)), sets)]
+    return replace(again, **{name: np.repeat(column, len(shots)) for name, column in columns.items()})
+
+
+def data_of(fit: Fit, shot: MeasuredShot) -> Data:
+    """What was measured of a shot of a fit."""
+    return Data(shot.observations, shot.status, fit.selection, fit.record.standoffs)
+
+
+def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
+    """Standard deviation of the discrepancy by kind at sets of parameters, each of shape [sets]."""
+    found = {kind: np.full(len(points), value) for kind, value in fit.discrepancy.items()}
+    for column, one in enumerate(fit.parameters):
+        if one.path[0] == "discrepancy":
+            found[str(one.path[1])] = one.at(points[:, column])
+    return found
+
+
+def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> list[Score]:
+    """Score every shot of a fit at sets of parameters.
+
+    Args:
+        points: standard normal numbers, shape [sets, parameters].
+        seed: of the hits that are kept.
+
+    Returns:
+        One score per shot, over the sets.
+    """
+    scales = discrepancies(fit, points)
+    scored: dict[int, list[tuple[NDArray[np.int64], Score]]] = {place: [] for place in range(len(fit.shots))}
+    rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(1, seed)))
+    for bench in benches(fit):
+        for run in runs(fit, bench, points, device=device):
+            for place in bench.which:
+                shot = fit.shots[place]
+                own = run.aim.of(shot.hit, run.scene.target.plate, run.scene.core)
+                for which in run.which.T:
+                    some = {kind: scale[which] for kind, scale in scales.items()}
+                    scored[place].append((which, score(data_of(fit, shot), own, run.outcomes, some, rng)))
+    return [_in_order(parts) for parts in scored.values()]
+
+
+def _in_order(parts: list[tuple[NDArray[np.int64], Score]]) -> Score:
+    order = np.argsort(np.concatenate([which for which, _ in parts]), kind="stable")
+    return Score.joined([one for _, one in parts])[order]

@@ -1,0 +1,121 @@
+"""Fit: measured shots, the scene they were fired in, and the priors of what is unknown of it (reading.py reads it)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path as FilePath
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from warpimpact.identification.hits import Place
+from warpimpact.identification.measured import Observation
+from warpimpact.identification.parameters import Parameter, as_read, put
+from warpimpact.results.measures import Measure
+from warpimpact.scene import Impact, Interaction, Numerics, Plate, Record, Scatter, Scene, Target
+from warpimpact.scene.model import Model
+from warpimpact.solver.columns import Path
+
+
+class Sampling(Model):
+    """How much is computed.
+
+    Attributes:
+        sets: sets of parameters at most.
+        hits: hit points per set over the part of the cell that differs.
+        draws: of the posterior in the file, of equal weight.
+        effective: effective sample size at which the sampling ends.
+        shared: sets that share the numbers which need a scene of their own, such as a degradation length.
+        seed: of all that is drawn.
+    """
+
+    sets: Annotated[int, Field(strict=True, ge=64, le=2**20)] = 4096
+    hits: Annotated[int, Field(strict=True, ge=32, le=2**16, multiple_of=8)] = 512
+    draws: Annotated[int, Field(strict=True, ge=50, le=2**16)] = 1000
+    effective: Annotated[int, Field(strict=True, ge=10, le=2**16)] = 400
+    shared: Annotated[int, Field(strict=True, ge=1, le=64)] = 4
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
+
+
+@dataclass(frozen=True)
+class MeasuredShot:
+    """A shot that was fired, and what was measured of it.
+
+    Attributes:
+        hit: where it hit: a class, or a place.
+        impact, scatter: how the core arrived, and what of that is uncertain.
+        tables: of its scene, with the medians of the priors.
+        own: paths that it gives itself, for which no prior counts.
+        observations: numbers that were measured.
+        status: how it ended, None if that was not told.
+    """
+
+    name: str
+    hit: str | Place
+    impact: Impact
+    scatter: Scatter
+    tables: Mapping[str, Any]
+    own: frozenset[Path]
+    observations: tuple[Observation, ...]
+    status: str | None
+
+    @property
+    def content(self) -> tuple[Any, ...]:
+        """All but the name: what two shots are compared by."""
+        return self.hit, self.impact, self.scatter, repr(self.tables), self.observations, self.status
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Measured shots, and what is unknown.
+
+    Attributes:
+        parameters: of the scene, and the scales of discrepancy that the observations need; first those that make a
+            scene of their own.
+        discrepancy: standard deviation that the model adds to each kind of observation where it is fixed, by kind.
+        selection: what had to be true of a shot so that it was measured.
+    """
+
+    title: str
+    text: str
+    folder: FilePath
+    parameters: tuple[Parameter, ...]
+    discrepancy: Mapping[str, float]
+    selection: tuple[Measure, ...]
+    record: Record
+    numerics: Numerics
+    sampling: Sampling
+    shots: tuple[MeasuredShot, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def scene_parameters(self) -> tuple[Parameter, ...]:
+        return tuple(one for one in self.parameters if one.path[0] != "discrepancy")
+
+    @cached_property
+    def observed(self) -> int:
+        """How many numbers were measured."""
+        return sum(len(shot.observations) + (shot.status is not None) for shot in self.shots)
+
+    def scene_of(self, shot: MeasuredShot, values: Mapping[Path, float] | None = None) -> Scene:
+        """The scene of a shot at some values of the parameters, the medians elsewhere.
+
+        Raises:
+            ValidationError: such a scene is not possible.
+        """
+        tables: Mapping[str, Any] = shot.tables
+        for one in self.scene_parameters:
+            if values is not None and one.path in values and one.path not in shot.own:
+                tables = put(tables, one.path, as_read(one, float(values[one.path])))
+        return scene_from(tables, self.record, self.folder)
+
+
+def scene_from(tables: Mapping[str, Any], record: Record, folder: FilePath) -> Scene:
+    """A scene from its tables; parts that are models already stay the same objects."""
+    context = {"folder": folder}
+    plate = Plate.model_validate(tables["plate"], context=context)
+    interaction = Interaction.model_validate(tables.get("interaction", {}), context=context)
+    wanted = {"core": tables["core"], "target": Target(plate=plate), "interaction": interaction, "record": record}
+    return Scene.model_validate(wanted, context=context)

@@ -1,0 +1,155 @@
+"""Where a measured shot hit: a place, a place with its uncertainty, a class of places, or unknown.
+
+What is not known of the hit is integrated out over points that every set of parameters shares (`Aim`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.identification.parameters import FitError, is_distribution, read_distribution
+from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmetries_used
+from warpimpact.scene.model import Array
+from warpimpact.scene.scatter import EDGE, Distribution
+from warpimpact.scene.units import Length, quantity, quoted
+
+if TYPE_CHECKING:
+    from warpimpact.identification.fit import MeasuredShot, Sampling
+
+_AROUND = 24
+"""Points of the core's largest circle that tell whether it crosses the edge of a hole."""
+REPLICATES = 8
+"""Independent scramblings of the hit points: their spread tells how well the hits are integrated out."""
+
+BoolArray = NDArray[np.bool_]
+
+
+def _everywhere(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
+    return np.ones(np.broadcast(y, z).shape, dtype=bool)
+
+
+def _in_a_hole(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
+    return np.asarray(plate.pattern.is_hole(y, z))
+
+
+def _on_material(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
+    return np.logical_not(_in_a_hole(plate, core, y, z))
+
+
+def _on_an_edge(plate: Plate, core: Core, y: Array, z: Array) -> BoolArray:
+    """Whether the core's largest circle about the hit crosses the edge of a hole."""
+    angles = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
+    around = [
+        _in_a_hole(plate, core, y + core.max_radius * np.cos(one), z + core.max_radius * np.sin(one)) for one in angles
+    ]
+    holes = np.sum([*around, _in_a_hole(plate, core, y, z)], axis=0)
+    return np.asarray((holes > 0) & (holes < len(around) + 1))
+
+
+CLASSES: dict[str, Callable[[Plate, Core, Array, Array], BoolArray]] = {
+    "unknown": _everywhere,
+    "through a hole": _in_a_hole,
+    "between holes": _on_material,
+    "at an edge": _on_an_edge,
+}
+"""Classes of hit points: where the line of flight of the centre of mass crosses the front face. "at an edge" is where
+the core's largest circle crosses the edge of a hole."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A hit point that was measured: each coordinate a number [m] or a distribution."""
+
+    y: float | Distribution
+    z: float | Distribution
+
+    @property
+    def is_exact(self) -> bool:
+        return isinstance(self.y, float) and isinstance(self.z, float)
+
+    def at(self, share_y: Array, share_z: Array) -> tuple[Array, Array]:
+        """Points at uniform numbers."""
+
+        def along(value: float | Distribution, share: Array) -> Array:
+            if isinstance(value, float):
+                return np.full_like(share, value)
+            return value.quantile(np.clip(share, EDGE, 1.0 - EDGE))
+
+        return along(self.y, share_y), along(self.z, share_z)
+
+
+def read_hit(given: Any, place: str) -> str | Place:
+    """A class, or the place of a hit."""
+    if isinstance(given, str):
+        if given not in CLASSES:
+            meant = get_close_matches(given, CLASSES, n=1)
+            hint = f'; did you mean "{meant[0]}"?' if meant else ""
+            allowed = ", ".join(f'"{one}"' for one in CLASSES)
+            raise FitError(f"{place}: got {quoted(given)}, but it must be {allowed}, or a table with y and z{hint}")
+        return given
+    if not isinstance(given, dict) or set(given) != {"y", "z"}:
+        raise FitError(f"{place}: got {quoted(given)}, but it must be the name of a class, or a table with y and z")
+    read = quantity(Length)
+    values: dict[str, float | Distribution] = {}
+    for axis, value in given.items():
+        if is_distribution(value):
+            values[axis] = read_distribution(read, value, f"{place}.{axis}")
+            continue
+        try:
+            values[axis] = float(read(value))
+        except ValueError as error:
+            raise FitError(f"{place}.{axis}: {error}") from None
+    return Place(**values)
+
+
+@dataclass(frozen=True)
+class Aim:
+    """The points over which one shot is integrated, at one scene.
+
+    Attributes:
+        shots: with all images, shape [points].
+        group: symmetries, by which the images of a shot follow each other; `computed` are the first of each group.
+        weight: 1 where a point is of the shot's class, else 0, shape [points].
+        replicates: the computed shots are dealt out to so many independent scramblings in turn.
+    """
+
+    shots: Shots
+    group: tuple[Symmetry, ...]
+    weight: Array
+    replicates: int
+
+    @property
+    def computed(self) -> Shots:
+        return self.shots[:: len(self.group)]
+
+    def of(self, hit: str | Place, plate: Plate, core: Core) -> Aim:
+        """The same points for another class."""
+        inside = CLASSES[hit](plate, core, self.shots.hit_y, self.shots.hit_z) if isinstance(hit, str) else None
+        weight = np.ones(len(self.shots)) if inside is None else inside.astype(np.float64)
+        return replace(self, weight=weight)
+
+
+def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling) -> Aim:
+    """Points for a shot: the same numbers at every set of parameters, spread over the cell of the plate."""
+    placed = isinstance(shot.hit, Place)
+    turned = any(name != "velocity" for name in shot.scatter.given)
+    solid = plate.open_area == 0.0 and plate.size is None
+    alone = not shot.scatter.given and (solid or (isinstance(shot.hit, Place) and shot.hit.is_exact))
+    count = 1 if alone else sampling.hits
+    replicates = 1 if alone else REPLICATES
+    hits = Hits(count=count, seed=sampling.seed, irreducible=not (placed or turned or alone), replicates=replicates)
+    group = symmetries_used(shot.impact, hits, plate)
+    hits = hits.model_copy(update={"count": count * len(group)})
+    sampler = Sampler(shot.impact, hits, plate, shot.scatter, replicates)
+    shots = sampler.shots(0, len(sampler))
+    if isinstance(shot.hit, Place):
+        shares = (at / side + 0.5 for at, side in zip((shots.hit_y, shots.hit_z), plate.sampled_cell, strict=True))
+        hit_y, hit_z = shot.hit.at(*shares)
+        shots = replace(shots, hit_y=hit_y, hit_z=hit_z)
+    return Aim(shots, group, np.ones(len(shots)), replicates).of(shot.hit, plate, core)

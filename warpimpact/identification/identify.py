@@ -1,0 +1,207 @@
+"""From a fit to its posterior: rounds of sets of parameters, kept on the disk as they come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.campaign.compute import made_by
+from warpimpact.campaign.parts import claimed
+from warpimpact.campaign.run import Interrupted
+from warpimpact.identification.evaluate import evaluate
+from warpimpact.identification.fit import Fit, Sampling
+from warpimpact.identification.likelihood import Score
+from warpimpact.identification.parameters import FitError
+from warpimpact.identification.posterior import Sampled, to_datatree
+from warpimpact.identification.store import Store
+from warpimpact.results import posterior as files
+from warpimpact.results.files import OutputError
+from warpimpact.statistics.importance import LARGEST_K, Sampler
+
+Array = NDArray[np.float64]
+
+FIRST_SHARE, ROUNDS = 0.25, 8
+"""Share of the sets that is drawn from the prior, and how many rounds draw the others."""
+DISCREPANCIES = 4
+"""Scales of discrepancy per set of parameters: they need no runs of their own."""
+BATCH = 32
+"""Sets per file on the disk."""
+FARTHEST = 5.0
+"""Standard deviations, discrepancy included, by which the best set of the prior may miss a number."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far a fit is.
+
+    Attributes:
+        done, total: sets of parameters; `total` is the most that is computed.
+        resumed: sets that an earlier call had computed.
+        effective, pareto_k: of the weights so far; NaN before the first round ends.
+        misfit: smallest sum over shots of Σ (miss/σ)² so far.
+    """
+
+    done: int
+    total: int
+    resumed: int
+    effective: float
+    pareto_k: float
+    misfit: float
+
+
+Follow = Callable[[Standing], None]
+
+
+def identify_to_file(
+    fit: Fit,
+    output: Path,
+    *,
+    device: str = "auto",
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Follow | None = None,
+) -> None:
+    """Compute the posterior of a fit into a file; what is computed is on the disk at once, in `output`.parts.
+
+    Raises:
+        OutputError: something cannot be written, must not be overwritten or is no part of this fit.
+        FitError: the priors exclude what was measured.
+        Interrupted: by the keyboard; what is saved can be resumed.
+    """
+    made = made_by(device)
+    with claimed(output):
+        store = Store(output, {"fit": fit.text, **made})
+        store.begin(resume=resume, overwrite=overwrite)
+        try:
+            sampled = sample(fit, device=device, store=store, progress=progress)
+            files.write(to_datatree(fit, sampled, made), output)
+        except KeyboardInterrupt:
+            kept = f"{store.count} batches are saved in {store.folder}; continue with --resume"
+            raise Interrupted(f"interrupted; {kept if store.count else 'nothing is saved'}") from None
+        except (FitError, OutputError):
+            if not store.count:
+                store.discard()
+            raise
+        store.discard()
+
+
+def sample(fit: Fit, *, device: str = "auto", store: Store | None = None, progress: Follow | None = None) -> Sampled:
+    """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn."""
+    plan, follow = fit.sampling, progress or (lambda standing: None)
+    sampler = Sampler(len(fit.parameters), shared(fit), plan.seed)
+    work = _Work(fit, device, store, follow)
+    for count in rounds(plan):
+        points = sampler.propose(count)
+        sampler.tell(work.round(points))
+        weights = sampler.weighed()
+        if len(sampler.points) == count:
+            _check_reach(fit, work.scores())
+        effective = weights.effective(DISCREPANCIES)
+        work.tell(effective, weights.pareto_k)
+        if effective >= plan.effective and weights.pareto_k <= LARGEST_K:
+            break
+    return Sampled(sampler.points, work.scores(), sampler.weighed(), DISCREPANCIES)
+
+
+def shared(fit: Fit) -> list[tuple[int, int]]:
+    """How many numbers blocks of draws share: those that make a scene of their own, then all that need runs."""
+    scenes = sum(not one.is_column for one in fit.parameters)
+    return [(scenes, fit.sampling.shared * DISCREPANCIES), (len(fit.scene_parameters), DISCREPANCIES)]
+
+
+def rounds(plan: Sampling) -> list[int]:
+    """Draws of the first round, from the prior, and of the others; whole blocks."""
+    block = plan.shared * DISCREPANCIES
+    blocks = plan.sets // plan.shared
+    first = max(1, int(FIRST_SHARE * blocks))
+    each = max(1, (blocks - first) // ROUNDS)
+    return [first * block, *[each * block] * ROUNDS]
+
+
+class _Work:
+    """Scores sets in batches, and knows what was computed before."""
+
+    def __init__(self, fit: Fit, device: str, store: Store | None, follow: Follow) -> None:
+        self._fit, self._device, self._store, self._follow = fit, device, store, follow
+        self._total = sum(rounds(fit.sampling)) // DISCREPANCIES
+        self._parts: list[list[Score]] = []
+        self._batch, self._resumed, self.done = 0, 0, 0
+        self._effective, self._pareto_k, self._misfit = np.nan, np.nan, np.inf
+
+    def round(self, points: Array) -> Array:
+        """Score the sets of one round; ln of their likelihood, shape [sets]."""
+        found: list[Array] = []
+        for first in range(0, len(points), BATCH * DISCREPANCIES):
+            some = points[first : first + BATCH * DISCREPANCIES]
+            scores = self._scores_of(some)
+            self._parts.append(scores)
+            self.done += len(some) // DISCREPANCIES
+            self._misfit = min(self._misfit, float(sum(one.misfit for one in scores).min()))  # type: ignore[union-attr]
+            found.append(np.sum([one.log_likelihood for one in scores], axis=0))
+            self._say()
+        return np.concatenate(found)
+
+    def _scores_of(self, points: Array) -> list[Score]:
+        batch, self._batch = self._batch, self._batch + 1
+        stored = None if self._store is None else self._store.load(batch)
+        if stored is not None and np.array_equal(stored["points"], points):
+            self._resumed += len(points) // DISCREPANCIES
+            return [
+                Score(**{f.name: stored[f"{f.name}_{place}"] for f in fields(Score)})
+                for place in range(len(self._fit.shots))
+            ]
+        scores = evaluate(self._fit, points, seed=batch, device=self._device)
+        if self._store is not None:
+            arrays = {
+                f"{f.name}_{place}": getattr(one, f.name) for place, one in enumerate(scores) for f in fields(Score)
+            }
+            self._store.save(batch, {"points": points, **arrays})
+        return scores
+
+    def scores(self) -> list[Score]:
+        """One score per shot over all sets so far."""
+        return [Score.joined([part[place] for part in self._parts]) for place in range(len(self._fit.shots))]
+
+    def tell(self, effective: float, pareto_k: float) -> None:
+        self._effective, self._pareto_k = effective, pareto_k
+        self._say()
+
+    def _say(self) -> None:
+        self._follow(Standing(self.done, self._total, self._resumed, self._effective, self._pareto_k, self._misfit))
+
+
+def _check_reach(fit: Fit, scores: list[Score]) -> None:
+    """Refuse priors of which no set comes near what was measured.
+
+    Raises:
+        FitError: names the shot and how far the nearest set is.
+    """
+    for shot, score in zip(fit.shots, scores, strict=True):
+        sets = len(score.misfit)
+        if not np.isfinite(score.misfit).any():
+            raise FitError(
+                f'the priors exclude shot "{shot.name}": in {sets} sets of parameters no core ended as it did'
+            )
+        if not shot.observations:
+            continue
+        nearest = int(score.misfit.argmin())
+        largest = {kind: fit.discrepancy.get(kind, 0.0) for kind in ("velocity", "angle")} | {
+            str(one.path[1]): float(one.prior.quantile(np.array(0.99)))
+            for one in fit.parameters
+            if one.path[0] == "discrepancy"
+        }
+        missed = [
+            (abs(float(one.miss(score.best[nearest, place]))) / np.hypot(one.std, largest[one.kind]), one, place)
+            for place, one in enumerate(shot.observations)
+        ]
+        worst, one, place = max(missed, key=lambda told: told[0])
+        if worst > FARTHEST:
+            raise FitError(
+                f'the priors exclude shot "{shot.name}": the nearest of {sets} sets of parameters has {one.label} = '
+                f"{one.shown(score.best[nearest, place]):.4g} instead of {one.shown(one.value):.4g}, {worst:.3g} "
+                "standard deviations off with the largest discrepancy that its prior expects; widen the priors"
+            )

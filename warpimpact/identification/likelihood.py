@@ -1,0 +1,191 @@
+"""How well computed shots explain a measured one: the likelihood with the hit point integrated out.
+
+    L = Σ_h w_h S_h N(measured | computed_h, σ² + δ²) / Σ_h w_h S_h
+
+over points h of the cell: w is 1 in the class of the hit, S is 1 where the shot would have been measured (selection), σ
+is the uncertainty of the measurement and δ the discrepancy of the model. Given the parameters, shots are independent:
+their ln L add up. So are the discrepancies of different numbers; a bias that all shots share is not part of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.identification.hits import Aim
+from warpimpact.identification.measured import Observation
+from warpimpact.kernels.status import Status
+from warpimpact.results import variables as v
+from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.solver.simulate import Outcomes
+
+Array = NDArray[np.float64]
+
+KEPT = 4
+"""Hit points that are kept per set and shot, of the posterior and of the prediction."""
+
+
+@dataclass(frozen=True)
+class Data:
+    """What was measured of a shot, and on which condition.
+
+    Attributes:
+        selection: what had to be true of the shot so that it was measured.
+        standoffs: of the record [m].
+    """
+
+    observations: tuple[Observation, ...]
+    status: str | None
+    selection: tuple[Measure, ...] = ()
+    standoffs: tuple[float, ...] = ()
+
+    @property
+    def values(self) -> Array:
+        """The measured numbers, shape [observations]."""
+        return np.array([one.value for one in self.observations])
+
+    def miss(self, computed: Array) -> Array:
+        """Computed less measured along the last axis, of the same shape."""
+        missed = np.empty_like(computed)
+        for place, one in enumerate(self.observations):
+            missed[..., place] = one.miss(computed[..., place])
+        return missed
+
+    def spread(self, discrepancy: Mapping[str, Array]) -> Array:
+        """√(σ² + δ²), shape [sets, observations]."""
+        if not self.observations:
+            return np.ones((1, 0))
+        return np.stack([np.hypot(one.std, discrepancy[one.kind]) for one in self.observations], axis=-1)
+
+
+@dataclass(frozen=True)
+class Score:
+    """How one shot fits some sets of parameters; SI and radians.
+
+    Attributes:
+        log_likelihood: shape [sets].
+        noise: standard error of it that the finite number of hit points leaves, shape [sets].
+        misfit: smallest Σ (miss/σ)² over the hit points, shape [sets]; infinite where no shot has the numbers.
+        best: computed numbers at that hit, shape [sets, observations]; best_hit: its place [m], shape [sets, 2].
+        fitted, fitted_hit: computed numbers and hits drawn from their posterior, shapes [sets, kept, observations] and
+            [sets, kept, 2].
+        predicted: numbers that another such shot would show, with uncertainty and discrepancy, NaN where it would show
+            none; shape [sets, kept, observations].
+    """
+
+    log_likelihood: Array
+    noise: Array
+    misfit: Array
+    best: Array
+    best_hit: Array
+    fitted: Array
+    fitted_hit: Array
+    predicted: Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """One after the other along the sets."""
+        return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
+
+    def __getitem__(self, which: slice | NDArray[np.int64]) -> Self:
+        return type(self)(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
+
+
+def score(
+    data: Data, aim: Aim, outcomes: Outcomes, discrepancy: Mapping[str, Array], rng: np.random.Generator
+) -> Score:
+    """Score sets of parameters against one measured shot.
+
+    Args:
+        outcomes: of all points of the aim at one set after the other, images included, shape [sets · points].
+        discrepancy: by kind, each of shape [sets].
+        rng: draws the hits that are kept.
+    """
+    points = len(aim.weight)
+    sets = len(outcomes.status) // points
+    computed = np.empty((sets, points, len(data.observations)))
+    for place, one in enumerate(data.observations):
+        computed[:, :, place] = one.of(outcomes).reshape(sets, points)
+        if one.is_limit:
+            computed[:, :, place] = _median(computed[:, :, place], aim.weight)
+    status = outcomes.status.reshape(sets, points)
+    counts = aim.weight * _counted(data, outcomes).reshape(sets, points)
+    miss, spread = data.miss(computed), data.spread(discrepancy)[:, None, :]
+    log = -0.5 * ((miss / spread) ** 2).sum(axis=-1) - np.log(np.sqrt(2.0 * np.pi) * spread).sum(axis=-1)
+    if data.status is not None:
+        log = np.where(status == STATUSES[data.status], log, -np.inf)
+    log = np.where((counts > 0.0) & ~np.isnan(log), log, -np.inf)
+    log_likelihood, noise = _integrated(log, counts, aim)
+    stds = np.array([one.std for one in data.observations])
+    misfits = np.where(np.isfinite(log), ((miss / stds) ** 2).sum(axis=-1), np.inf)
+    nearest, row = misfits.argmin(axis=1), np.arange(sets)
+    hits = np.stack([aim.shots.hit_y, aim.shots.hit_z], axis=-1)
+    relative = np.exp(log - np.where(np.isfinite(log), log, -1e300).max(axis=1, keepdims=True))
+    fitted, ahead = _drawn(relative, rng), _drawn(counts, rng)
+    with np.errstate(invalid="ignore"):
+        predicted = computed[row[:, None], ahead] + spread * rng.standard_normal((sets, KEPT, computed.shape[-1]))
+    return Score(
+        log_likelihood=log_likelihood,
+        noise=noise,
+        misfit=misfits[row, nearest],
+        best=computed[row, nearest],
+        best_hit=hits[nearest],
+        fitted=computed[row[:, None], fitted],
+        fitted_hit=hits[fitted],
+        predicted=predicted,
+    )
+
+
+def _counted(data: Data, outcomes: Outcomes) -> Array:
+    """1 where a shot would have been measured, shape [shots]: its computation did not fail, and the selection holds."""
+    kept = ~np.isin(outcomes.status, [status for status in Status if status.failed])
+    for condition in data.selection:
+        kept &= holds(condition, outcomes, data.standoffs)
+    return kept.astype(np.float64)
+
+
+def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) -> NDArray[np.bool_]:
+    """Whether a condition such as P(perforated) or P(bending_stress < 1.5 GPa) is true of each shot."""
+    if condition.kind == "share":
+        return np.asarray(outcomes.status == STATUSES[condition.variable])
+    values: Array = getattr(outcomes, condition.variable)
+    if condition.standoff is not None:
+        values = values[:, int(np.abs(np.subtract(standoffs, condition.standoff)).argmin())]
+    (variable,) = (one for one in v.HIT_NUMBERS if one == condition.variable)
+    shown = np.degrees(values) if variable.units == "degree" else values
+    return np.asarray(shown > condition.limit if condition.above else shown < condition.limit)
+
+
+def _median(values: Array, weight: Array) -> Array:
+    """Median over the points of the class, shape [sets, 1]; NaN without such a point."""
+    inside = values[:, weight > 0.0]
+    return np.median(inside, axis=1, keepdims=True) if inside.size else np.full((len(values), 1), np.nan)
+
+
+def _integrated(log: Array, counts: Array, aim: Aim) -> tuple[Array, Array]:
+    """ln of the mean over the points, and its standard error from the spread of the replicates; both [sets]."""
+    highest = np.where(np.isfinite(log), log, -1e300).max(axis=1)
+    relative = np.exp(log - highest[:, None]) * counts
+    total = counts.sum(axis=1)
+    images = len(aim.group)
+    replicate = np.arange(log.shape[1]) // images % aim.replicates
+    sums = np.stack([relative[:, replicate == one].sum(axis=1) for one in range(aim.replicates)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_likelihood = np.where(total > 0.0, highest + np.log(relative.sum(axis=1) / total), -np.inf)
+        spread = sums.std(axis=0, ddof=1) / sums.mean(axis=0) if aim.replicates > 1 else np.zeros(len(log))
+    log_likelihood = np.where(highest > -1e300, log_likelihood, -np.inf)
+    return log_likelihood, np.nan_to_num(spread / np.sqrt(aim.replicates), nan=np.inf)
+
+
+def _drawn(weights: Array, rng: np.random.Generator) -> NDArray[np.int64]:
+    """KEPT indices along the second axis in proportion to weights, shape [sets, KEPT]; 0 where all weights are 0."""
+    ends = np.cumsum(weights, axis=1)
+    places = rng.random((len(weights), KEPT)) * ends[:, -1:]
+    drawn: NDArray[np.int64] = np.stack(
+        [np.searchsorted(end, at, side="right") for end, at in zip(ends, places, strict=True)]
+    )
+    return np.asarray(np.minimum(drawn, weights.shape[1] - 1))

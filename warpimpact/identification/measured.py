@@ -1,0 +1,154 @@
+"""What was measured of a shot: numbers with their uncertainty in the names of the Dataset, and how the shot ended."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.identification.parameters import FitError
+from warpimpact.results import variables as v
+from warpimpact.results.measures import STATUSES
+from warpimpact.scene.units import Angle, Speed, quantity, quoted
+from warpimpact.solver.simulate import Outcomes
+
+Array = NDArray[np.float64]
+
+KINDS = {"m s-1": ("velocity", Speed), "degree": ("angle", Angle)}
+"""Kind of discrepancy and type of a number, by the units of its variable."""
+LIMIT_VELOCITY = v.Variable("limit_velocity", ("hit",), "m s-1", "impact velocity at which the core just perforates")
+"""It is a property of plate and core, not of one shot: of the hits of a class it is the median."""
+MEASURABLE = {
+    str(one): one for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW, LIMIT_VELOCITY)
+}
+
+
+@dataclass(frozen=True)
+class WithLimit(Outcomes):
+    """Outcomes with the limit velocity of every shot [m/s], shape [shots]; infinite where no velocity is enough."""
+
+    limit_velocity: Array
+
+
+@dataclass(frozen=True)
+class Observation:
+    """One measured number.
+
+    Attributes:
+        name: of the variable of the Dataset.
+        standoff: place of the stand-off in the record, None where the variable has none.
+        at: that stand-off [m].
+        value, std: the number and its standard uncertainty, SI and radians.
+    """
+
+    name: str
+    standoff: int | None
+    at: float | None
+    value: float
+    std: float
+
+    @property
+    def kind(self) -> str:
+        """Kind of its discrepancy."""
+        return KINDS[MEASURABLE[self.name].units][0]
+
+    @property
+    def label(self) -> str:
+        """Such as "yaw@50mm"."""
+        return self.name if self.at is None else f"{self.name}@{self.at * 1e3:.10g}mm"
+
+    @property
+    def units(self) -> str:
+        """Those of the Dataset."""
+        return MEASURABLE[self.name].units
+
+    def shown(self, value: Any) -> Any:
+        """Values in the units of the Dataset."""
+        return np.degrees(value) if self.kind == "angle" else value
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether it is a limit velocity."""
+        return self.name == LIMIT_VELOCITY
+
+    def of(self, outcomes: Outcomes) -> Array:
+        """The computed number of every shot, shape [shots]; NaN where there is none."""
+        column: Array = getattr(outcomes, self.name)
+        return column if self.standoff is None else column[:, self.standoff]
+
+    def miss(self, computed: Array) -> Array:
+        """Computed less measured, of the same shape; an angle the short way round."""
+        difference = computed - self.value
+        return np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi if self.kind == "angle" else difference
+
+
+def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[tuple[Observation, ...], str | None]:
+    """The table `measured` of a shot: numbers, and how it ended.
+
+    Raises:
+        FitError: names the key.
+    """
+    if not isinstance(given, dict) or not given:
+        raise FitError(f"{place}: is missing, but a fit needs what was measured, such as residual_velocity")
+    observations: list[Observation] = []
+    status = None
+    for name, value in given.items():
+        if name == "status":
+            status = _status(value, f"{place}.status")
+            continue
+        if name not in MEASURABLE:
+            allowed = (*MEASURABLE, "status")
+            meant = get_close_matches(name, allowed, n=1)
+            hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(allowed)}"
+            raise FitError(f"{place}: got the unknown key {quoted(name)}; {hint}")
+        observations += _numbers(name, value, standoffs, f"{place}.{name}")
+    if status not in (None, "perforated", "missed") and observations:
+        raise FitError(
+            f'{place}.status: got "{status}" beside {observations[0].label}, but only a core that passed the plate has '
+            "that number"
+        )
+    return tuple(observations), status
+
+
+def _status(value: Any, place: str) -> str:
+    if value not in STATUSES:
+        raise FitError(f"{place}: got {quoted(value)}, but it must be one of {', '.join(STATUSES)}")
+    return str(value)
+
+
+def _numbers(name: str, given: Any, standoffs: Sequence[float], place: str) -> list[Observation]:
+    if not isinstance(given, dict) or set(given) != {"value", "std"}:
+        raise FitError(
+            f"{place}: got {quoted(given)}, but it must be a table of the value and its standard uncertainty, such as "
+            '{ value = "714 m/s", std = "8 m/s" }'
+        )
+    if "standoff" not in MEASURABLE[name].dims:
+        return [_observation(name, (None, None), given["value"], given["std"], place)]
+    values, stds = (given[key] if isinstance(given[key], list) else [given[key]] for key in ("value", "std"))
+    stds = stds * len(values) if len(stds) == 1 else stds
+    if not len(values) == len(stds) == len(standoffs):
+        raise FitError(
+            f"{place}: got {len(values)} values and {len(stds)} std at {len(standoffs)} stand-offs, but each stand-off "
+            "of [record] takes one; nan stands for one that was not measured"
+        )
+    return [
+        _observation(name, (index, at), value, std, place)
+        for index, (at, value, std) in enumerate(zip(standoffs, values, stds, strict=True))
+        if not (isinstance(value, float) and math.isnan(value))
+    ]
+
+
+def _observation(name: str, standoff: tuple[int | None, float | None], value: Any, std: Any, place: str) -> Observation:
+    read = quantity(KINDS[MEASURABLE[name].units][1])
+    try:
+        number, spread = float(read(value)), float(read(std))
+    except ValueError as error:
+        raise FitError(f"{place}: {error}") from None
+    if spread <= 0.0:
+        raise FitError(f"{place}.std: got {quoted(std)}, but no measurement is exact: it must be greater than 0")
+    return Observation(name, *standoff, number, spread)

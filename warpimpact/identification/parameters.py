@@ -1,0 +1,242 @@
+"""Parameters of a fit: which numbers of the scene are unknown, their priors, and the scene at some values of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Annotated, Any, get_args, get_origin
+
+import numpy as np
+from pydantic import BeforeValidator, TypeAdapter, ValidationError
+
+from warpimpact.campaign.text import CampaignError
+from warpimpact.scene import AnyCore, Interaction, Plate
+from warpimpact.scene.model import Array, Model
+from warpimpact.scene.scatter import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
+from warpimpact.scene.units import quoted
+from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path
+
+TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": AnyCore}
+"""Tables of the scene whose numbers may be parameters."""
+_DISTRIBUTION: TypeAdapter[Distribution] = TypeAdapter(AnyDistribution)
+_ALONG = ("y", "z")
+
+
+class FitError(CampaignError):
+    """A fit that cannot be computed: one sentence naming file, field, value and what is allowed."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An unknown number of the scene, or the scale of a discrepancy.
+
+    Attributes:
+        path: of its key in the fit file, such as ("plate", "pattern", "spacing", 0).
+        name: short, such as "spacing_y".
+        unit: SI unit, "rad" of an angle, "" of a number.
+        prior: in SI and radians.
+    """
+
+    path: Path
+    name: str
+    unit: str
+    prior: Distribution
+
+    def at(self, normal: Array) -> Array:
+        """Values at standard normal numbers, of their shape: the prior is normal there."""
+        from scipy.special import ndtr  # a while to import
+
+        return self.prior.quantile(np.clip(ndtr(normal), EDGE, 1.0 - EDGE))
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Smallest and largest value that can be drawn."""
+        low, high = self.prior.quantile(np.array([EDGE, 1.0 - EDGE]))
+        return float(low), float(high)
+
+    @property
+    def is_column(self) -> bool:
+        """Whether its values may differ from shot to shot of one computation."""
+        return self.path in COLUMNS or self.path in UNITS_OF_EXPOSURE or self.path[0] == "discrepancy"
+
+
+def read_priors(prior: Mapping[str, Any], tables: Mapping[str, Any], name: str) -> list[Parameter]:
+    """The parameters of a table [prior].
+
+    Args:
+        prior: nested as the tables of the scene are, with a distribution in the place of each unknown number.
+        tables: those of the scene, which say which shape a core or a pattern has.
+        name: of the file.
+
+    Raises:
+        FitError: names the key.
+    """
+    parameters: list[Parameter] = []
+    for path, given in _distributions(prior, (), name):
+        place = f"{name}: prior.{dotted(path)}"
+        read = _reader(path, tables, place)
+        parameters.append(Parameter(path, "", read.unit, read_distribution(read, given, place)))
+    names = [_short(one.path) for one in parameters]
+    full = ["_".join(map(str, one.path)) for one in parameters]
+    chosen = [short if names.count(short) == 1 else long for short, long in zip(names, full, strict=True)]
+    return [Parameter(one.path, own, one.unit, one.prior) for one, own in zip(parameters, chosen, strict=True)]
+
+
+def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distribution:
+    """A distribution of a quantity, in SI.
+
+    Raises:
+        FitError: names the place.
+    """
+    try:
+        return _DISTRIBUTION.validate_python({name: _in_si(read, name, part) for name, part in given.items()})
+    except ValidationError as error:
+        told = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in told["loc"] if part != given.get("distribution"))
+        complaint = str(told.get("ctx", {}).get("error", told["msg"]))
+        raise FitError(f"{place}{'.' if where else ''}{where}: got {quoted(dict(given))}, but: {complaint}") from None
+    except ValueError as error:
+        raise FitError(f"{place}.{error}") from None
+
+
+def _in_si(read: Any, name: str, part: Any) -> Any:
+    """A parameter of a distribution, which may have the unit of its quantity."""
+    if name in PURE_NUMBERS:
+        return part
+    try:
+        return [read(one) for one in part] if isinstance(part, list) else read(part)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+
+
+def is_distribution(value: Any) -> bool:
+    return isinstance(value, Mapping) and "distribution" in value
+
+
+def _distributions(node: Any, path: Path, name: str) -> Iterator[tuple[Path, Mapping[str, Any]]]:
+    if is_distribution(node):
+        yield path, node
+    elif isinstance(node, Mapping):
+        for key, inner in node.items():
+            yield from _distributions(inner, (*path, key), name)
+    elif isinstance(node, list):
+        for index, inner in enumerate(node):
+            yield from _distributions(inner, (*path, index), name)
+    elif not isinstance(path[-1], int):  # in a list a fixed number may stand beside an unknown one
+        raise FitError(
+            f"{name}: prior.{dotted(path)}: got {quoted(node)}, but a prior is a distribution such as "
+            '{ distribution = "uniform", low = 1, high = 2 }; a known value belongs in the table of the scene'
+        )
+
+
+def dotted(path: Path) -> str:
+    """A path as a person writes it."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).removeprefix(".")
+
+
+def _short(path: Path) -> str:
+    if isinstance(path[-1], str):
+        return path[-1]
+    last = _ALONG[path[-1]] if path[-2] in ("spacing", "size") else path[-1]
+    return f"{path[-2]}_{last}"
+
+
+def _reader(path: Path, tables: Mapping[str, Any], place: str) -> Any:
+    """The reader of the quantity at a path of the scene."""
+    annotation: Any = TABLES.get(str(path[0]))
+    if annotation is None:
+        raise FitError(f'{place}: got the table "{path[0]}", but a prior belongs in one of {", ".join(TABLES)}')
+    node: Any = tables.get(str(path[0]), {})
+    for part in path[1:]:
+        if isinstance(part, int):
+            annotation = _element(annotation, part)
+            continue
+        model = _model(annotation, node)
+        fields = {} if model is None else model.model_fields
+        if part not in fields:
+            meant = get_close_matches(part, fields, n=1)
+            hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(fields)}"
+            raise FitError(f'{place}: got the unknown key "{part}"; {hint}')
+        field = fields[part]
+        annotation = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        node = node.get(part, {}) if isinstance(node, Mapping) else {}
+    found = _quantity(annotation)
+    if found is None:
+        raise FitError(f"{place}: is no number, but only a number can have a prior")
+    return found
+
+
+def _model(annotation: Any, node: Any) -> type[Model] | None:
+    """The model that a table is read as: of several shapes, the one that it names."""
+    models = list(_models(annotation))
+    shape = node.get("shape", "none") if isinstance(node, Mapping) else "none"
+    named = [one for one in models if getattr(one.model_fields.get("shape"), "default", None) == shape]
+    return next(iter(named or models), None)
+
+
+def _models(annotation: Any) -> Iterator[type[Model]]:
+    if isinstance(annotation, type) and issubclass(annotation, Model):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from _models(inner)
+
+
+def _element(annotation: Any, index: int) -> Any:
+    """Type of an entry of a tuple."""
+    if get_origin(annotation) is tuple:
+        inner = get_args(annotation)
+        return inner[0] if len(inner) == 2 and inner[1] is Ellipsis else inner[min(index, len(inner) - 1)]
+    return next((found for one in get_args(annotation) if (found := _element(one, index)) is not None), None)
+
+
+def _quantity(annotation: Any) -> Any:
+    """The reader in a type such as `PositiveLength | None`."""
+    for mark in getattr(annotation, "__metadata__", ()):
+        if isinstance(mark, BeforeValidator) and hasattr(mark.func, "unit"):
+            return mark.func
+    if get_origin(annotation) is tuple:
+        return None
+    return next((found for one in get_args(annotation) if (found := _quantity(one)) is not None), None)
+
+
+def with_medians(table: Any, prior: Any, parameters: Sequence[Parameter], path: Path = ()) -> Any:
+    """Tables of the scene with the median of every prior in its place."""
+    if is_distribution(prior):
+        (parameter,) = (one for one in parameters if one.path == path)
+        return as_read(parameter, float(parameter.prior.quantile(np.array(0.5))))
+    if isinstance(prior, Mapping):
+        own = dict(table) if isinstance(table, Mapping) else {}
+        return own | {key: with_medians(own.get(key), inner, parameters, (*path, key)) for key, inner in prior.items()}
+    if isinstance(prior, list):
+        return [with_medians(None, inner, parameters, (*path, index)) for index, inner in enumerate(prior)]
+    return prior
+
+
+def put(tables: Mapping[str, Any], path: Path, value: Any) -> dict[str, Any]:
+    """Tables with one value replaced; what lies beside it is shared."""
+
+    def inner(node: Any, rest: Path) -> Any:
+        if not rest:
+            return value
+        if isinstance(rest[0], int):
+            return [inner(one, rest[1:]) if index == rest[0] else one for index, one in enumerate(node)]
+        return {**node, rest[0]: inner(node.get(rest[0], {}), rest[1:])}
+
+    replaced: dict[str, Any] = inner(tables, path)
+    return replaced
+
+
+def as_read(parameter: Parameter, value: float) -> Any:
+    """A value in SI as the tables hold it."""
+    return f"{value!r} rad" if parameter.unit == "rad" else value
+
+
+def corners(parameters: Sequence[Parameter]) -> Iterator[dict[Path, float]]:
+    """Extreme values of the parameters: each alone at its ends with all others at their medians, then all together."""
+    medians = {one.path: float(one.prior.quantile(np.array(0.5))) for one in parameters}
+    for one in parameters:
+        for end in one.ends:
+            yield {**medians, one.path: end}
+    for index in range(min(2 ** len(parameters), 256)):
+        yield {one.path: one.ends[index >> place & 1] for place, one in enumerate(parameters)}

@@ -1,0 +1,327 @@
+"""The posterior of a fit as a tree of Datasets, and numbers that say what it is worth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from warpimpact.campaign.drawn import OF_THE_MATERIAL
+from warpimpact.identification.evaluate import data_of, discrepancies
+from warpimpact.identification.fit import Fit
+from warpimpact.identification.likelihood import KEPT, Score
+from warpimpact.identification.parameters import Parameter
+from warpimpact.results import attributes as attr
+from warpimpact.results import posterior as files
+from warpimpact.results.variables import HIT_Y, HIT_Z
+from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
+
+Array = NDArray[np.float64]
+
+LARGEST_NOISE = 0.5
+"""Standard error of ln L, over all shots, up to which the hits count as integrated out."""
+ALIKE = 0.15
+"""Largest distance between the distribution functions of prior and posterior at which they count as alike."""
+WIDE = 0.6
+"""Share of the prior within the posterior's 90 % interval (0.9 if nothing was learnt) above which little was learnt."""
+STRONG = 0.7
+"""Correlation above which two parameters are told of as a combination."""
+_OF_PLATE = {path[1] for path in OF_THE_MATERIAL if path[0] == "plate"}
+_DENSITY_DRAWS = 400
+"""Predicted rows whose probability is compared with that of the measured one."""
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Sets of parameters with their scores and weights.
+
+    Attributes:
+        points: standard normal numbers, shape [sets, parameters].
+        scores: one per shot.
+        block: sets in a row that differ in the scales of discrepancy alone.
+    """
+
+    points: Array
+    scores: list[Score]
+    weights: Weights
+    block: int = 1
+
+    @property
+    def effective(self) -> float:
+        return self.weights.effective(self.block)
+
+
+def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.DataTree:
+    """Gather a posterior, in the units of the Datasets.
+
+    Args:
+        made: versions and device.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(2,)))
+    which = resampled(sampled.weights.values, fit.sampling.draws, rng)
+    own = rng.integers(KEPT, size=len(which))
+    hits = {
+        name: _of_shots(sampled, lambda one, axis=axis: one.fitted_hit[which, own, axis])
+        for axis, name in enumerate(files.HITS)
+    }
+    likelihood = np.stack([one.log_likelihood for one in sampled.scores], axis=-1)
+    noise = np.sqrt(sum(one.noise[which] ** 2 for one in sampled.scores))
+    groups: dict[str, xarray.Dataset] = {
+        "posterior": _parameters(fit, sampled.points[which], "draw").assign(
+            {name: (("draw", "shot"), values, _place(name)) for name, values in hits.items()}
+        ),
+        "prior": _parameters(fit, rng.standard_normal((fit.sampling.draws, len(fit.parameters))), "draw"),
+        "sample_stats": xarray.Dataset(
+            {
+                "lp": ("draw", likelihood[which].sum(axis=1), {"long_name": "logarithm of the likelihood"}),
+                "hit_noise": ("draw", noise, {"long_name": "its standard error, by the number of hit points"}),
+                "set": ("draw", which, {"long_name": "place in the group sets"}),
+            }
+        ),
+        "log_likelihood": xarray.Dataset({files.MEASURED: (("draw", "shot"), likelihood[which])}),
+        "observed_data": _observed(fit),
+        "posterior_predictive": _computed(fit, sampled, which, own),
+    }
+    with_chain = {"posterior", "prior", "sample_stats", "log_likelihood", "posterior_predictive"}
+    groups = {
+        name: (
+            one.expand_dims(chain=[0]).assign_coords(draw=np.arange(one.sizes["draw"])) if name in with_chain else one
+        )
+        for name, one in groups.items()
+    }
+    groups["sets"] = _parameters(fit, sampled.points, "set").assign(
+        weight=("set", sampled.weights.values, {"long_name": "normalised importance weight"}),
+        log_likelihood=(("set", "shot"), likelihood),
+        misfit=(("set", "shot"), np.stack([one.misfit for one in sampled.scores], axis=-1)),
+    )
+    groups["best"] = _best(fit, sampled)
+    shots = {"shot": _names(fit)}
+    groups = {name: one.assign_coords(shots) if "shot" in one.dims else one for name, one in groups.items()}
+    return xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=_attributes(fit, sampled, made, noise)), **groups})
+
+
+def _names(fit: Fit) -> list[str]:
+    """Names of the shots, made different where they are not."""
+    names = [shot.name for shot in fit.shots]
+    return [name if names.count(name) == 1 else f"{name} [{place}]" for place, name in enumerate(names)]
+
+
+def _place(name: str) -> dict[str, str]:
+    return {"units": "m", "long_name": {"hit_y": HIT_Y, "hit_z": HIT_Z}[name].long_name}
+
+
+def _of_shots(sampled: Sampled, of: Any) -> Array:
+    return np.stack([of(one) for one in sampled.scores], axis=-1)
+
+
+def _shown(parameter: Parameter, values: Array) -> Array:
+    return np.degrees(values) if parameter.unit == "rad" else values
+
+
+def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
+    """Values of the parameters at standard normal numbers."""
+    return xarray.Dataset(
+        {
+            one.name: (dim, _shown(one, one.at(points[:, column])), _described(one))
+            for column, one in enumerate(fit.parameters)
+        }
+    )
+
+
+def _described(parameter: Parameter) -> dict[str, str]:
+    units = {"rad": "degree", "": "1", "m/s": "m s-1"}.get(parameter.unit, parameter.unit)
+    return {"units": units, files.PATH: json.dumps(parameter.path), "prior": parameter.prior.model_dump_json()}
+
+
+def _labels(fit: Fit) -> list[tuple[int, int]]:
+    """Shot and place in its observations of every measured number."""
+    return [(place, index) for place, shot in enumerate(fit.shots) for index in range(len(shot.observations))]
+
+
+def _along_observations(fit: Fit) -> dict[str, Any]:
+    names, ones = _names(fit), [fit.shots[place].observations[index] for place, index in _labels(fit)]
+    shots = [names[place] for place, _ in _labels(fit)]
+    return {
+        "observation": [f"{shot}: {one.label}" for shot, one in zip(shots, ones, strict=True)],
+        files.SHOT_OF: ("observation", shots),
+        files.UNITS_OF: ("observation", [one.units for one in ones]),
+    }
+
+
+def _observed(fit: Fit) -> xarray.Dataset:
+    ones = [fit.shots[place].observations[index] for place, index in _labels(fit)]
+    return xarray.Dataset(
+        {
+            files.MEASURED: ("observation", np.array([float(one.shown(one.value)) for one in ones])),
+            files.STD: ("observation", np.array([float(one.shown(one.std)) for one in ones])),
+        },
+        _along_observations(fit),
+    )
+
+
+def _numbers(fit: Fit, of: Any) -> Array:
+    """Numbers of all observations side by side, in the units of the Dataset: `of` gives those of a shot, SI."""
+    columns = [fit.shots[place].observations[index].shown(of(place)[..., index]) for place, index in _labels(fit)]
+    return np.stack(columns, axis=-1) if columns else np.empty((*of(0).shape[:-1], 0))
+
+
+def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], own: NDArray[np.int64]) -> xarray.Dataset:
+    """What another such shot would show, and what each draw computes at its hit."""
+    scores, over = sampled.scores, ("draw", "observation")
+    predicted = _numbers(fit, lambda place: scores[place].predicted[which, own])
+    fitted = _numbers(fit, lambda place: scores[place].fitted[which, own])
+    return xarray.Dataset(
+        {
+            files.MEASURED: (over, predicted, {"long_name": "of another such shot, measured"}),
+            files.FITTED: (over, fitted, {"long_name": "computed for this shot, at its hit"}),
+        },
+        _along_observations(fit),
+    )
+
+
+def _best(fit: Fit, sampled: Sampled) -> xarray.Dataset:
+    """The set with the smallest sum of the shots' misfits at their best hits."""
+    misfit = np.stack([one.misfit for one in sampled.scores], axis=-1)
+    best = int(misfit.sum(axis=1).argmin())
+    dataset = _parameters(fit, sampled.points[[best]], "set").isel(set=0)
+    hits = np.stack([one.best_hit[best] for one in sampled.scores])
+    return dataset.assign(
+        misfit=("shot", misfit[best], {"long_name": "sum of (computed − measured)² over the squared uncertainty"}),
+        hit_y=("shot", hits[:, 0], _place("hit_y")),
+        hit_z=("shot", hits[:, 1], _place("hit_z")),
+        measured=("observation", _numbers(fit, lambda place: sampled.scores[place].best[best])),
+    ).assign_coords(_along_observations(fit))
+
+
+def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Array) -> dict[str, Any]:
+    weights = sampled.weights
+    hit_noise = float(np.sqrt(np.mean(noise**2)))
+    rows = {
+        name: row_probability(fit, place, sampled)
+        for place, name in enumerate(_names(fit))
+        if fit.shots[place].observations
+    }
+    return {
+        attr.TITLE: fit.title,
+        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact identify",
+        files.FIT: fit.text,
+        files.MATERIAL: _material(fit),
+        **made,
+        attr.SEED: fit.sampling.seed,
+        files.EFFECTIVE: sampled.effective,
+        files.PARETO_K: weights.pareto_k,
+        files.HIT_NOISE: hit_noise,
+        files.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
+        files.EVIDENCE: weights.log_evidence,
+        "wanted_sample_size": fit.sampling.effective,
+        files.SETS: len(sampled.points) // sampled.block,
+        "hits": fit.sampling.hits,
+        "observations": fit.observed,
+        "row_probability": json.dumps(rows),
+    }
+
+
+def _material(fit: Fit) -> str:
+    scene = fit.scene_of(fit.shots[0])
+    plate = scene.target.plate.model_dump(include={str(name) for name in _OF_PLATE})
+    return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump()})
+
+
+def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:
+    """Whether weights and hits can be trusted."""
+    trusted = sampled.weights.pareto_k <= LARGEST_K and noise <= LARGEST_NOISE
+    return trusted and sampled.effective >= fit.sampling.effective
+
+
+def row_probability(fit: Fit, place: int, sampled: Sampled) -> float:
+    """Share of the rows that another such shot would show which are less probable than the measured one.
+
+    Their density is a mixture of normal distributions about the numbers that some sets predict, by their weights. A row
+    of a core that did not pass the plate counts as less probable.
+    """
+    shot, scored = fit.shots[place], sampled.scores[place]
+    rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(3, place)))
+    which = resampled(sampled.weights.values, 2000, rng)
+    rows = scored.predicted[which, rng.integers(KEPT, size=len(which))]
+    data = data_of(fit, shot)
+    spread = data.spread(discrepancies(fit, sampled.points[which]))
+    there = ~np.isnan(rows).any(axis=1)
+    if not there.any():
+        return 0.0
+    centres, widths = rows[there], np.sqrt(2.0) * spread[there]
+
+    def density(row: Array) -> float:
+        apart = centres - row
+        for index, one in enumerate(shot.observations):
+            apart[:, index] = one.miss(apart[:, index] + one.value)
+        return float(np.mean(np.exp(-0.5 * ((apart / widths) ** 2).sum(axis=1)) / widths.prod(axis=1)))
+
+    measured = density(data.values)
+    some = centres[:_DENSITY_DRAWS]
+    less = np.mean([density(row) <= measured for row in some])
+    return float(less * there.mean() + (1.0 - there.mean()))
+
+
+@dataclass(frozen=True)
+class Learnt:
+    """What the shots tell of one parameter.
+
+    Attributes:
+        distance: largest difference between the distribution functions of prior and posterior.
+        kept: share of the prior within the posterior's 90 % interval; 0.9 if nothing was learnt.
+        quantiles: 5, 50 and 95 % of the posterior, in the units of the file.
+    """
+
+    distance: float
+    kept: float
+    quantiles: tuple[float, float, float]
+    prior: tuple[float, float, float]
+
+    @property
+    def verdict(self) -> str:
+        if self.distance < ALIKE:
+            return "not determined by these shots"
+        return "hardly determined" if self.kept > WIDE else "determined"
+
+
+def learnt(tree: xarray.DataTree) -> dict[str, Learnt]:
+    """Prior and posterior compared, by parameter."""
+    prior, posterior = (tree[name].to_dataset() for name in ("prior", "posterior"))
+    found = {}
+    for name in parameters_of(tree):
+        before, after = (np.sort(one[str(name)].values.ravel()) for one in (prior, posterior))
+        grid = np.concatenate([before, after])
+        shares = [np.searchsorted(of, grid, side="right") / len(of) for of in (before, after)]
+        low, middle, high = np.quantile(after, [0.05, 0.5, 0.95])
+        kept = np.searchsorted(before, high, side="right") - np.searchsorted(before, low)
+        found[name] = Learnt(
+            float(np.abs(shares[0] - shares[1]).max()),
+            float(kept / len(before)),
+            (float(low), float(middle), float(high)),
+            tuple(float(one) for one in np.quantile(before, [0.05, 0.5, 0.95])),  # type: ignore[arg-type]
+        )
+    return found
+
+
+def together(tree: xarray.DataTree) -> list[tuple[str, str, float]]:
+    """Pairs of parameters of which the shots determine a combination: names, and their correlation in the posterior by
+    ranks, where it is strong."""
+    from scipy.stats import spearmanr
+
+    posterior, names = tree["posterior"].to_dataset(), parameters_of(tree)
+    pairs = [(one, other) for place, one in enumerate(names) for other in names[place + 1 :]]
+    found = [
+        (one, other, spearmanr(posterior[one].values.ravel(), posterior[other].values.ravel())) for one, other in pairs
+    ]
+    return [(one, other, float(told.statistic)) for one, other, told in found if abs(told.statistic) > STRONG]
+
+
+def parameters_of(tree: xarray.DataTree) -> Sequence[str]:
+    """Names of the parameters of a posterior."""
+    return [str(name) for name in tree["prior"].to_dataset().data_vars]

@@ -1,0 +1,105 @@
+"""What a fit has computed, on the disk: a folder beside the posterior, from which a later call goes on.
+
+POSTERIOR.nc.parts holds a manifest, which says what is computed, and a file per batch of sets with a checksum of the
+manifest in it. Batches follow from the fit and from earlier batches alone, so a resumed fit equals an undisturbed one.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.campaign.parts import difference, fingerprint, folder_of
+from warpimpact.results import files
+from warpimpact.results.files import OutputError
+
+_MANIFEST = "manifest.json"
+
+
+class Store:
+    """Batches of one fit, in a folder that is `claimed`.
+
+    Args:
+        output: the file of the posterior.
+        content: what decides every number of it.
+    """
+
+    def __init__(self, output: Path, content: Mapping[str, Any]) -> None:
+        self._output, self._content = output, json.loads(json.dumps(content))
+        self.folder = folder_of(output)
+        self._seal = fingerprint(self._content)
+
+    def begin(self, *, resume: bool, overwrite: bool) -> None:
+        """Take the folder, with what is in it if that is to be resumed.
+
+        Raises:
+            OutputError: something is there that must be neither resumed nor overwritten.
+        """
+        begun = self._begun()
+        if begun is not None and resume:
+            if changed := difference(begun, self._content):
+                raise OutputError(
+                    f"{self.folder}: cannot be resumed: {changed}; put it back, or begin anew with --overwrite"
+                )
+            return
+        if begun is not None and not overwrite:
+            raise OutputError(
+                f"{self.folder}: holds a fit that has not ended ({len(list(self._batches()))} batches); continue it "
+                "with --resume or begin anew with --overwrite"
+            )
+        if self._output.exists() and not overwrite:
+            raise OutputError(f"{self._output}: exists already; name another file or give --overwrite")
+        self.discard()
+        with files.aside(self.folder / _MANIFEST) as file:
+            file.write_text(json.dumps(self._content, indent=1), encoding="utf-8")
+
+    def _begun(self) -> Any:
+        """What was begun here, None if nothing was; a damaged manifest is nothing."""
+        try:
+            return json.loads((self.folder / _MANIFEST).read_bytes())
+        except (OSError, ValueError):
+            return None
+
+    def _batches(self) -> list[Path]:
+        return sorted(self.folder.glob("batch_*.npz"))
+
+    def _path(self, batch: int) -> Path:
+        return self.folder / f"batch_{batch:06d}.npz"
+
+    def load(self, batch: int) -> dict[str, NDArray[Any]] | None:
+        """A batch that was computed; None if it is not there, is damaged or is of another fit."""
+        try:
+            with np.load(self._path(batch), allow_pickle=False) as file:
+                arrays = dict(file)
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+            return None
+        return arrays if str(arrays.pop("seal", "")) == self._seal else None
+
+    def save(self, batch: int, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Put a batch on the disk.
+
+        Raises:
+            OutputError: it cannot be written.
+        """
+        with files.aside(self._path(batch)) as path, path.open("wb") as file:
+            np.savez(file, allow_pickle=False, **{"seal": np.array(self._seal), **arrays})
+
+    @property
+    def count(self) -> int:
+        """Batches on the disk."""
+        return len(self._batches())
+
+    def discard(self) -> None:
+        """Empty the folder."""
+        for path in (self.folder / _MANIFEST, *self._batches(), *self.folder.glob(".*.part")):
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)

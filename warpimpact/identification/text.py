@@ -1,0 +1,106 @@
+"""A posterior as text: parameters with their intervals, what the shots determine, and what the numbers are worth."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray
+
+from warpimpact.identification.posterior import LARGEST_NOISE, learnt, together
+from warpimpact.results import attributes as attr
+from warpimpact.results import posterior as files
+from warpimpact.statistics.importance import LARGEST_K
+
+UNITS = {
+    "Pa": ("GPa", 1e-9),
+    "m": ("mm", 1e3),
+    "s": ("µs", 1e6),
+    "kg": ("g", 1e3),
+    "degree": ("°", 1.0),
+    "1": ("", 1.0),
+}
+"""Units that people read, and the factor to them."""
+
+
+def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
+    """Unit of a parameter as it is shown, and the factor to it."""
+    units = str(array.attrs.get("units", "1"))
+    return UNITS.get(units, (units.replace(" s-1", "/s"), 1.0))
+
+
+def posterior_text(tree: xarray.DataTree) -> str:
+    """The whole of it."""
+    return "\n".join([*_parameters(tree), "", *_rows(tree), "", *_best(tree), "", *_worth(tree)])
+
+
+def _parameters(tree: xarray.DataTree) -> list[str]:
+    lines = [
+        str(tree.attrs[attr.TITLE]),
+        f"{'parameter':26}{'median':>9}  {'90 % interval':18}{'90 % of the prior':20}verdict",
+    ]
+    for name, one in learnt(tree).items():
+        unit, factor = unit_of(tree["posterior"][name])
+        low, middle, high = (factor * value for value in one.quantiles)
+        prior = f"{factor * one.prior[0]:.3g} to {factor * one.prior[2]:.3g}"
+        label = f"{name} [{unit}]" if unit else name
+        lines.append(f"{label:26}{middle:9.3g}  {f'{low:.3g} to {high:.3g}':18}{prior:20}{one.verdict}")
+    lines += [
+        f"{one} and {other} are determined together more than each alone: their correlation is {value:+.2f}"
+        for one, other, value in together(tree)
+    ]
+    return lines
+
+
+def _rows(tree: xarray.DataTree) -> list[str]:
+    """Measured numbers beside what is computed for them, and what another shot would show."""
+    observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
+    lines = [f"{'measured':42}{'':18}{'computed at its hit':22}{'another such shot':20}(90 % intervals)"]
+    for place, label in enumerate(observed["observation"].values if "observation" in observed else ()):
+        value, std = (float(observed[name][place]) for name in (files.MEASURED, files.STD))
+        spans = [
+            "{:.4g} to {:.4g}".format(*np.nanquantile(computed[name].values[..., place], [0.05, 0.95]))
+            for name in (files.FITTED, files.MEASURED)
+        ]
+        lines.append(f"{label!s:42}{f'{value:g} ± {std:g}':18}{spans[0]:22}{spans[1]:20}")
+    for shot, share in json.loads(str(tree.attrs["row_probability"])).items():
+        lines.append(
+            f"{shot}: {share:.2g} of the rows that another such shot would show are less probable than this one"
+        )
+    return lines
+
+
+def _best(tree: xarray.DataTree) -> list[str]:
+    best = tree["best"].to_dataset()
+    values = []
+    for name in learnt(tree):
+        unit, factor = unit_of(best[name])
+        values.append(f"{name} {factor * float(best[name]):.3g} {unit}".strip())
+    hits = ", ".join(
+        f"{shot} ({1e3 * float(best['hit_y'][place]):.2f}, {1e3 * float(best['hit_z'][place]):.2f}) mm"
+        for place, shot in enumerate(best["shot"].values)
+    )
+    return [
+        f"smallest misfit {float(best['misfit'].sum()):.3g} = "
+        f"{' + '.join(f'{value:.3g}' for value in best['misfit'].values)}, sum of squares over the uncertainties, at",
+        f"  {', '.join(values)}",
+        f"  hits: {hits}",
+    ]
+
+
+def _worth(tree: xarray.DataTree) -> list[str]:
+    told = tree.attrs
+    effective, k, noise = (float(told[name]) for name in (files.EFFECTIVE, files.PARETO_K, files.HIT_NOISE))
+    lines = [
+        f"{tree.attrs[files.SETS]} sets of parameters, effective sample size {effective:.0f}, Pareto k {k:.2f}, "
+        f"the hits leave ±{noise:.2g} in ln L"
+    ]
+    if told[files.CONVERGED]:
+        return lines
+    wanted = int(told["wanted_sample_size"])
+    causes = [
+        (effective < wanted, f"the effective sample size is below {wanted}: give more sets"),
+        (k > LARGEST_K, f"Pareto k is above {LARGEST_K}: some sets carry too much weight; give more sets"),
+        (noise > LARGEST_NOISE, f"the hits leave more than ±{LARGEST_NOISE} in ln L: give more hits"),
+    ]
+    return [*lines, "NOT CONVERGED: " + "; ".join(text for failed, text in causes if failed)]

@@ -1,0 +1,168 @@
+"""Figures of a posterior: pairs of parameters, measured against computed numbers, and where each shot hit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray
+from matplotlib.figure import Figure
+
+from warpimpact.identification.posterior import learnt, parameters_of
+from warpimpact.identification.reading import fit_from
+from warpimpact.identification.text import unit_of
+from warpimpact.results import attributes as attr
+from warpimpact.results import posterior as files
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+_BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.6"
+_MM = 1e3
+_POINTS = 600
+
+
+def save_posterior(tree: xarray.DataTree, folder: Path, stem: str) -> Iterator[Path]:
+    """Write the figures of a posterior as PNG; returns their paths."""
+    figures = {"pairs": pairs_figure, "measured": measured_figure, "hits": hits_figure}
+    for name, draw in figures.items():
+        path = folder / f"{stem}_{name}.png"
+        draw(tree).savefig(path, dpi=150)
+        yield path
+
+
+def _values(tree: xarray.DataTree, group: str, name: str) -> tuple[Array, str]:
+    """Draws of a parameter in the units that people read, and its label."""
+    array = tree[group].to_dataset()[name]
+    unit, factor = unit_of(array)
+    return factor * array.values.ravel(), f"{name.replace('_', ' ')}{f' [{unit}]' if unit else ''}"
+
+
+def pairs_figure(tree: xarray.DataTree) -> Figure:
+    """Every two parameters against each other, and each beside its prior."""
+    names = parameters_of(tree)
+    size = max(4.5, 1.75 * len(names))
+    figure = Figure(figsize=(size + 1.2, size + 0.9), layout="constrained")
+    figure.suptitle(f"{tree.attrs[attr.TITLE]}\nposterior (blue) and prior (grey); {_worth(tree)}")
+    panels = figure.subplots(len(names), len(names), squeeze=False)
+    told = learnt(tree)
+    for row, below in enumerate(names):
+        for column, across in enumerate(names):
+            axes = panels[row, column]
+            if column > row:
+                axes.remove()
+                continue
+            x, label_x = _values(tree, "posterior", across)
+            y, label_y = _values(tree, "posterior", below)
+            prior = _values(tree, "prior", across)[0]
+            if row == column:
+                _density(axes, prior, x)
+                axes.set_title(told[across].verdict.replace(" by these shots", ""), fontsize="x-small")
+                axes.set_yticks([])
+            else:
+                some = slice(None, None, max(1, len(x) // _POINTS))
+                axes.scatter(prior[some], _values(tree, "prior", below)[0][some], s=2, color=_GREY, alpha=0.25, lw=0)
+                axes.scatter(x[some], y[some], s=4, color=_BLUE, alpha=0.45, lw=0)
+                axes.set_ylim(_limits(_values(tree, "prior", below)[0], y))
+            axes.set_xlim(_limits(prior, x))
+            axes.tick_params(labelsize="x-small", labelbottom=row == len(names) - 1, labelleft=column == 0 and row > 0)
+            if row == len(names) - 1:
+                axes.set_xlabel(label_x.replace(" [", "\n["), fontsize="small")
+            if column == 0 and row > 0:
+                axes.set_ylabel(label_y.replace(" [", "\n["), fontsize="small")
+    return figure
+
+
+def _worth(tree: xarray.DataTree) -> str:
+    ended = "" if tree.attrs[files.CONVERGED] else ", NOT CONVERGED"
+    return f"effective sample size {tree.attrs[files.EFFECTIVE]:.0f}{ended}"
+
+
+def _limits(prior: Array, posterior: Array) -> tuple[float, float]:
+    low, high = np.quantile(np.concatenate([prior, posterior]), [0.002, 0.998])
+    return float(low - 0.03 * (high - low)), float(high + 0.03 * (high - low))
+
+
+def _density(axes: Axes, prior: Array, posterior: Array) -> None:
+    edges = np.linspace(*_limits(prior, posterior), 31).tolist()
+    axes.hist(prior, bins=edges, density=True, color=_GREY, alpha=0.5)
+    axes.hist(posterior, bins=edges, density=True, color=_BLUE, alpha=0.6)
+
+
+def measured_figure(tree: xarray.DataTree) -> Figure:
+    """Every measured number with its uncertainty beside what is computed for it: 50 and 90 % intervals."""
+    observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
+    units = [str(one) for one in observed[files.UNITS_OF].values] if files.UNITS_OF in observed else []
+    kinds = list(dict.fromkeys(units)) or ["1"]
+    counts = [max(1, units.count(kind)) for kind in kinds]
+    figure = Figure(figsize=(10.0, 2.6 + 0.55 * sum(counts)), layout="constrained")
+    figure.suptitle(f"{tree.attrs[attr.TITLE]}\nmeasured and computed, {_worth(tree)}")
+    panels = figure.subplots(len(kinds), 1, squeeze=False, gridspec_kw={"height_ratios": counts})[:, 0]
+    for axes, kind in zip(panels, kinds, strict=True):
+        rows = [place for place, unit in enumerate(units) if unit == kind]
+        labels = [str(observed["observation"].values[place]) for place in rows]
+        for line, place in enumerate(rows):
+            for offset, name, colour in ((-0.16, files.MEASURED, _GREY), (0.16, files.FITTED, _BLUE)):
+                values = computed[name].values[..., place].ravel()
+                values = values[np.isfinite(values)]
+                if len(values):
+                    low, quarter, three, high = np.quantile(values, [0.05, 0.25, 0.75, 0.95])
+                    axes.plot([low, high], [line + offset] * 2, color=colour, lw=1.5)
+                    axes.plot([quarter, three], [line + offset] * 2, color=colour, lw=5, solid_capstyle="butt")
+            value, std = (float(observed[name][place]) for name in (files.MEASURED, files.STD))
+            axes.errorbar(value, line, xerr=std, fmt="o", color=_VERMILION, capsize=3, ms=5, zorder=4)
+        axes.set_yticks(range(len(rows)), labels)
+        axes.set_ylim(len(rows) - 0.5, -0.5)
+        axes.set_xlabel({"m s-1": "m/s", "degree": "degrees"}.get(kind, kind))
+        axes.grid(axis="x", color="0.9")
+        axes.set_axisbelow(True)
+    handles = [_line(_VERMILION, "measured, ±1 standard uncertainty", "o"), _line(_BLUE, "computed at its hit")]
+    handles.append(_line(_GREY, "another such shot, measured"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def _line(colour: str, label: str, marker: str = "") -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], color=colour, marker=marker or None, lw=0 if marker else 4, label=label)
+
+
+def hits_figure(tree: xarray.DataTree) -> Figure:
+    """Where each shot hit, on the plate: draws of the posterior, and the hit of the smallest misfit.
+
+    The plate is drawn at the posterior's medians; where the spacing of its holes is unknown, so are their places.
+    """
+    fit = fit_from(str(tree.attrs[files.FIT]), "the fit of this posterior", Path())
+    posterior, best = tree["posterior"].to_dataset(), tree["best"].to_dataset()
+    medians = {one.path: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.unit != "rad"}
+    across = min(3, len(fit.shots))
+    down = -(-len(fit.shots) // across)
+    figure = Figure(figsize=(4.2 * across + 0.8, 5.2 * down + 1.0), layout="constrained")
+    figure.suptitle(f"{tree.attrs[attr.TITLE]}\nwhere the shots hit, {_worth(tree)}")
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for place, shot in enumerate(fit.shots):
+        axes = panels[place]
+        scene = fit.scene_of(shot, medians)
+        y, z = (_MM * posterior[name].values[..., place].ravel() for name in files.HITS)
+        half = [0.55 * side * _MM for side in scene.target.plate.sampled_cell]
+        half = [max(one, float(np.abs(at).max()) * 1.05) for one, at in zip(half, (y, z), strict=True)]
+        ranges = [(-one / _MM, one / _MM) for one in half]
+        axes.set_facecolor("0.85")
+        for outline in scene.target.plate.pattern.outlines(*ranges):
+            axes.fill(*(_MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
+        axes.scatter(y, z, s=5, color=_BLUE, alpha=0.35, lw=0, label="posterior")
+        at = (_MM * float(best[name][place]) for name in files.HITS)
+        axes.plot(*at, "X", color=_VERMILION, ms=8, mec="white", label="smallest misfit")
+        axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
+        axes.set_title(str(posterior["shot"].values[place]))
+    for axes in panels[len(fit.shots) :]:
+        axes.remove()
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    return figure

@@ -1,0 +1,89 @@
+"""The file of a posterior: a tree of Datasets with the groups that ArviZ reads, written whole or not at all.
+
+posterior, prior          draws of the parameters, along chain and draw; the posterior has the hit of every shot, too
+sample_stats              ln of the likelihood and the misfit of every draw
+log_likelihood            of every draw and shot
+observed_data             what was measured
+posterior_predictive      what another such shot would show; `fitted` is what the draw computes for this very shot
+sets                      all sets of parameters that were computed, with their weights
+best                      the set of smallest misfit
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import xarray
+
+from warpimpact.results import attributes as attr
+from warpimpact.results.files import ResultError, aside
+from warpimpact.results.interrupts import uninterrupted
+
+GROUPS = (
+    "posterior",
+    "prior",
+    "sample_stats",
+    "log_likelihood",
+    "observed_data",
+    "posterior_predictive",
+    "sets",
+    "best",
+)
+HITS = ("hit_y", "hit_z")
+"""Variables of the posterior that are no parameters."""
+MEASURED, STD, FITTED = "measured", "std", "fitted"
+UNITS_OF = "units_of_observation"
+SHOT_OF = "shot_of_observation"
+PATH = "path"
+"""Attribute of a parameter: its key in the scene, as JSON."""
+
+FIT = "fit"
+MATERIAL = "material"
+"""What the material had in the fit, the parameters at their medians: JSON of the tables plate and interaction."""
+EFFECTIVE = "effective_sample_size"
+PARETO_K = "pareto_k"
+CONVERGED = "converged"
+HIT_NOISE = "hit_noise"
+EVIDENCE = "log_evidence"
+SETS = "computed_sets"
+
+
+def write(tree: xarray.DataTree, path: Path) -> None:
+    """Write a posterior; an existing file is replaced.
+
+    Raises:
+        OutputError: it cannot be written; what was there before is untouched.
+    """
+    with uninterrupted(), aside(path) as file:
+        tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
+
+
+def read(path: Path) -> xarray.DataTree:
+    """Read a posterior into memory.
+
+    Raises:
+        ResultError: the file is missing, is not netCDF, or is no posterior.
+    """
+    if not path.is_file():
+        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
+    try:
+        with uninterrupted(), xarray.open_datatree(path, engine="netcdf4") as tree:
+            loaded = tree.load()
+    except Exception as error:  # a file that was altered leads xarray into errors of any class
+        raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
+    missing = [name for name in GROUPS if name not in loaded.children]
+    if missing or attr.WARPIMPACT_VERSION not in loaded.attrs or FIT not in loaded.attrs:
+        what = f'group "{missing[0]}"' if missing else f'attribute "{FIT}"'
+        raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
+    return loaded
+
+
+def is_posterior(path: Path) -> bool:
+    """Whether a file says that it is a posterior."""
+    import netCDF4
+
+    try:
+        with netCDF4.Dataset(path) as file:
+            return "posterior" in file.groups
+    except OSError:
+        return False

@@ -1,0 +1,44 @@
+"""Numbers of a scene that may differ from shot to shot of one computation, as columns of Shots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.solver.resolution import decay_rate
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Plate
+
+Array = NDArray[np.float64]
+Path = tuple[str | int, ...]
+"""Of a key in the tables of a scene, such as ("plate", "pattern", "spacing", 0)."""
+
+COLUMNS: dict[Path, str] = {
+    ("plate", "resistance"): "resistance",
+    ("plate", "shear_coefficient"): "shear_coefficient",
+    ("plate", "degradation"): "degradation",
+    ("plate", "thickness"): "thickness",
+    ("core", "mass"): "mass",
+}
+"""Name of the column, by the path."""
+UNITS_OF_EXPOSURE: tuple[Path, ...] = (("plate", "degradation_interval"), ("plate", "degradation_distance"))
+"""β per Δt_β is the same law as β^(Δt₀/Δt_β) per Δt₀, so these become a degradation of the shot."""
+
+
+def columns_of(values: Mapping[Path, Array], plate: Plate) -> dict[str, Array]:
+    """Columns for some values, each of their shape.
+
+    Args:
+        values: by path; paths that make no column are left out.
+        plate: that of the scene, whose degradation and unit of exposure count where they have no values.
+    """
+    columns = {name: values[path] for path, name in COLUMNS.items() if path in values}
+    for path in UNITS_OF_EXPOSURE:
+        if path in values:
+            base = columns.get("degradation", np.full_like(values[path], plate.degradation))
+            columns["degradation"] = np.exp(decay_rate(base, 1.0) * plate.degradation_unit / values[path])
+    return columns

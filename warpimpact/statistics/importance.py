@@ -1,0 +1,270 @@
+"""Adaptive importance sampling of a posterior whose prior is standard normal, and how far its weights can be trusted.
+
+Rounds of draws: the first from the prior, later ones from a Student's t distribution with mean and covariance of the
+weighted draws so far. All draws of all rounds count, weighted by prior · likelihood over the mixture of all proposals
+(Cornuet, Marin, Mira and Robert, "Adaptive multiple importance sampling", 2012). The largest weights are smoothed, and
+their Pareto index k says whether they can be trusted (Vehtari, Simpson, Gelman, Yao and Gabry, "Pareto smoothed
+importance sampling", 2024).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+FREEDOM = 5.0
+"""Degrees of freedom of a proposal: its tails are heavier than a posterior's, so that no weight is without bound."""
+FROM_PRIOR = 0.1
+"""Share of later rounds that is drawn from the prior."""
+FEWEST_PER_DIMENSION = 10
+"""Effective draws per dimension that a round is shaped by; where weights give fewer, they are tempered."""
+LARGEST_K = 0.7
+"""Pareto index up to which weights can be trusted."""
+_FEWEST_TAIL = 5
+
+
+Shared = Sequence[tuple[int, int]]
+"""How many of the first numbers are the same within blocks of how many draws, such as ((3, 16), (6, 4))."""
+
+
+def _with_shared(numbers: Array, shared: Shared) -> Array:
+    """Draws whose first numbers are those of the first draw of their block."""
+    numbers = numbers.copy()
+    for first, block in sorted(shared, reverse=True):  # blocks that share less are larger
+        of = np.arange(len(numbers)) // block * block
+        numbers[:, :first] = numbers[of, :first]
+    return numbers
+
+
+@dataclass(frozen=True)
+class Student:
+    """Student's t distribution, mixed with FROM_PRIOR of the prior.
+
+    One with the whole covariance was measured to give more effective draws than mixtures of narrower kernels about the
+    draws of large weight: these are few at first, and a mixture of few is rough.
+
+    Attributes:
+        centre: shape [dimensions].
+        factor: lower Cholesky factor of its scale matrix, shape [dimensions, dimensions].
+    """
+
+    centre: Array
+    factor: Array
+
+    def draw(self, rng: np.random.Generator, count: int, shared: Shared) -> Array:
+        """Draws in blocks that share their first numbers, shape [count, dimensions].
+
+        Within a block the scale and the first normal numbers are the same. As the factor is triangular, so are the
+        first numbers of the draws; each draw alone still has the whole distribution.
+        """
+        largest = max((block for _, block in shared), default=1)
+        blocks = -(-count // largest)
+        of = np.repeat(np.arange(blocks), largest)[:count]
+        normal = _with_shared(rng.standard_normal((count, len(self.centre))), shared)
+        scale = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, blocks))[of]
+        from_prior = (rng.random(blocks) < FROM_PRIOR)[of]
+        own = self.centre + scale[:, None] * (normal @ self.factor.T)
+        return np.where(from_prior[:, None], normal, own)
+
+    def log_density(self, points: Array) -> Array:
+        """Logarithm of the density at points, shape [points]."""
+        from scipy.linalg import solve_triangular
+        from scipy.special import gammaln
+
+        dimensions = points.shape[1]
+        square = (solve_triangular(self.factor, (points - self.centre).T, lower=True) ** 2).sum(axis=0)
+        own = (
+            gammaln(0.5 * (FREEDOM + dimensions))
+            - gammaln(0.5 * FREEDOM)
+            - 0.5 * dimensions * math.log(FREEDOM * math.pi)
+            - np.log(np.diag(self.factor)).sum()
+            - 0.5 * (FREEDOM + dimensions) * np.log1p(square / FREEDOM)
+        )
+        density: Array = np.logaddexp(math.log1p(-FROM_PRIOR) + own, math.log(FROM_PRIOR) + log_prior(points))
+        return density
+
+
+def log_prior(points: Array) -> Array:
+    """Logarithm of the standard normal density, shape [points]."""
+    return np.asarray(-0.5 * (points**2).sum(axis=1) - 0.5 * points.shape[1] * math.log(2.0 * math.pi))
+
+
+@dataclass
+class Sampler:
+    """Draws of a posterior in rounds: `propose` points, compute their likelihood, `tell` it.
+
+    Args:
+        dimensions: of the parameters; their prior is standard normal.
+        shared: which of them blocks of draws share, for what is costly to change.
+        seed: draws are a function of it and of what was told.
+    """
+
+    dimensions: int
+    shared: Shared
+    seed: int
+    points: Array = field(init=False)
+    log_likelihood: Array = field(init=False)
+    _proposals: list[tuple[int, Student | None]] = field(init=False, default_factory=list)
+    _densities: list[Array] = field(init=False, default_factory=list)
+    """Logarithm of every proposal's density at the points, as many of them as were there when it was last asked."""
+
+    def __post_init__(self) -> None:
+        self.points = np.empty((0, self.dimensions))
+        self.log_likelihood = np.empty(0)
+
+    def propose(self, count: int) -> Array:
+        """The points of the next round, shape [count, dimensions]."""
+        sequence = np.random.SeedSequence(self.seed, spawn_key=(len(self._proposals),))
+        rng = np.random.default_rng(sequence)
+        student = self._student() if len(self.points) else None
+        new = self._from_prior(rng, count) if student is None else student.draw(rng, count, self.shared)
+        self._proposals.append((count, student))
+        self.points = np.concatenate([self.points, new])
+        return new
+
+    def tell(self, log_likelihood: Array) -> None:
+        """The logarithm of the likelihood at the points that were proposed last."""
+        self.log_likelihood = np.concatenate([self.log_likelihood, log_likelihood])
+
+    def _from_prior(self, rng: np.random.Generator, count: int) -> Array:
+        from scipy.special import ndtri
+        from scipy.stats.qmc import Sobol
+
+        uniform = Sobol(self.dimensions, rng=rng).random(1 << (count - 1).bit_length())[:count]
+        uniform = _with_shared(uniform, self.shared)
+        normal: Array = ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31))
+        return normal
+
+    def _student(self) -> Student | None:
+        """The proposal of the next round; None where no draw has a likelihood."""
+        raw = self._raw()
+        if not np.isfinite(raw).any():
+            return None
+        weights = _tempered(raw, FEWEST_PER_DIMENSION * self.dimensions)
+        centre = weights @ self.points
+        apart = self.points - centre
+        covariance = (weights[:, None] * apart).T @ apart + 1e-6 * np.eye(self.dimensions)
+        factor: Array = np.linalg.cholesky(covariance).astype(np.float64)
+        return Student(centre, factor)
+
+    def _raw(self) -> Array:
+        """Logarithms of the weights, not normalised."""
+        from scipy.special import logsumexp
+
+        total = sum(count for count, _ in self._proposals)
+        for place, (_, student) in enumerate(self._proposals):
+            known = self._densities[place] if place < len(self._densities) else np.empty(0)
+            new = self.points[len(known) :]
+            at_new = log_prior(new) if student is None else student.log_density(new)
+            self._densities[place : place + 1] = [np.concatenate([known, at_new])]
+        terms = [
+            math.log(count / total) + density
+            for (count, _), density in zip(self._proposals, self._densities, strict=True)
+        ]
+        raw: Array = log_prior(self.points) + self.log_likelihood - logsumexp(np.stack(terms), axis=0)
+        return raw
+
+    def weighed(self) -> Weights:
+        """The weights of all points."""
+        return Weights.of(self._raw())
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Normalised weights of draws, shape [draws], with their Pareto index and the logarithm of their mean before."""
+
+    values: Array
+    pareto_k: float
+    log_evidence: float
+
+    @classmethod
+    def of(cls, raw: Array) -> Weights:
+        """From logarithms of weights, of which the largest are smoothed."""
+        from scipy.special import logsumexp
+
+        evidence = float(logsumexp(raw) - math.log(len(raw)))
+        if not math.isfinite(evidence):
+            return cls(np.full(len(raw), 1.0 / len(raw)), math.inf, -math.inf)
+        values, k = _smoothed(np.exp(raw - raw.max()))
+        return cls(values / values.sum(), k, evidence)
+
+    def effective(self, block: int = 1) -> float:
+        """Effective sample size; draws of a block count as one, since they share most of their numbers."""
+        return effective_size(np.add.reduceat(self.values, np.arange(0, len(self.values), block)))
+
+
+def effective_size(weights: Array) -> float:
+    """Number of draws of equal weight that tell as much (Kish)."""
+    return float(weights.sum() ** 2 / (weights**2).sum())
+
+
+def resampled(weights: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
+    """Indices of draws in proportion to their weights, by systematic resampling, in random order."""
+    places = (np.arange(count) + rng.random()) / count
+    which = np.searchsorted(np.cumsum(weights) / weights.sum(), places, side="right")
+    chosen: NDArray[np.int64] = rng.permutation(np.minimum(which, len(weights) - 1))
+    return chosen
+
+
+def _tempered(raw: Array, effective: float) -> Array:
+    """Normalised weights to the largest power up to 1 that leaves them this effective size."""
+
+    def at(power: float) -> Array:
+        log = np.where(np.isfinite(raw), power * raw, -np.inf)
+        weights: Array = np.exp(log - log.max())
+        return np.asarray(weights / weights.sum())
+
+    wanted = min(effective, 0.5 * np.isfinite(raw).sum())
+    low, high = 0.0, 1.0
+    if effective_size(at(1.0)) >= wanted:
+        return at(1.0)
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if effective_size(at(middle)) >= wanted else (low, middle)
+    return at(low)
+
+
+def _smoothed(weights: Array) -> tuple[Array, float]:
+    """Weights with their largest ones replaced by quantiles of a Pareto distribution, and its index k."""
+    count = len(weights)
+    tail = math.ceil(min(0.2 * count, 3.0 * math.sqrt(count)))
+    order = np.argsort(weights)
+    cut = weights[order[-tail - 1]] if tail < count else 0.0
+    beyond = weights[order[-tail:]] - cut
+    if tail < _FEWEST_TAIL or (beyond > 0.0).sum() < _FEWEST_TAIL:
+        return weights, math.inf
+    k, sigma = pareto_fit(beyond)
+    shares = (np.arange(tail) + 0.5) / tail
+    quantiles = -sigma * np.log1p(-shares) if abs(k) < 1e-9 else sigma * np.expm1(-k * np.log1p(-shares)) / k
+    smooth = weights.copy()
+    smooth[order[-tail:]] = np.minimum(cut + quantiles, weights.max())
+    return smooth, k
+
+
+def pareto_fit(beyond: Any) -> tuple[float, float]:
+    """Index k and scale of a generalized Pareto distribution of positive numbers.
+
+    By the quasi-Bayesian estimate of Zhang and Stephens (Technometrics 51, 2009, 316), drawn towards k = 0.5 as of ten
+    more numbers.
+    """
+    x = np.sort(np.asarray(beyond, dtype=np.float64))
+    x = np.maximum(x, 1e-300)
+    count = len(x)
+    grid = 30 + int(math.sqrt(count))
+    quarter = x[int(count / 4.0 + 0.5) - 1]
+    places = 1.0 / x[-1] + (1.0 - np.sqrt(grid / (np.arange(1, grid + 1) - 0.5))) / (3.0 * quarter)
+    places = np.where(places == 0.0, 1e-12 / x[-1], places)
+    k = np.log1p(-places[:, None] * x).mean(axis=1)
+    profile = count * (np.log(-places / k) - k - 1.0)
+    with np.errstate(over="ignore"):
+        weights = 1.0 / np.exp(profile - profile[:, None]).sum(axis=1)
+    theta = float((places * weights).sum() / weights.sum())
+    shape = float(np.log1p(-theta * x).mean())
+    return (count * shape + 5.0) / (count + 10.0), -shape / theta
