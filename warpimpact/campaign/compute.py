@@ -1,4 +1,7 @@
-"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here."""
+"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here.
+
+Long because everything that a Dataset tells of its campaign is gathered here.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Marches the shots of a scene on a device: windows, memory and threads."""
+"""Marches the shots of a scene on a device: windows, memory and threads.
+
+Long because the windows, the memory and the threads of a march share its state.
+"""
 
 from __future__ import annotations
 
@@ -151,8 +154,7 @@ class March:
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
         """What is known of the bending of every shot."""
         breaks = self.scene.core.strength is not None or self.shots.strength is not None
-        known = self.variant.bends
-        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks) if known else {}
+        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks)
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""
