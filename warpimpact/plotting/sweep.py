@@ -48,6 +48,8 @@ def sweep_figure(sweep: xarray.Dataset) -> Figure:
     for axes, measure in zip(panels.flat, measures, strict=True):
         axes.set_ylabel(_label(measure))
         axes.grid(color="0.9")
+        if measure.is_binary:
+            axes.set_ylim(-0.03, 1.03)
     for axes in panels[-1]:
         axes.set_xlabel(_axis_label(sweep[along]))
     if others:
