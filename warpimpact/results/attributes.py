@@ -71,6 +71,10 @@ PLATE_PERIOD = "plate_period"
 PLATE_THICKNESS = "plate_thickness"
 FAILED_SHARE = "failed_share"
 
+# A sweep
+SWEEP = "sweep"
+"""JSON of the swept inputs: name of the dimension → values as they were written."""
+
 # The stop rule
 STOP_QUANTITY = "stop_quantity"
 STOP_REASON = "stop_reason"
