@@ -13,7 +13,7 @@ from warpimpact.scene import (
     Scene,
 )
 from warpimpact.solver import arrays
-from warpimpact.solver.arrays import onset_jump
+from warpimpact.solver.materials import onset_jump
 from warpimpact.solver.resolution import FASTEST_DECAY, FIDELITIES, NODAL, SLENDER, WEAKENING, decay_rate, resolve
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
