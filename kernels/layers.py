@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, exposure, footprint, interaction, passage, plate_grid, rigid_body
+from . import contact, core_surface, earlier, exposure, footprint, interaction, passage, plate_grid, rigid_body
 from . import shots as conditions
 from .variant import Variant
 
@@ -25,8 +25,8 @@ def build(variant: Variant) -> SimpleNamespace:
     Surface, Pose, Plate, Window, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window, laws.Law
     Body, State, Load = motion.Body, motion.State, motion.Load
     Fields, Footprint, Touches, Shots = contacts.Fields, prints.Footprint, contacts.Touches, launch.Shots
-    passages, own = passage.build(variant), launch.own
-    Passage = passages.Passage
+    passages, hits, own = passage.build(variant), earlier.build(variant), launch.own
+    Passage, Earlier = passages.Passage, hits.Earlier
 
     @wp.struct
     class Layers:
@@ -138,6 +138,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def open_layer(
         layers: Layers,
         stack: Stack,
+        past: Earlier,
         common: Fields,
         shots: Shots,
         slot: wp.int32,
@@ -151,15 +152,10 @@ def build(variant: Variant) -> SimpleNamespace:
         if layer > 0:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
         fields = fields_of(layers, common, layer)
-        window = grid.window_at(
-            layers.plates[layer],
-            own_of(layers.thickness, layer, shot),
-            fields.cells_y,
-            fields.cells_z,
-            0,
-            own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]],
-            own(shots.hit_z, shot) + wp.float64(home[2]) - layers.offset_z[layer, shot % layers.offset_z.shape[1]],
-        )
+        y = own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]]
+        z = own(shots.hit_z, shot) + wp.float64(home[2]) - layers.offset_z[layer, shot % layers.offset_z.shape[1]]
+        thickness = own_of(layers.thickness, layer, shot)
+        window = grid.window_at(layers.plates[layer], thickness, fields.cells_y, fields.cells_z, 0, y, z)
         first = slot * layers.nodes + layers.first[layer]
         window.first += first
         window.home += first
@@ -167,6 +163,8 @@ def build(variant: Variant) -> SimpleNamespace:
         if wp.static(variant.degrades):
             if window.weakens:
                 memories.blank(fields, window)
+                if wp.static(variant.burst):
+                    hits.recall(past, fields, layers.plates[layer], window, slot, layer, shot, y, z)
         here = slot * layers.count + layer
         stack.window[here] = window
         stack.home[here] = home
@@ -189,6 +187,7 @@ def build(variant: Variant) -> SimpleNamespace:
         layers: Layers,
         fields: Fields,
         stack: Stack,
+        past: Earlier,
         passage: Passage,
         shots: Shots,
         slot: wp.int32,
@@ -224,7 +223,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 if not stack.open[here]:
                     ahead = real((front - pose.position[0]) / wp.max(state.velocity[0], one)) * state.velocity
                     ahead = wp.min(one, surface.bounding_radius / (wp.length(ahead) + tiny)) * ahead
-                    open_layer(layers, stack, fields, shots, slot, k, shot, pose, ahead)
+                    open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, ahead)
                 plate, window = layers.plates[k], stack.window[here]
                 touch = prints.footprint_of(surface, plate, window, in_layer(layers, stack, slot, k, shot, pose), dt)
                 if touch.last_ring >= 0:
@@ -327,6 +326,15 @@ def build(variant: Variant) -> SimpleNamespace:
             inside = reached.foremost > front and reached.rearmost < rear
             passages.conclude(passage, shot, k, status, inside, reached.deepest - front)
 
+    @wp.func
+    def keep(layers: Layers, common: Fields, stack: Stack, past: Earlier, slot: wp.int32, shot: wp.int32):
+        """Keep what a shot of a burst has added to the layers that it reached."""
+        for k in range(layers.count):
+            here = slot * layers.count + k
+            if stack.open[here]:
+                if layers.weakens[k]:
+                    hits.keep(past, common, stack.window[here], slot, shot)
+
     return SimpleNamespace(
         Layers=Layers,
         Stack=Stack,
@@ -338,4 +346,5 @@ def build(variant: Variant) -> SimpleNamespace:
         load_on=load_on,
         free_time=free_time,
         conclude=conclude,
+        keep=keep,
     )

@@ -339,4 +339,7 @@ def _read(read: Any, name: str, value: Any) -> Any:
 
 
 assert set(QUANTITIES) == set(Scatter.model_fields) - {"layers"}
-assert {"hit_y", "hit_z", *QUANTITIES, *(f"layer_{name}" for name in OF_A_LAYER)} == set(Shots.__dataclass_fields__)
+assert {"hit_y", "hit_z", *QUANTITIES, *(f"layer_{name}" for name in OF_A_LAYER)} == set(Shots.__dataclass_fields__) - {
+    "sample",
+    "burst_order",
+}

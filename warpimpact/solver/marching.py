@@ -18,6 +18,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
+from warpimpact.solver.bursts import bytes_of, check_bursts, earlier_hits, in_turns, spoilt, turns, whole_plates
 from warpimpact.solver.device import cores, free_memory, load
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.layering import Passages, deep_cells
@@ -59,9 +60,11 @@ class March:
     ) -> None:
         self.scene, self.shots, self.device = scene, shots, device
         self.threads = threads or cores()
+        check_bursts(shots, numerics)
         self.arrays = arrays_of(scene, numerics, shots, traced=traced)
         self.inputs = Inputs(self.arrays, device)
         self.variant, self.stage = self.arrays.variant, self.inputs.stage
+        self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.passages = Passages(self.stage, len(shots), len(self.inputs.plates), self.variant, device)
@@ -75,10 +78,11 @@ class March:
         pending = np.arange(count)
         for _ in range(MAX_DOUBLINGS):
             self._march_some(pending, outcomes, _after(count - len(pending), count, progress))
-            pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
+            pending = whole_plates(outcomes.status.numpy() == Status.LEFT_WINDOW, self.at_a_plate)
             if not len(pending) or not self._fits(2 * self.cells[0], 2 * self.cells[1]):
                 break
             self.cells = (2 * self.cells[0], 2 * self.cells[1])
+        outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
         progress(count, count)
         return outcomes
 
@@ -88,31 +92,31 @@ class March:
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
-        """Share of the resistance that is left after some steps of the first shot on the CPU, in the window of its
-        march."""
-        scratch = self._scratch(1, *self.cells)
-        self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
-        first = self.inputs.put(np.zeros(1), wp.int32)
-        self._launch(first, self._empty(self.stage.Outcomes, (1,)), scratch, 1, 0, 1)
+        """Share of the resistance that is left after some steps of the last shot on the CPU, in the window of its
+        march. All shots hit one plate."""
+        scratch, count = self._scratch(1, *self.cells), len(self.shots)
+        self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[-1])
+        order = self.inputs.put(np.arange(count), wp.int32)
+        self._launch(order, self._empty(self.stage.Outcomes, (count,)), scratch, 1, 0, count)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
         exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
-        return self._material() * np.exp(self.arrays.shots["decay_rate"][0] * exposure)
+        return self._material() * np.exp(self.arrays.shots["decay_rate"][-1] * exposure)
 
     def body(self) -> MassProperties:
-        """Mass properties of the first shot."""
+        """Mass properties of the last shot."""
         names = ("mass", "inertia_axial", "inertia_transverse")
-        return self.scene.core.mass_properties._replace(**{name: float(self.arrays.shots[name][0]) for name in names})
+        return self.scene.core.mass_properties._replace(**{name: float(self.arrays.shots[name][-1]) for name in names})
 
     def nodes(self) -> tuple[Array, Array]:
-        """Coordinates in the plate of the nodes of the first shot's window, along y and z [m]."""
-        hit = self.shots.hit_y[0], self.shots.hit_z[0]
+        """Coordinates in the plate of the nodes of the last shot's window, along y and z [m]."""
+        hit = self.shots.hit_y[-1], self.shots.hit_z[-1]
         spacing = self.arrays.grid.spacing
         y, z = (at + (np.arange(count) - count // 2) * spacing for at, count in zip(hit, self.cells, strict=True))
         return y, z
 
     def _material(self) -> Array:
-        """Share of material about every node of the first shot's window."""
+        """Share of material about every node of the last shot's window."""
         samples = 16
         fine = (np.arange(samples) + 0.5) / samples - 0.5
         y, z = ((nodes[:, None] + self.arrays.grid.spacing * fine).reshape(-1) for nodes in self.nodes())
@@ -190,7 +194,9 @@ class March:
         size = 8 if self.variant.double else 4
         per_ring = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings = self.inputs.surface.rings * per_ring
-        return len(self._fields()) * self._nodes(cells_y, cells_z) * size + self._patches() * (6 * size + 2 * 4) + rings
+        nodes = self._nodes(cells_y, cells_z)
+        earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
+        return len(self._fields()) * nodes * size + earlier + self._patches() * (6 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
@@ -207,15 +213,15 @@ class March:
     def _slots(self, cells_y: int, cells_z: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow."""
         free = free_memory() if self.device.is_cpu else self.device.free_memory
-        wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
+        wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots) // self.at_a_plate)
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
-        return min(wanted, affordable, (2**31 - 1) // self._nodes(cells_y, cells_z))
+        return min(wanted, affordable, (2**31 - 1) // (self.at_a_plate * self._nodes(cells_y, cells_z)))
 
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
 
     def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, ...]:
-        """Fields, touches and layers of some slots."""
+        """Fields, touches, layers and earlier hits of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         scratch, touches = self.stage.Fields(), self.stage.Touches()
         scratch.cells_y, scratch.cells_z = cells_y, cells_z
@@ -231,7 +237,8 @@ class March:
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)
-        return scratch, touches, self.passages.stack(slots)
+        earlier = earlier_hits(self.stage, self.at_a_plate, slots, self._windows(cells_y, cells_z), self.device)
+        return scratch, touches, self.passages.stack(slots), earlier
 
     def _launch(
         self,
@@ -270,15 +277,21 @@ class March:
         load(self.stage.kernel, self.device)
         if self.variant.layered:
             self.inputs.place_windows(self._windows(*self.cells))
-        launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
         if self.device.is_cpu:
+            launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)
         else:
             slots, scratch = _halving(self._slots(*self.cells), lambda slots: self._scratch(slots, *self.cells))
-            for first, count in _chunks(len(which), slots):
-                launch(scratch, slots, first, count)
+            order = self.inputs.put(in_turns(which, self.at_a_plate, slots), wp.int32)
+            for first, count in turns(len(which), self.at_a_plate, slots):
+                self._launch(order, outcomes, scratch, slots, first, count)
                 wp.synchronize_device(self.device)
                 progress(first + count)
+
+    def _cpu_chunk(self, fair: int) -> int:
+        """Shots per launch on the CPU, if so many load the threads evenly: those at one plate stay together."""
+        plates = min(CPU_CHUNK, fair) // self.at_a_plate
+        return max(1, plates) * self.at_a_plate
 
     def _cpu_scratch(self) -> list[Any]:
         """Scratch of one slot for every thread."""
@@ -301,7 +314,7 @@ class March:
 
         done = 0
         with ThreadPoolExecutor(len(slots)) as pool:
-            for count in pool.map(work, _chunks(total, max(1, min(CPU_CHUNK, total // (4 * len(slots)))))):
+            for count in pool.map(work, _chunks(total, self._cpu_chunk(total // (4 * len(slots))))):
                 done += count
                 progress(done)
 
