@@ -11,6 +11,8 @@ from pydantic_core import ErrorDetails
 from ..results.variables import BENDING_VARIABLES
 from ..scene import (
     AnyCore,
+    Burst,
+    BurstSampler,
     Hits,
     Impact,
     Interaction,
@@ -65,6 +67,7 @@ class Campaign(Model):
     output: Output = Output()
     scatter: Scatter = Scatter()
     stop: Stop | None = None
+    burst: Burst | None = None
     _source: str = PrivateAttr("")
 
     @property
@@ -137,7 +140,15 @@ class Campaign(Model):
 
     def sampler(self) -> Sampler:
         """Its shots."""
-        return Sampler(self.impact, self.hits, self.plate, self.scatter, self.replicates)
+        own: dict[str, Any] = {"scatter": self.scatter, "replicates": self.replicates}
+        if self.burst is None:
+            return Sampler(self.impact, self.hits, self.plate, **own)
+        return BurstSampler(self.impact, self.hits, self.plate, self.burst, **own)
+
+    @property
+    def at_a_plate(self) -> int:
+        """Shots at one plate."""
+        return 1 if self.burst is None else self.burst.count
 
     @model_validator(mode="before")
     @classmethod
@@ -177,6 +188,7 @@ class Campaign(Model):
             farthest = 0.5 * max(covered)
         else:
             farthest = max(float(np.abs(listed[name]).max()) for name in ("hit_y", "hit_z"))
+        farthest += 0.0 if self.burst is None else self.burst.reach
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
         allowed = min(_FARTHEST, 2**30 * cell)
@@ -190,6 +202,14 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _images_share_their_shot(self) -> Self:
         check_scatter(self.hits, self.scatter)
+        return self
+
+    @model_validator(mode="after")
+    def _plate_takes_a_burst(self) -> Self:
+        if self.burst is not None and self.hits.irreducible:
+            raise ValueError("got hits.irreducible = true beside burst, but the hits of a burst have no images")
+        if self.burst is not None and self.numerics.scheme == "nodal":
+            raise ValueError('got numerics.scheme = "nodal" beside burst, but it must be "consistent"')
         return self
 
     @model_validator(mode="after")

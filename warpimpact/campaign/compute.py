@@ -16,7 +16,7 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import solid_dataset, to_dataset
-from warpimpact.scene import Numerics, Scene, Shots, Symmetry
+from warpimpact.scene import Burst, Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
@@ -25,6 +25,9 @@ from warpimpact.solver.refinement import LEVELS, Estimates, simulate_to_toleranc
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
 from warpimpact.solver.unfold import unfolded, unfolded_estimates
+
+_FEWEST_BURSTS = 8
+"""Of a pilot, however many shots they have."""
 
 
 def compute(
@@ -91,7 +94,8 @@ def compute(
         | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {})
-        | ({} if promise is None else _promised(promise)),
+        | ({} if promise is None else _promised(promise))
+        | ({} if campaign.burst is None else _burst(campaign.burst)),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
     )
     if solid is None:
@@ -107,21 +111,23 @@ def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
     """The promise that a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
 
     The pilot takes the first hits of a Sobol or random sampling. It takes hits at even distances from a grid or a list.
-    So it depends on the campaign alone.
+    So it depends on the campaign alone. It takes whole bursts, as a later hit meets what the earlier ones left.
 
     Raises:
         DeviceError: the device is absent.
     """
     if campaign.numerics.explicit is not None:
         return None
-    sampler, group = campaign.sampler(), len(campaign.symmetries)
-    hits = len(sampler) // group
-    count = min(PILOT, hits)
+    sampler, images, at_a_plate = campaign.sampler(), len(campaign.symmetries), campaign.at_a_plate
+    group = images * at_a_plate
+    groups = len(sampler) // group
+    count = min(max(-(-PILOT // at_a_plate), _FEWEST_BURSTS), groups)
     if campaign.hits.sampling in ("sobol", "random"):
-        pilot = sampler.shots(0, count * group)[::group]
+        pilot = sampler.shots(0, count * group)
     else:
-        places = np.linspace(0, hits, count, endpoint=False).astype(int)
-        pilot = Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
+        places = np.linspace(0, groups, count, endpoint=False).astype(int)
+        pilot = Shots.joined([sampler.shots(int(place) * group, group) for place in places])
+    pilot = pilot[::images]
     return keep(campaign.scene, campaign.numerics, pilot, device=device)
 
 
@@ -186,6 +192,11 @@ def _material(campaign: Campaign) -> str:
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
     """Symmetries by which hits were unfolded, and the number of computed hits."""
     return {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
+
+
+def _burst(burst: Burst) -> dict[str, Any]:
+    """How many shots hit a plate, and how they lie."""
+    return {attr.BURST: burst.model_dump_json(exclude_none=True), attr.SHOTS_AT_A_PLATE: burst.count}
 
 
 def made_by(device: str) -> dict[str, str]:

@@ -78,7 +78,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
     """
     total = len(campaign.sampler())
     with local_team(campaign, device) as team:
-        held = _Held(extent(total))
+        held = _Held(extent(total, campaign.at_a_plate))
         end = _fill(campaign, held, team, progress or (lambda standing: None))
     shards = [held.load(index) for index in range(end.shards)]
     dataset = shards[0]
@@ -224,7 +224,9 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
         return None
     conditions = [values for name, values in shots.columns.items() if name not in (v.HIT_Y, v.HIT_Z)]
     alike = plate.size is None and not any(np.ptp(values) for values in conditions)
-    return shots[: 1 if alike else _MOST_SOLID]
+    if alike and campaign.burst is None:
+        return shots[:1]
+    return shots[: max(1, _MOST_SOLID // campaign.at_a_plate) * campaign.at_a_plate]
 
 
 def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
@@ -266,7 +268,7 @@ class _Watch:
         self._rule = campaign.stop
         last = campaign.output.standoffs[-1]
         measures = [Measure.parse("mean(residual_velocity)"), Measure.parse(f"mean(tilt@{last * 1e3:.10g}mm)")]
-        dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries)}
+        dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
         self._tallies = [Tally(measure, **dealt) for measure in measures]
         if self._rule is not None:
             rule = self._rule

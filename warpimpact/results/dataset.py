@@ -64,11 +64,12 @@ def to_dataset(
         v.AXIS: ["x", "y", "z"],
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    values |= {name: shots.columns[name] for name in v.SCATTER_VARIABLES if name in shots.columns}
+    of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES)
+    values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
     ended = (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
     values |= _outlines(scene, *((-0.5 * side, 0.5 * side) for side in period))
-    optional = (name for name in (*v.SCATTER_VARIABLES, *v.BENDING_VARIABLES) if name in values)
+    optional = (name for name in (*of_shots, *v.BENDING_VARIABLES) if name in values)
     variables = [*v.VARIABLES, *optional]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES
@@ -200,6 +201,11 @@ def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
 def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
     return np.isin(dataset[v.STATUS].values, [status for status in Status if status.failed])
+
+
+def shots_at_a_plate(dataset: xarray.Dataset) -> int:
+    """How many hits in a row are on one plate; 1 without bursts."""
+    return int(dataset.attrs.get(attr.SHOTS_AT_A_PLATE, 1))
 
 
 def images(dataset: xarray.Dataset) -> int:

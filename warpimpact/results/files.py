@@ -175,7 +175,11 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         if attr.PLATE_PERIOD not in dataset.attrs:
             raise ResultError(f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"')
         if not is_history(dataset):
-            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.ESTIMATE_VARIABLES))
+            _check(
+                dataset,
+                path,
+                (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.ESTIMATE_VARIABLES),
+            )
         yield dataset
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images, passed
+from warpimpact.results.dataset import failed, images, passed, shots_at_a_plate
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -166,5 +166,6 @@ class Tally:
 
 
 def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
-    """Arguments of `Dealt` that fit the sampling of a result."""
-    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": images(dataset)}
+    """Arguments of `Dealt` that fit the sampling of a result. The shots at one plate count as one, like images."""
+    together = images(dataset) * shots_at_a_plate(dataset)
+    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": together}

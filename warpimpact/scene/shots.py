@@ -38,6 +38,8 @@ def _is_tilt(angle: float) -> float:
 Obliquity = Annotated[Angle, AfterValidator(_is_obliquity)]
 Tilt = Annotated[Angle, AfterValidator(_is_tilt)]
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
+OF_A_BURST = ("sample", "burst_order", "nearest_earlier_hit")
+"""Columns of shots that share their plates."""
 
 
 class Impact(Model):
@@ -173,6 +175,7 @@ class Shots:
         sample: number of the plate that a shot hits, where several hit one and the same; those are in a row. None where
             every shot has a plate of its own.
         burst_order: how many shots have hit that plate before.
+        nearest_earlier_hit: distance from the nearest hit on that plate before [m]; NaN for the first one.
     """
 
     hit_y: Array
@@ -196,6 +199,7 @@ class Shots:
     layer_offset_z: Array | None = None
     sample: NDArray[np.int64] | None = None
     burst_order: NDArray[np.int64] | None = None
+    nearest_earlier_hit: Array | None = None
 
     def __len__(self) -> int:
         """Number of shots."""
@@ -244,5 +248,5 @@ class Shots:
 
 def _listable(required: tuple[str, ...]) -> tuple[str, ...]:
     """Quantities that a list of hits may have beside those required: one number per shot."""
-    foreign = {*required, "sample", "burst_order"}
+    foreign = {*required, *OF_A_BURST}
     return tuple(f.name for f in fields(Shots) if f.name not in foreign and not f.name.startswith("layer_"))
