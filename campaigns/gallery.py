@@ -12,7 +12,7 @@ from PIL import Image
 
 from warpimpact import Campaign, run
 from warpimpact.campaign.replay import replay
-from warpimpact.plotting import dispersion, hit_maps, marginals, overview, trajectory, uncertainty
+from warpimpact.plotting import bursts_figure, dispersion, hit_maps, marginals, overview, trajectory, uncertainty
 from warpimpact.plotting.pressure import pressure
 
 HERE = Path(__file__).parent
@@ -43,6 +43,7 @@ def main() -> None:
     oblique = Campaign.from_toml(HERE / "oblique_shot.toml")
     yaw = {"distribution": "normal", "mean": "-2 deg", "std": "1 deg"}
     save(uncertainty(run(oblique.model_copy(update={"scatter": {"yaw": yaw}})), "tilt"), folder / "uncertainty.png")
+    save(bursts_figure(run(Campaign.from_toml(HERE / "burst_of_five.toml"))), folder / "bursts.png", 900)
     edge = np.hypot(slotted.hit_y - HIT[0], slotted.hit_z - HIT[1])
     hit = replay(slotted, int(edge.argmin("hit")), folder=HERE)
     for draw in (trajectory.passage, trajectory.flight, trajectory.plate, pressure):
