@@ -40,8 +40,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
     # Native, because a compiler vectorises these loops only if the pointers do not alias.
     @wp.func_native("""
-    const int row_low = row > 0 ? 0 : -row, row_high = row > 0 ? rows - 1 - row : rows - 1;
-    const int low = column > 0 ? 0 : -column, high = column > 0 ? columns - 1 - column : columns - 1;
+    const int row_low = row > 0 ? 0 : -row, row_high = row < 0 ? rows : rows - 1 - row;
+    const int low = column > 0 ? 0 : -column, high = column < 0 ? columns : columns - 1 - column;
     const auto far_far = y * z, far_near = y - far_far, near_far = z - far_far, near_near = 1 - y - near_far;
     assert(target >= 0 && target + rows * columns <= field.shape[0]);
     assert(source >= 0 && source + rows * columns <= field.shape[0]);
