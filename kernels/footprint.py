@@ -88,4 +88,26 @@ def build(variant: Variant) -> SimpleNamespace:
             )
         return found
 
-    return SimpleNamespace(Footprint=Footprint, footprint_of=footprint_of)
+    @wp.func
+    def is_clear(plate: Plate, window: Window, found: Footprint):
+        """Whether the nodes around the rings in the slab lie in a hole or beside a finite layer, with a node to
+        spare."""
+        y = half * real(found.box.y_low + found.box.y_high - 2 * (window.cells_y // 2)) * plate.spacing
+        z = half * real(found.box.z_low + found.box.z_high - 2 * (window.cells_z // 2)) * plate.spacing
+        wide = half * real(found.box.y_high - found.box.y_low) + one
+        long = half * real(found.box.z_high - found.box.z_low) + one
+        reach = wp.sqrt(wide * wide + long * long) * plate.spacing
+        beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
+        return beside > reach or plate.clear[grid.tile_at(plate, window, y, z)] > reach
+
+    @wp.func
+    def is_beside(window: Window, found: Footprint):
+        """Whether a window holds none of the nodes around the rings in the slab: a core that comes back elsewhere."""
+        return (
+            found.box.y_high < 0
+            or found.box.z_high < 0
+            or found.box.y_low >= window.cells_y
+            or found.box.z_low >= window.cells_z
+        )
+
+    return SimpleNamespace(Footprint=Footprint, footprint_of=footprint_of, is_clear=is_clear, is_beside=is_beside)

@@ -62,12 +62,14 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Stack:
         """Scratch of all slots, shape [slots × layers]: what a step can touch of each layer, the layer's window, the
-        place of the window's home relative to the hit [m], and whether the window is open."""
+        place of the window's home relative to the hit [m], whether the window is open, and whether the core was near
+        the layer in the last step."""
 
         found: wp.array(dtype=Footprint)
         window: wp.array(dtype=Window)
         home: wp.array(dtype=vec3)
         open: wp.array(dtype=wp.bool)
+        near: wp.array(dtype=wp.bool)
 
     @wp.struct
     class Reached:
@@ -102,6 +104,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """No layer is reached yet."""
         for k in range(layers.count):
             stack.open[slot * layers.count + k] = False
+            stack.near[slot * layers.count + k] = False
         passages.begin(passage, shot, layers.count)
 
     @wp.func
@@ -147,9 +150,9 @@ def build(variant: Variant) -> SimpleNamespace:
         pose: Pose,
         ahead: vec3,
     ):
-        """Open the window of a layer where the core will reach it. That of the plate is about the hit."""
-        home = vec3()
-        if layer > 0:
+        """Open the window of a layer where the core will reach it, at first that of the plate about the hit."""
+        here, home = slot * layers.count + layer, vec3()
+        if layer > 0 or stack.open[here]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
         fields = fields_of(layers, common, layer)
         y = own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]]
@@ -165,20 +168,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 memories.blank(fields, window)
                 if wp.static(variant.burst):
                     hits.recall(past, fields, layers.plates[layer], window, slot, layer, shot, y, z)
-        here = slot * layers.count + layer
         stack.window[here] = window
         stack.home[here] = home
         stack.open[here] = True
-
-    @wp.func
-    def is_clear(plate: Plate, window: Window, found: Footprint):
-        """Whether the nodes around the rings in the slab lie in a hole, with a node to spare."""
-        y = half * real(found.box.y_low + found.box.y_high - 2 * (window.cells_y // 2)) * plate.spacing
-        z = half * real(found.box.z_low + found.box.z_high - 2 * (window.cells_z // 2)) * plate.spacing
-        wide = half * real(found.box.y_high - found.box.y_low) + one
-        long = half * real(found.box.z_high - found.box.z_low) + one
-        reach = wp.sqrt(wide * wide + long * long) * plate.spacing
-        return plate.clear[grid.tile_at(plate, window, y, z)] > reach
 
     @wp.func
     def reach(
@@ -219,25 +211,33 @@ def build(variant: Variant) -> SimpleNamespace:
             front = own_of(layers.front, k, shot)
             rear = front + own_of(layers.thickness, k, shot)
             found.through = low > rear  # in the end, that of the last layer
+            near = bool(False)
             if high > front and low < rear:
                 if not stack.open[here]:
                     ahead = real((front - pose.position[0]) / wp.max(state.velocity[0], one)) * state.velocity
                     ahead = wp.min(one, surface.bounding_radius / (wp.length(ahead) + tiny)) * ahead
                     open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, ahead)
-                plate, window = layers.plates[k], stack.window[here]
-                touch = prints.footprint_of(surface, plate, window, in_layer(layers, stack, slot, k, shot, pose), dt)
+                plate = layers.plates[k]
+                seen = in_layer(layers, stack, slot, k, shot, pose)
+                touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
+                if not touch.inside and not stack.near[here] and prints.is_beside(stack.window[here], touch):
+                    open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, vec3())
+                    seen = in_layer(layers, stack, slot, k, shot, pose)
+                    touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
                 if touch.last_ring >= 0:
-                    if is_clear(plate, window, touch):
+                    if prints.is_clear(plate, stack.window[here], touch):
                         touch.last_ring = -1
                         touch.inside = True
                 if touch.last_ring >= 0:
                     reached.first = wp.min(reached.first, k)
                     reached.last = k
                     found.last_ring = surface.rings - 1
-                    found.inside = found.inside and (touch.inside or not window.weakens)
+                    found.inside = found.inside and (touch.inside or not layers.weakens[k])
                 stack.found[here] = touch
+                near = True
             elif low > rear and not passages.has_left(passage, shot, k):
                 passages.leave(passage, body, shot, k, state, rearmost - rear, time, flight)
+            stack.near[here] = near
         return found, reached
 
     @wp.func
@@ -328,12 +328,11 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def keep(layers: Layers, common: Fields, stack: Stack, past: Earlier, slot: wp.int32, shot: wp.int32):
-        """Keep what a shot of a burst has added to the layers that it reached."""
+        """Keep what a shot of a burst has added to the layers that it reached, each in its last window there."""
         for k in range(layers.count):
             here = slot * layers.count + k
-            if stack.open[here]:
-                if layers.weakens[k]:
-                    hits.keep(past, common, stack.window[here], slot, shot)
+            if stack.open[here] and layers.weakens[k]:
+                hits.keep(past, common, stack.window[here], slot, shot)
 
     return SimpleNamespace(
         Layers=Layers,

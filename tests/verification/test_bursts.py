@@ -198,12 +198,13 @@ def test_every_shot_of_a_failed_burst_behind_the_failure_fails() -> None:
     np.testing.assert_array_equal(marching.spoilt(status, 4), [0, 5, 5, 5, 0, 0, 0, 0])
 
 
+@TARGETS
 @pytest.mark.parametrize("order", [0, 2])
-def test_a_replay_is_the_shot_of_its_burst(order: int) -> None:
+def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
     shots, numerics = near_bursts(), Numerics(fidelity="draft")
     at = 5 * COUNT + order
-    again = simulation.replay(scene_of(solid_plate()), shots[5 * COUNT : at + 1], numerics=numerics)
-    for name, values in vars(simulate(solid_plate(), shots)).items():
+    again = simulation.replay(scene_of(solid_plate(), behind), shots[5 * COUNT : at + 1], numerics=numerics)
+    for name, values in vars(simulate(solid_plate(), shots, behind)).items():
         np.testing.assert_array_equal(getattr(again.outcomes, name)[0], values[at], err_msg=name)
     found = again.resistance_share[0]
     assert found.max() == 1.0

@@ -1,4 +1,4 @@
-"""Targets of several layers: closed forms, and targets that are the same thing said in two ways (docs/model.md §6.10)."""
+"""Targets of several layers: closed forms, and targets that say the same thing in two ways (docs/model.md §6.10)."""
 
 from dataclasses import replace
 from math import pi

@@ -175,7 +175,7 @@ def label(campaign: Campaign, numerics: Numerics) -> str:
 
 def _time_step(campaign: Campaign, resolution: Resolution) -> float:
     """Time step at the campaign's impact velocity [s]."""
-    return resolution.step_of(campaign.impact, campaign.plate)
+    return resolution.step_in(campaign.impact, campaign.target)
 
 
 def extrapolated(double: Answer, single: Answer) -> Answer:

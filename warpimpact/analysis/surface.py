@@ -55,6 +55,19 @@ def pressed(history: xarray.Dataset, step: int) -> Surface:
     return Surface(point, normal, area, np.where(touching, _left(history, step, point), 0.0))
 
 
+def largest_in_plate(history: xarray.Dataset) -> int:
+    """The step of the largest force; with layers behind the plate, of those in which the core reaches none of them.
+
+    A history holds what is left of the resistance of the plate alone.
+    """
+    force = np.linalg.norm(history[v.FORCE], axis=1)
+    if v.LAYER_FRONT in history:
+        centre = history[v.PLATE_POSITION].values[:, 0]
+        foremost = centre + np.abs(history[v.STATION].values).max()
+        force = np.where(foremost < float(history[v.LAYER_FRONT][1]), force, -1.0)
+    return int(force.argmax())
+
+
 def _body(history: xarray.Dataset) -> tuple[Array, Array, Array]:
     """Points relative to the centre of mass and normals, both in body axes, and areas; shapes as in `Surface`."""
     station, radius = history[v.STATION].values, history[v.CORE_RADIUS].values

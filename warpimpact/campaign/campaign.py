@@ -6,7 +6,6 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
-from pydantic_core import ErrorDetails
 
 from ..results.variables import BENDING_VARIABLES
 from ..scene import (
@@ -16,6 +15,7 @@ from ..scene import (
     Hits,
     Impact,
     Interaction,
+    Layer,
     Numerics,
     Plate,
     Record,
@@ -28,10 +28,14 @@ from ..scene import (
 )
 from ..scene.model import Model
 from ..scene.scatter import EDGE, QUANTITIES, check_range
-from ..scene.symmetry import check_scatter
-from ..scene.units import Number, PositiveLength, Title, brief, quantity, quoted
+from ..scene.symmetry import check_layers, check_scatter
+from ..scene.target import MOST_LAYERS
+from ..scene.units import Number, PositiveLength, Title
 from ..solver.bending import check_bending
+from ..solver.resolution import ONE_PLATE
+from .apart import with_scatter_apart
 from .plausible import warn_of
+from .problems import sentence
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
 
@@ -55,11 +59,13 @@ class Output(Record):
 
 
 class Campaign(Model):
-    """What is shot at what, where, how finely it is computed and what is reported."""
+    """What is shot at what, where, how finely it is computed and what is reported. `layer` is what stands behind the
+    plate, in order: a table `[[layer]]` each."""
 
     title: Title
     core: AnyCore
     plate: Plate
+    layer: Annotated[tuple[Layer, ...], Field(max_length=MOST_LAYERS)] = ()
     impact: Impact
     hits: Hits
     interaction: Interaction = Interaction()
@@ -110,11 +116,11 @@ class Campaign(Model):
             )
         if count is not None:
             _override_count(data, count)
-        data = _with_scatter_apart(data, name)
+        data = with_scatter_apart(data, name)
         try:
             campaign = cls.model_validate(data, context={"folder": folder})
         except ValidationError as error:
-            raise CampaignError(f"{name}: {_sentence(error, data)}") from None
+            raise CampaignError(f"{name}: {sentence(error, data)}") from None
         campaign._source = text
         return campaign
 
@@ -126,7 +132,12 @@ class Campaign(Model):
     @property
     def scene(self) -> Scene:
         """What is shot at what, and what is recorded."""
-        return Scene(core=self.core, target=Target(plate=self.plate), interaction=self.interaction, record=self.output)
+        return Scene(core=self.core, target=self.target, interaction=self.interaction, record=self.output)
+
+    @property
+    def target(self) -> Target:
+        """The plate and the layers behind it."""
+        return Target(plate=self.plate, layers=self.layer)
 
     @property
     def replicates(self) -> int:
@@ -202,6 +213,13 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _images_share_their_shot(self) -> Self:
         check_scatter(self.hits, self.scatter)
+        check_layers(self.hits, self.layer)
+        return self
+
+    @model_validator(mode="after")
+    def _scheme_knows_layers(self) -> Self:
+        if self.layer and self.numerics.scheme == "nodal":
+            raise ValueError(f'got numerics.scheme = "nodal" beside {len(self.layer)} [[layer]], but {ONE_PLATE}')
         return self
 
     @model_validator(mode="after")
@@ -237,12 +255,13 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _weakens_about_the_core(self) -> Self:
-        length, radius = self.plate.degradation_length, self.core.max_radius
-        if radius > _MOST_LENGTHS * length:
-            raise ValueError(
-                f"got plate.degradation_length = {length:g} m beside a core of radius {radius:g} m, "
-                f"but it must be at least 1/{_MOST_LENGTHS} of that"
-            )
+        radius = self.core.max_radius
+        for name, plate in self.target.named:
+            if radius > _MOST_LENGTHS * plate.degradation_length:
+                raise ValueError(
+                    f"got {name}.degradation_length = {plate.degradation_length:g} m beside a core of radius "
+                    f"{radius:g} m, but it must be at least 1/{_MOST_LENGTHS} of that"
+                )
         return self
 
     @model_validator(mode="after")
@@ -274,60 +293,3 @@ def _override_count(data: dict[str, Any], count: int) -> None:
         data["stop"]["max_count"] = count
     if isinstance(data.setdefault("hits", {}), dict) and (not stopped or "count" in data["hits"]):
         data["hits"]["count"] = count
-
-
-def _with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
-    """Distributions moved from the places of their values to `scatter`, their medians in the places."""
-    data, scatter = dict(data), {}
-    for field, (table, kind) in QUANTITIES.items():
-        value = data[table].get(field) if isinstance(data.get(table), dict) else None
-        if isinstance(value, dict):
-            try:
-                scatter[field] = getattr(Scatter.model_validate({field: value}), field)
-            except ValidationError as error:
-                raise CampaignError(f"{name}: {table}.{_sentence(error, {field: value})}") from None
-            median = float(scatter[field].quantile(np.array(0.5)))
-            data[table] = data[table] | {field: quantity(kind).as_read(median)}
-    return data | {"scatter": scatter} if scatter else data
-
-
-def _sentence(error: ValidationError, data: dict[str, Any]) -> str:
-    """The first problem as a sentence, and how many more there are."""
-    problems = error.errors(include_url=False)
-    place, complaint = _place(problems[0], data), _complaint(problems[0])
-    more = len(problems) - 1
-    also = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
-    return f"{place}: {complaint}{also}" if place else f"{complaint}{also}"
-
-
-def _place(problem: ErrorDetails, data: Any) -> str:
-    """Dotted TOML key of a problem, without the chosen `shape` or `distribution`, which pydantic counts as a key."""
-    place = ""
-    for part in problem["loc"]:
-        if isinstance(data, dict) and part not in data and part in (data.get("shape"), data.get("distribution")):
-            continue
-        place += f"[{part}]" if isinstance(part, int) else f".{part}"
-        data = data.get(part) if isinstance(data, dict) else None
-    if problem["type"].startswith("union_tag"):
-        place += f".{problem['ctx']['discriminator'].strip(chr(39))}"
-    return brief(place.removeprefix("."))
-
-
-def _complaint(problem: ErrorDetails) -> str:
-    """What was got and what is allowed."""
-    context = problem.get("ctx", {})
-    match problem["type"]:
-        case "missing" | "union_tag_not_found":
-            return "is missing, but must be given"
-        case "value_error":
-            return str(context["error"])
-        case "union_tag_invalid":
-            return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
-        case "model_type" | "model_attributes_type":
-            return f"got {quoted(problem['input'])}, but it must be a table"
-        case "too_long":
-            return f"got {quoted(problem['input'])}, but it must have at most {context['max_length']} items"
-        case "tuple_type":
-            return f"got {quoted(problem['input'])}, but it must be a list"
-    allowed = problem["msg"].replace("Input should", "it must")
-    return f"got {quoted(problem['input'])}, but {allowed}"

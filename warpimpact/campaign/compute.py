@@ -81,7 +81,7 @@ def compute(
             attr.REPLICATES: campaign.replicates,
             attr.STANDOFF_POINT: campaign.output.standoff_point,
             attr.OPEN_AREA: campaign.plate.open_area,
-            attr.AREAL_DENSITY: campaign.plate.areal_density,
+            attr.AREAL_DENSITY: campaign.target.areal_density,
             attr.CORE: campaign.core.model_dump_json(),
             attr.IMPACT: _impact(campaign),
             attr.MATERIAL: _material(campaign),
@@ -100,11 +100,21 @@ def compute(
     )
     if solid is None:
         return dataset
-    thinner = campaign.plate.solid
-    if solid.thickness is not None:
-        solid = replace(solid, thickness=solid.thickness * (thinner.thickness / campaign.plate.thickness))
-    reference = scene.model_copy(update={"target": thinner})
+    solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
     return dataset.merge(solid_dataset(_outcomes(reference, solid, numerics, device, threads)[0]))
+
+
+def _at_solid(campaign: Campaign, shots: Shots) -> Shots:
+    """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
+    target, plate = campaign.target, campaign.plate
+    own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}
+    if shots.thickness is None and shots.layer_thickness is None:
+        return replace(shots, **own)
+    thickness = shots.own("thickness", plate.thickness) * (plate.solid.thickness / plate.thickness)
+    for k, layer in enumerate(target.layers):
+        share = layer.areal_density / layer.thickness / plate.density
+        thickness = thickness + share * shots.own_of_layer("thickness", k, layer.thickness)
+    return replace(shots, **own, thickness=np.broadcast_to(thickness, len(shots)).copy())
 
 
 def promise_of(campaign: Campaign, device: str = "auto") -> Promise | None:
@@ -221,7 +231,7 @@ def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
-        f"time_step {resolution.step_of(impact, campaign.plate):.4g} s, "
+        f"time_step {resolution.step_in(impact, campaign.target):.4g} s, "
         f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
         f"grid_spacing {resolution.grid_spacing:.4g} m, precision {'double' if resolution.double else 'single'}"
     )

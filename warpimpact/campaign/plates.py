@@ -16,6 +16,8 @@ _NAME = re.compile(r"\w[\w .+-]{,79}")
 def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Campaign]:
     """Read a campaign file with several tables `[[plate]]`, each with a `name`; everything else is shared.
 
+    Tables `[[plate.layer]]` stand behind one of the plates, before what tables `[[layer]]` put behind every plate.
+
     Args:
         path: the TOML file.
         count: number of hits, instead of the file's.
@@ -28,7 +30,7 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
     """
     path = Path(path)
     shared = parsed(read_text(path), str(path))
-    plates = shared.pop("plate", None)
+    plates, behind = shared.pop("plate", None), shared.pop("layer", None)
     if not isinstance(plates, list) or len(plates) < 2:
         raise CampaignError(f"{path}: plate: a comparison needs two or more tables [[plate]], each with a name")
     campaigns: dict[str, Campaign] = {}
@@ -36,10 +38,16 @@ def read_plates(path: str | Path, *, count: int | None = None) -> dict[str, Camp
         name = _name(plate, f"{path}: plate[{place}].name")
         if name in campaigns:
             raise CampaignError(f'{path}: plate[{place}].name: got "{name}" again, but each plate needs its own name')
-        rest = {key: value for key, value in plate.items() if key != "name"}
+        rest = {key: value for key, value in plate.items() if key not in ("name", "layer")}
+        layers = _layers(plate.get("layer"), f"{path}: plate[{place}].layer") + _layers(behind, f"{path}: layer")
         title = {"title": f"{shared['title']}: {name}"} if isinstance(shared.get("title"), str) else {}
         campaigns[name] = Campaign.from_text(
-            json.dumps(shared | title | {"plate": rest}, indent=1, ensure_ascii=False, default=str),
+            json.dumps(
+                shared | title | {"plate": rest} | ({"layer": layers} if layers else {}),
+                indent=1,
+                ensure_ascii=False,
+                default=str,
+            ),
             name=f'{path}, plate "{name}"',
             folder=path.parent,
             count=count,
@@ -57,3 +65,11 @@ def _name(plate: Any, place: str) -> str:
             "digits, blanks and the characters _ . + -, 80 at most"
         )
     return name
+
+
+def _layers(tables: Any, place: str) -> list[Any]:
+    if tables is None:
+        return []
+    if not isinstance(tables, list):
+        raise CampaignError(f"{place}: got {quoted(tables)}, but it must be a list: tables [[layer]]")
+    return tables

@@ -36,19 +36,23 @@ def warn_of(campaign: Campaign) -> None:
 
 def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:
     """Place, kind and value of all that has bounds."""
-    core, plate = campaign.core, campaign.plate
+    core = campaign.core
     yield "core: length", "core.length", core.length
     yield "core: largest diameter", "core.diameter", 2.0 * core.max_radius
     if core.density is not None:
         yield "core.density", "core.density", core.density
     yield "core: mass", "core.mass", core.mass_properties.mass
-    for name in _OF_A_PLATE:
-        yield f"plate.{name}", f"plate.{name}", getattr(plate, name)
-    for side in plate.size or ():
-        yield "plate.size", "plate.size", side
-    if plate.open_area > 0.0:
-        for side in plate.pattern.unit_cell:
-            yield "plate.pattern: cell", "plate.pattern.cell", side
+    for place, plate in campaign.target.named:
+        for name in _OF_A_PLATE:
+            if getattr(plate, name) is not None:
+                yield f"{place}.{name}", f"plate.{name}", getattr(plate, name)
+        for side in plate.size or ():
+            yield f"{place}.size", "plate.size", side
+        if plate.open_area > 0.0:
+            for side in plate.pattern.unit_cell:
+                yield f"{place}.pattern: cell", "plate.pattern.cell", side
+    for k, layer in enumerate(campaign.layer):
+        yield f"layer[{k}].gap", "layer.gap", layer.gap
     for name, value in campaign.impact:
         yield f"impact.{name}", f"impact.{name}", value
     for standoff in campaign.output.standoffs:

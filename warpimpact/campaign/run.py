@@ -220,10 +220,11 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
     """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
     differ but in where they hit."""
     plate = campaign.plate
-    if not campaign.output.solid_reference or plate.solid == plate:
+    if not campaign.output.solid_reference or campaign.target.solid == plate:
         return None
-    conditions = [values for name, values in shots.columns.items() if name not in (v.HIT_Y, v.HIT_Z)]
-    alike = plate.size is None and not any(np.ptp(values) for values in conditions)
+    elsewhere = (v.HIT_Y, v.HIT_Z, "layer_offset_y", "layer_offset_z")
+    conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
+    alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     if alike and campaign.burst is None:
         return shots[:1]
     return shots[: max(1, _MOST_SOLID // campaign.at_a_plate) * campaign.at_a_plate]

@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from warpimpact.analysis.surface import AROUND, pressed
+from warpimpact.analysis.surface import AROUND, largest_in_plate, pressed
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -24,7 +24,7 @@ def pressure(dataset: xarray.Dataset) -> Figure:
 
     Colour and length show the stress as a share of that of the untouched plate at rest (`analysis.surface.pressed`).
     """
-    step = int(np.linalg.norm(dataset[v.FORCE], axis=1).argmax())
+    step = largest_in_plate(dataset)
     surface = pressed(dataset, step)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     figure.suptitle(

@@ -18,6 +18,7 @@ from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
 from scipy.spatial import ConvexHull
 
+from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.plotting.cell import words
 from warpimpact.plotting.pressure import pressure
 from warpimpact.results import attributes as attr
@@ -208,7 +209,7 @@ def _pose_at(dataset: xarray.Dataset, standoff: float) -> Pose:
     axis /= np.linalg.norm(axis)
     ahead = float(dataset[v.STATION].max()) * axis[0] if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0
     position, velocity = end[v.PLATE_POSITION].values, end[v.VELOCITY].values
-    x = dataset.attrs[attr.PLATE_THICKNESS] + standoff - ahead
+    x = depth_of(dataset) + standoff - ahead
     return Pose(position + velocity * ((x - position[0]) / velocity[0]), axis)
 
 
@@ -224,7 +225,7 @@ def two_views(
     corners = {}
     for view in _ANGLES:
         outlines = np.concatenate([silhouette(dataset, pose, view) for pose in poses])
-        hit = [dataset.attrs[attr.PLATE_THICKNESS], float(dataset[v.HIT_POINT[view]])]
+        hit = [depth_of(dataset), float(dataset[v.HIT_POINT[view]])]
         points = np.vstack([outlines, [[0.0, hit[1]], hit]]) * _MM
         corners[view] = points.min(axis=0) - room, points.max(axis=0) + room
     heights = [high[1] - low[1] for low, high in corners.values()]
@@ -237,9 +238,10 @@ def two_views(
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         axes.set(xlabel="x [mm]", ylabel=f"{view} [mm]")
         along = (dataset[v.SECTION] + dataset[v.HIT_POINT[view]]) * _MM
-        solid = dataset[v.SOLID_ALONG[view]].values == 1
-        thickness = dataset.attrs[attr.PLATE_THICKNESS] * _MM
-        axes.fill_betweenx(along, 0.0, thickness, where=solid, step="mid", color=_STEEL, ec="none", zorder=0)
+        for front, rear, solid in slabs(dataset, view):
+            axes.fill_betweenx(
+                along, front * _MM, rear * _MM, where=solid, step="mid", color=_STEEL, ec="none", zorder=0
+            )
         axes.autoscale(False)
     return figure, dict(zip(corners, panels, strict=True))
 

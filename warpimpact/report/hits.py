@@ -10,6 +10,7 @@ import xarray
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
+from warpimpact.analysis.slabs import slabs
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Shown, hit_points, limits, nearest_hits, shown, words
 from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
@@ -128,8 +129,7 @@ def trajectory_data(history: xarray.Dataset) -> dict[str, Any]:
         return {"label": label, "colour": colour} | {view: _outline(history, pose, view) for view in "yz"}
 
     return {
-        "thickness": history.attrs[attr.PLATE_THICKNESS] * _MM,
-        "solid": {view: _solid_ranges(history, view) for view in "yz"},
+        "solid": {view: _solid_boxes(history, view) for view in "yz"},
         "inside": [drawn(*pose, colour) for pose, colour in zip(inside.items(), colours, strict=True)],
         "behind": [drawn(*pose, _BEHIND) for pose in behind.items()],
     }
@@ -144,12 +144,16 @@ def _outline(history: xarray.Dataset, pose: Pose, view: str) -> list[list[float 
     return [_rounded(np.append(coordinate, coordinate[0])) for coordinate in few.T]
 
 
-def _solid_ranges(history: xarray.Dataset, view: str) -> list[list[float]]:
-    """Ranges [mm] in which the plate is solid along y or z through the hit point."""
+def _solid_boxes(history: xarray.Dataset, view: str) -> list[list[float]]:
+    """Front, rear, low and high [mm] of what is solid along y or z through the hit point, in all layers."""
     along = (history[v.SECTION].values + float(history[v.HIT_POINT[view]])) * _MM
-    solid = np.concatenate([[0], history[v.SOLID_ALONG[view]].values, [0]])
-    starts, ends = np.flatnonzero(np.diff(solid) == 1), np.flatnonzero(np.diff(solid) == -1) - 1
-    return [[float(along[start]), float(along[end])] for start, end in zip(starts, ends, strict=True)]
+    boxes = []
+    for front, rear, there in slabs(history, view):
+        edges = np.diff(np.concatenate([[0], there.astype(int), [0]]))
+        starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+        faces = [front * _MM, rear * _MM]
+        boxes += [[*faces, float(along[low]), float(along[high])] for low, high in zip(starts, ends, strict=True)]
+    return boxes
 
 
 def _rounded(values: Array) -> list[float | None]:

@@ -119,8 +119,8 @@
     return Math.hypot(along("y", result.period[0]), along("z", result.period[1]));
   }
 
-  // The core in two views with one scale, x-y above x-z, and the plate cut through the hit point.
-  function drawViews(place, { thickness, solid }, poses) {
+  // The core in two views with one scale, x-y above x-z, and all layers cut through the hit point.
+  function drawViews(place, { solid }, poses) {
     const traces = [], shapes = [];
     [["y", "x", "y"], ["z", "x2", "y2"]].forEach(([view, xaxis, yaxis], row) => {
       for (const { label, colour, [view]: [x, y] } of poses) {
@@ -129,9 +129,9 @@
           fill: "toself", fillcolor: `${colour}40`, line: { color: colour, width: 1.5 }, hoverinfo: "skip",
         });
       }
-      for (const [low, high] of solid[view]) {
+      for (const [front, rear, low, high] of solid[view]) {
         shapes.push({
-          type: "rect", xref: xaxis, yref: yaxis, x0: 0, x1: thickness, y0: low, y1: high,
+          type: "rect", xref: xaxis, yref: yaxis, x0: front, x1: rear, y0: low, y1: high,
           fillcolor: "#bbbbbb", line: { width: 0 }, layer: "below",
         });
       }

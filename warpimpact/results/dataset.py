@@ -16,6 +16,7 @@ import xarray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.scene.target import value_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -66,10 +67,12 @@ def to_dataset(
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES)
     values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
-    ended = (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES)
+    ended = (*v.OUTCOME_VARIABLES, *v.BENDING_VARIABLES, *v.LAYER_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
+    values |= _of_layers(scene, shots)
     values |= _outlines(scene, *((-0.5 * side, 0.5 * side) for side in period))
-    optional = (name for name in (*of_shots, *v.BENDING_VARIABLES) if name in values)
+    layers = (*v.LAYER_VARIABLES, *v.LAYER_FACES)
+    optional = (name for name in (*of_shots, *v.BENDING_VARIABLES, *layers) if name in values)
     variables = [*v.VARIABLES, *optional]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES
@@ -96,9 +99,9 @@ def solid_dataset(outcomes: Outcomes) -> xarray.Dataset:
 def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """Shots and outcomes of the solid plate, with the names of a hit map and along "hit"; None if there are none.
 
-    A solid plate is its own reference.
+    A solid plate that stands alone is its own reference.
     """
-    if dataset.attrs.get(attr.OPEN_AREA) == 0.0:
+    if dataset.attrs.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset.variables:
         return dataset
     if not v.SOLID_VARIABLES.keys() <= dataset.variables.keys():
         return None
@@ -138,7 +141,8 @@ def history_dataset(
     core, plate = scene.core, scene.target.plate
     hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
     history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
-    section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * core.bounding_radius
+    farthest = np.abs(history.position[:, 1:]).max() if scene.target.layers else 0.0
+    section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * (core.bounding_radius + 0.25 * farthest)
     values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}
     values |= {
         v.PLATE_POSITION: history.position + np.array([0.0, hit_y, hit_z]),
@@ -147,6 +151,7 @@ def history_dataset(
         v.SOLID_ALONG_Y: plate.is_solid(hit_y + section, np.array(hit_z)).astype(np.int8),
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
+    values |= _sections(scene, hit, section)
     values |= _outlines(scene, *((float(cells.min()), float(cells.max())) for cells in (replay.cell_y, replay.cell_z)))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
@@ -163,9 +168,51 @@ def history_dataset(
         .assign_coords(_described(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
-    return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES), values)).assign_attrs(
+    layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if scene.target.layers else ()
+    return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         dict(attributes) | {attr.PLATE_THICKNESS: thickness}
     )
+
+
+def _of_layers(scene: Scene, shots: Shots) -> dict[str, NDArray[np.float64]]:
+    """Faces of the layers, and what differs in them from shot to shot; empty if the plate stands alone."""
+    target = scene.target
+    if not target.layers:
+        return {}
+    values = dict(zip(v.LAYER_FACES, target.faces.T, strict=True))
+    for variable in v.LAYER_SCATTER:
+        if variable in shots.columns:
+            name = variable.removeprefix("layer_")
+            own = [shots.own(name, value_in(target.plate, name))]
+            own += [shots.own_of_layer(name, k, value_in(layer, name)) for k, layer in enumerate(target.layers)]
+            values[variable] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
+    return values
+
+
+def _sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
+    """Faces of the layers for one hit, and where each is solid along y and z through the hit point; empty if the plate
+    stands alone."""
+    target, hit_y, hit_z = scene.target, float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
+    if not target.layers:
+        return {}
+
+    def own(name: str) -> list[float]:
+        means = [value_in(plate, name) for plate in target.plates]
+        return hit[f"layer_{name}"].values.tolist() if f"layer_{name}" in hit else means
+
+    thickness = own("thickness")
+    if v.THICKNESS in hit:
+        thickness[0] = float(hit[v.THICKNESS])
+    front = np.array(target.fronts([np.array(one) for one in thickness]))
+    places = list(zip(target.plates, own("offset_y"), own("offset_z"), strict=True))
+    along_y = [plate.is_solid(hit_y - y + section, np.array(hit_z - z)) for plate, y, z in places]
+    along_z = [plate.is_solid(np.array(hit_y - y), hit_z - z + section) for plate, y, z in places]
+    return {
+        v.LAYER_FRONT: front,
+        v.LAYER_REAR: front + np.array(thickness),
+        v.LAYER_SOLID_ALONG_Y: np.array(along_y).astype(np.int8),
+        v.LAYER_SOLID_ALONG_Z: np.array(along_z).astype(np.int8),
+    }
 
 
 def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:

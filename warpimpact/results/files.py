@@ -175,11 +175,14 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         if attr.PLATE_PERIOD not in dataset.attrs:
             raise ResultError(f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"')
         if not is_history(dataset):
-            _check(
-                dataset,
-                path,
-                (*v.COORDINATES, *v.VARIABLES, *v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.ESTIMATE_VARIABLES),
+            optional = (
+                *v.SCATTER_VARIABLES,
+                *v.BURST_VARIABLES,
+                *v.ESTIMATE_VARIABLES,
+                *v.LAYER_VARIABLES,
+                *v.LAYER_FACES,
             )
+            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
 
 

@@ -1,4 +1,7 @@
-"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings."""
+"""The variables of the Datasets: the one place that knows their names, dimensions, units and meanings.
+
+Long because it is one list.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels.status import LayerStatus, Status
 
 if TYPE_CHECKING:
     import xarray
@@ -64,17 +67,17 @@ class Variable(str):
 
     @property
     def is_number_of_hit(self) -> bool:
-        """Whether it has one number per hit, or one per hit and stand-off. Maps and measures need this."""
-        return self.flags is None and self.dims in {("hit",), ("hit", "standoff")}
+        """Whether it has one number with a unit per hit, or one per hit and stand-off. Maps and measures need this."""
+        return self.flags is None and self.units != "1" and self.dims in {("hit",), ("hit", "standoff")}
 
 
-_HIT, _AT_STANDOFF = ("hit",), ("hit", "standoff")
+_HIT, _AT_STANDOFF, _IN_LAYER = ("hit",), ("hit", "standoff"), ("hit", "layer")
 _MAIN = ("run", "inspect", "plot", "report")
 
 # --- Coordinates of a hit map ---
 HIT_Y = Variable("hit_y", _HIT, "m", "hit point on the front face, y")
 HIT_Z = Variable("hit_z", _HIT, "m", "hit point on the front face, z")
-STANDOFF = Variable("standoff", ("standoff",), "m", "distance behind the rear face")
+STANDOFF = Variable("standoff", ("standoff",), "m", "distance behind the rear face of the target")
 AXIS = Variable("axis", ("axis",), "1", "axis of the plate frame")
 
 COORDINATES = (HIT_Y, HIT_Z, STANDOFF, AXIS)
@@ -100,7 +103,16 @@ DEGRADATION = Variable("degradation", _HIT, "1", "share of the resistance left a
 THICKNESS = Variable("thickness", _HIT, "m", "thickness of the plate")
 MASS = Variable("mass", _HIT, "kg", "mass of the core")
 
-SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS)
+LAYER_SCATTER = (
+    Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer"),
+    Variable("layer_resistance", _IN_LAYER, "Pa", "resistance of each layer"),
+    Variable("layer_shear_coefficient", _IN_LAYER, "1", "friction per normal stress of each layer"),
+    Variable("layer_degradation", _IN_LAYER, "1", "share of the resistance left after contact, of each layer"),
+    Variable("layer_offset_y", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, y"),
+    Variable("layer_offset_z", _IN_LAYER, "m", "place of the layer's origin in the plane of the plate, z"),
+)
+
+SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, *LAYER_SCATTER)
 """Present only in a campaign in which they differ from shot to shot."""
 
 # --- Bursts ---
@@ -116,7 +128,7 @@ STATUS = Variable("status", _HIT, "1", "how the shot ended", flags=Status)
 RESIDUAL_VELOCITY = Variable("residual_velocity", _HIT, "m s-1", "residual velocity", shown_by=_MAIN)
 DEFLECTION = Variable("deflection", _HIT, "degree", "angle between residual velocity and line of fire", shown_by=_MAIN)
 ANGULAR_VELOCITY = Variable("angular_velocity", ("hit", "axis"), "rad s-1", "residual angular velocity")
-ENERGY_LOSS = Variable("energy_loss", _HIT, "J", "kinetic energy lost in the plate")
+ENERGY_LOSS = Variable("energy_loss", _HIT, "J", "kinetic energy lost in the target")
 CONTACT_DURATION = Variable("contact_duration", _HIT, "s", "duration of contact")
 TILT = Variable("tilt", _AT_STANDOFF, "degree", "angle between core axis and line of fire", shown_by=_MAIN)
 PITCH = Variable("pitch", _AT_STANDOFF, "degree", "pitch of the core, projected into the x-z plane")
@@ -169,6 +181,28 @@ BENDING_STRESS_SECTION = Variable("bending_stress_section", _HIT, "m", "distance
 BENDING_VARIABLES = (LARGEST_BENDING_MOMENT, BENDING_SECTION, BENDING_STRESS, BENDING_STRESS_SECTION)
 """Present only with `output.bending`."""
 
+LAYER_STATUS = Variable("layer_status", _IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus)
+LAYER_RESIDUAL_VELOCITY = Variable(
+    "layer_residual_velocity", _IN_LAYER, "m s-1", "velocity when the last point of the core leaves the layer"
+)
+LAYER_TILT = Variable(
+    "layer_tilt", _IN_LAYER, "degree", "angle between core axis and line of fire when its last point leaves the layer"
+)
+LAYER_TIME = Variable(
+    "layer_time", _IN_LAYER, "s", "time when the last point of the core leaves the layer, since the first touch"
+)
+STOPPED_IN = Variable("stopped_in", _HIT, "1", "deepest layer that the core rests in; -1 where it does not rest in one")
+DEPTH = Variable("depth", _HIT, "m", "how far behind the front face of that layer any point of the core came")
+
+LAYER_VARIABLES = (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, STOPPED_IN, DEPTH)
+"""Present only with layers behind the plate, which is layer 0."""
+
+LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer, from that of the target")
+LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")
+
+LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
+"""Likewise; of the means where thicknesses scatter."""
+
 RESIDUAL_VELOCITY_ERROR = Variable("residual_velocity_error", _HIT, "m s-1", "estimated error of the residual velocity")
 TILT_ERROR = Variable("tilt_error", _AT_STANDOFF, "degree", "estimated error of the tilt")
 CONVERGED = Variable("converged", _HIT, "1", "whether the estimated errors meet the tolerance, 1 or 0")
@@ -184,7 +218,9 @@ OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *OUTLINE_VARIABLES)
 """Present in every hit map."""
-HIT_NUMBERS = tuple(v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES) if v.is_number_of_hit)
+HIT_NUMBERS = tuple(
+    v for v in (*SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES, *LAYER_VARIABLES) if v.is_number_of_hit
+)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
 # --- History of one hit ---
@@ -222,6 +258,16 @@ SOLID_ALONG_Z = Variable(
     "solid_along_z", ("section",), "1", "1 where the plate is solid along z through the hit point, else 0"
 )
 
+LAYER_SOLID_ALONG_Y = Variable(
+    "layer_solid_along_y", ("layer", "section"), "1", "1 where the layer is solid along y through the hit point, else 0"
+)
+LAYER_SOLID_ALONG_Z = Variable(
+    "layer_solid_along_z", ("layer", "section"), "1", "1 where the layer is solid along z through the hit point, else 0"
+)
+
+LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
+"""Present only with layers behind the plate, as LAYER_FACES, which are those of the hit here."""
+
 HISTORY_VARIABLES = (
     POSITION,
     PLATE_POSITION,
@@ -245,6 +291,7 @@ RESIDUAL_ANGULAR_VELOCITY = "residual_angular_velocity"
 HIT_POINT = {"y": HIT_Y, "z": HIT_Z}
 OUTLINE = {"y": OUTLINE_Y, "z": OUTLINE_Z}
 CELL = {"y": CELL_Y, "z": CELL_Z}
+LAYER_SOLID_ALONG = {"y": LAYER_SOLID_ALONG_Y, "z": LAYER_SOLID_ALONG_Z}
 SOLID_ALONG = {"y": SOLID_ALONG_Y, "z": SOLID_ALONG_Z}
 
 # --- Study of speed and accuracy; some names also occur in a hit map, with another meaning ---
@@ -328,4 +375,4 @@ def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    return [*OUTCOME_VARIABLES, *(name for name in BENDING_VARIABLES if name in dataset)]
+    return [*OUTCOME_VARIABLES, *(name for name in (*BENDING_VARIABLES, *LAYER_VARIABLES) if name in dataset)]

@@ -65,6 +65,7 @@ USUAL = {
     "plate.degradation_length": _length(0.01, 20.0),
     "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", 1.0, (("g/cm^3", 1e3),)),
     "plate.pattern.cell": _length(0.5, 500.0),
+    "layer.gap": _length(0.05, 3_000.0),
     "impact.velocity": Bounds(20.0, 3000.0, "m/s", 1.0, (("km/s", 1e3),)),
     "impact.azimuth": Bounds(0.0, 360.0 * _DEG, "deg", _DEG),
     "impact.pitch": Bounds(0.0, 60.0 * _DEG, "deg", _DEG),

@@ -11,6 +11,7 @@ from .model import Array
 from .plate import Plate
 from .scatter import Scatter
 from .shots import Hits, Impact
+from .target import Layer
 
 _ROUNDING = 1e-12
 """A smaller component of the unit vector along the line of flight, or a smaller angle [rad], counts as 0: cos 90° is
@@ -79,6 +80,20 @@ def check_scatter(hits: Hits, scatter: Scatter) -> None:
             f"got hits.irreducible = true beside a distribution of impact.{turned[0]}, but a symmetry must hold for "
             "every shot; of the impact quantities only velocity may scatter with it"
         )
+
+
+def check_layers(hits: Hits, layers: Sequence[Layer]) -> None:
+    """Refuse layers that may not have the symmetry of `hits.irreducible`.
+
+    Raises:
+        ValueError: names the layer.
+    """
+    for k, layer in enumerate(layers):
+        if hits.irreducible and (layer.open_area > 0.0 or layer.size is not None):
+            raise ValueError(
+                f"got hits.irreducible = true beside layer[{k}] with a pattern or a rim, but only layers that are "
+                "solid and unbounded leave the symmetry of the plate"
+            )
 
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:

@@ -13,7 +13,7 @@ from .units import Length
 
 _WIDEST_GAP = 10.0
 """[m]. Positions are exact to a micrometre within such a gap, and air is left out."""
-_MOST_LAYERS = 64
+MOST_LAYERS = 64
 
 
 class Layer(Plate):
@@ -28,6 +28,13 @@ class Layer(Plate):
     offset: tuple[Length, Length] = (0.0, 0.0)
 
 
+def value_in(plate: Plate, name: str) -> float:
+    """A quantity of a layer by the name that it scatters under; a plate in front has no offset."""
+    if name.startswith("offset"):
+        return plate.offset["yz".index(name[-1])] if isinstance(plate, Layer) else 0.0
+    return float(getattr(plate, name))
+
+
 class Target(Model):
     """What is shot at. Nothing couples its layers but the core.
 
@@ -37,7 +44,7 @@ class Target(Model):
     """
 
     plate: Plate
-    layers: Annotated[tuple[Layer, ...], Field(max_length=_MOST_LAYERS)] = ()
+    layers: Annotated[tuple[Layer, ...], Field(max_length=MOST_LAYERS)] = ()
 
     @field_validator("plate")
     @classmethod
@@ -50,6 +57,11 @@ class Target(Model):
     def plates(self) -> tuple[Plate, ...]:
         """Everything in order: layer 0 is the plate."""
         return (self.plate, *self.layers)
+
+    @property
+    def named(self) -> list[tuple[str, Plate]]:
+        """Everything in order, with its place in a campaign."""
+        return [("plate", self.plate), *((f"layer[{k}]", layer) for k, layer in enumerate(self.layers))]
 
     def fronts(self, thickness: list[Array]) -> list[Array]:
         """Front faces of all layers [m], if their thicknesses [m] are these, of their shapes."""

@@ -68,6 +68,11 @@ def turns(total: int, count: int, slots: int) -> Iterator[tuple[int, int]]:
         yield from ((first + turn * plates, plates) for turn in range(count))
 
 
+def chunk_of(most: int, count: int) -> int:
+    """Shots per launch, at most so many but at least one plate: those at one plate stay together."""
+    return max(1, most // count) * count
+
+
 def spoilt(status: NDArray[np.int32], count: int) -> NDArray[np.int32]:
     """Statuses of all shots, in which a shot fails, too, where the computation of an earlier one at its plate failed:
     nobody knows what that one left of the plate."""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import psutil
 import warp as wp
+
+Scratch = TypeVar("Scratch")
 
 
 class DeviceError(RuntimeError):
@@ -82,3 +85,15 @@ def load(kernel: Any, device: Any) -> None:
     compiles again at the launch.
     """
     kernel.module.load(device, 1 if device.is_cpu else 256)
+
+
+def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
+    """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
+    estimate."""
+    while True:
+        try:
+            return slots, allocate(slots)
+        except (RuntimeError, MemoryError) as error:
+            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
+                raise
+        slots //= 2

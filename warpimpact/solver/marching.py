@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -18,8 +18,17 @@ from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
-from warpimpact.solver.bursts import bytes_of, check_bursts, earlier_hits, in_turns, spoilt, turns, whole_plates
-from warpimpact.solver.device import cores, free_memory, load
+from warpimpact.solver.bursts import (
+    bytes_of,
+    check_bursts,
+    chunk_of,
+    earlier_hits,
+    in_turns,
+    spoilt,
+    turns,
+    whole_plates,
+)
+from warpimpact.solver.device import cores, free_memory, halving, load
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.layering import Passages, deep_cells
 from warpimpact.solver.resolution import Fidelity
@@ -27,7 +36,6 @@ from warpimpact.solver.resolution import Fidelity
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 Progress1 = Callable[[int], None]
-Scratch = TypeVar("Scratch")
 
 CPU_CHUNK = 32
 """Most shots per launch on the CPU: few enough for a smooth progress bar and an even load of the threads."""
@@ -92,16 +100,25 @@ class March:
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
-        """Share of the resistance that is left after some steps of the last shot on the CPU, in the window of its
-        march. All shots hit one plate."""
-        scratch, count = self._scratch(1, *self.cells), len(self.shots)
+        """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of
+        its march. All shots hit one plate."""
+        scratch, before = self._scratch(1, *self.cells), len(self.shots) - 1
+        order = self.inputs.put(np.arange(before + 1), wp.int32)
+        outcomes = self._empty(self.stage.Outcomes, (before + 1,))
+        if self.variant.layered and before:
+            steps = max(1, steps)  # the window of a layer opens with the first step
         self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[-1])
-        order = self.inputs.put(np.arange(count), wp.int32)
-        self._launch(order, self._empty(self.stage.Outcomes, (count,)), scratch, 1, 0, count)
+        if before:
+            self._launch(order, outcomes, scratch, 1, 0, before)
+        for name in self._fields():  # the window of a layer that is not reached stays closed
+            getattr(scratch[0], name).zero_()
+        self._launch(order, outcomes, scratch, 1, before, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
-        exposure = _host(scratch[0].exposure).reshape(self.cells) if self.variant.degrades else np.zeros(self.cells)
-        return self._material() * np.exp(self.arrays.shots["decay_rate"][-1] * exposure)
+        exposure = np.zeros(math.prod(self.cells))
+        if self.variant.degrades and self.arrays.materials[0].weakens:
+            exposure = _host(scratch[0].exposure)[: exposure.size]
+        return self._material() * np.exp(self.arrays.shots["decay_rate"][-1] * exposure.reshape(self.cells))
 
     def body(self) -> MassProperties:
         """Mass properties of the last shot."""
@@ -281,22 +298,17 @@ class March:
             launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)
         else:
-            slots, scratch = _halving(self._slots(*self.cells), lambda slots: self._scratch(slots, *self.cells))
+            slots, scratch = halving(self._slots(*self.cells), lambda slots: self._scratch(slots, *self.cells))
             order = self.inputs.put(in_turns(which, self.at_a_plate, slots), wp.int32)
             for first, count in turns(len(which), self.at_a_plate, slots):
                 self._launch(order, outcomes, scratch, slots, first, count)
                 wp.synchronize_device(self.device)
                 progress(first + count)
 
-    def _cpu_chunk(self, fair: int) -> int:
-        """Shots per launch on the CPU, if so many load the threads evenly: those at one plate stay together."""
-        plates = min(CPU_CHUNK, fair) // self.at_a_plate
-        return max(1, plates) * self.at_a_plate
-
     def _cpu_scratch(self) -> list[Any]:
         """Scratch of one slot for every thread."""
         slots = self._slots(*self.cells)
-        return _halving(slots, lambda slots: [self._scratch(1, *self.cells) for _ in range(slots)])[1]
+        return halving(slots, lambda slots: [self._scratch(1, *self.cells) for _ in range(slots)])[1]
 
     def _on_threads(self, launch: Callable[..., int], slots: list[Any], total: int, progress: Progress1) -> None:
         """Distribute chunks over threads, each with one slot. A CPU launch runs its shots one after another on the
@@ -312,9 +324,9 @@ class March:
             finally:
                 idle.put(scratch)
 
-        done = 0
+        done, chunk = 0, chunk_of(min(CPU_CHUNK, total // (4 * len(slots))), self.at_a_plate)
         with ThreadPoolExecutor(len(slots)) as pool:
-            for count in pool.map(work, _chunks(total, self._cpu_chunk(total // (4 * len(slots))))):
+            for count in pool.map(work, turns(total, 1, chunk)):
                 done += count
                 progress(done)
 
@@ -322,23 +334,6 @@ class March:
 def _after(finished: int, total: int, progress: Progress) -> Progress1:
     """Progress of what comes after the shots already finished."""
     return lambda done: progress(finished + done, total)
-
-
-def _chunks(total: int, size: int) -> Iterator[tuple[int, int]]:
-    """(first, count) of consecutive chunks."""
-    return ((first, min(size, total - first)) for first in range(0, total, size))
-
-
-def _halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
-    """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
-    estimate."""
-    while True:
-        try:
-            return slots, allocate(slots)
-        except (RuntimeError, MemoryError) as error:
-            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
-                raise
-        slots //= 2
 
 
 def _host(array: Any) -> Array:

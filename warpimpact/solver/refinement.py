@@ -12,7 +12,7 @@ from warpimpact.scene import Numerics, Scene, Shots, Tolerance
 from warpimpact.solver.bursts import whole_plates
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import level
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
 
 Array = NDArray[np.float64]
 
@@ -108,8 +108,9 @@ def simulate_to_tolerance(
 
 @dataclass(frozen=True)
 class Change:
-    """What changes between two levels: of the residual velocity [m/s], shape [shots], and of the tilt [rad], shape
-    [shots, stand-offs]. 0 where neither has a value, infinite where the status differs or only one has a value."""
+    """What changes between two levels: of the residual velocity [m/s], or that behind a layer if it changes by more,
+    shape [shots]; and of the tilt [rad], shape [shots, stand-offs]. 0 where neither has a value, infinite where the
+    status differs or only one has a value."""
 
     residual_velocity: Array
     tilt: Array
@@ -119,6 +120,9 @@ class Change:
         """The change from the outcomes of one level to those of another, of the same shots."""
         same = coarse.status == fine.status
         velocity, tilt = _apart(coarse.residual_velocity, fine.residual_velocity), _apart(coarse.tilt, fine.tilt)
+        if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
+            behind = _apart(coarse.layer_residual_velocity, fine.layer_residual_velocity)
+            velocity = np.maximum(velocity, behind.max(axis=1))
         return cls(np.where(same, velocity, np.inf), np.where(same[:, None], tilt, np.inf))
 
     def in_tolerances(self, tolerance: Tolerance) -> Array:

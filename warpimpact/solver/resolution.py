@@ -75,6 +75,9 @@ NODAL: dict[str, Any] = {
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
 
 
+ONE_PLATE = "the nodal scheme knows one plate and no layers behind it; the consistent scheme takes layers"
+
+
 def level(index: int, numerics: Numerics) -> Fidelity:
     """A level of the ladder, in the precision of the numerics."""
     return replace(LADDER[index], double=numerics.precision == "double")
@@ -161,9 +164,7 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
     if numerics.scheme == "nodal":
         defaults = NODAL
         if scene.target.layers:
-            raise ValueError(
-                "the nodal scheme knows one plate and no layers behind it, which the consistent scheme takes"
-            )
+            raise ValueError(ONE_PLATE)
         if plate.degradation_distance is not None:
             raise ValueError(
                 "the nodal scheme weakens the plate once per time step: it knows no degradation_distance, which the "

@@ -101,8 +101,8 @@ class Replay:
         outcomes: how it ended, each of shape [1] or [1, …].
         history: the core at every step, and at the end.
         plate_time: instants at which the plate is shown [s], shape [snapshots]; 0 is the first touch.
-        resistance_share: resistance left, as a share of Y, in the cells that the core may reach: 0 in holes,
-            shape [snapshots, cells_y, cells_z].
+        resistance_share: resistance left, as a share of Y, in the cells of the plate that the core may reach: 0 in
+            holes, shape [snapshots, cells_y, cells_z].
         cell_y, cell_z: centres of those cells in the plate [m], shapes [cells_y] and [cells_z].
     """
 
@@ -186,7 +186,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None =
     return Replay(
         outcomes=replace(outcomes, **{name: values[-1:] for name, values in vars(outcomes).items()}),
         history=History.from_trace(trace, march.body()),
-        plate_time=steps * time_step,
+        plate_time=trace[steps, 0] - 0.5 * time_step if march.variant.layered else steps * time_step,
         resistance_share=np.stack([march.plate_after(count, time_step) for count in steps]),
         cell_y=cell_y,
         cell_z=cell_z,

@@ -12,7 +12,7 @@ from warpimpact.campaign.run import run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.scene import Scene, Shots
-from warpimpact.solver import marching, simulate
+from warpimpact.solver import device, marching, simulate
 from warpimpact.solver.simulate import Outcomes
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -64,7 +64,7 @@ def test_scratch_is_halved_until_it_can_be_had() -> None:
             raise RuntimeError(f"Failed to allocate {slots} bytes on device 'cuda:0'")
         return f"{slots} slots"
 
-    assert marching._halving(1000, allocate) == (62, "62 slots")
+    assert device.halving(1000, allocate) == (62, "62 slots")
 
 
 @pytest.mark.parametrize("error", [RuntimeError("Failed to allocate 8 bytes"), MemoryError(), RuntimeError("other")])
@@ -76,7 +76,7 @@ def test_what_halving_cannot_cure_is_told(error: Exception) -> None:
         raise error
 
     with pytest.raises(type(error)):
-        marching._halving(8, allocate)
+        device.halving(8, allocate)
     assert asked == ([8] if str(error) == "other" else [8, 4, 2, 1])
 
 

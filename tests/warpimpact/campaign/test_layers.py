@@ -1,0 +1,169 @@
+"""Campaigns with layers behind the plate: how they are read, what a result holds, and that a replay gives it again."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign, run
+from warpimpact.campaign.plates import read_plates
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.text import CampaignError
+from warpimpact.kernels.status import LayerStatus
+from warpimpact.scene import Layer
+
+CAMPAIGN = """
+title = "two layers"
+[core]
+shape = "polynomial"
+coefficients = [3.0e-4, 0.24, -5.29]
+length = "27.86 mm"
+mass = "4 g"
+{plate}
+[[layer]]
+gap = "50 mm"
+thickness = "3 mm"
+resistance = "2 GPa"
+pattern = {{ shape = "circle", diameter = "4 mm", spacing = ["9 mm", "9 mm"] }}
+offset = {offset}
+[[layer]]
+gap = "5 mm"
+thickness = {thickness}
+resistance = "8 GPa"
+[impact]
+velocity = "825 m/s"
+[hits]
+count = 16
+seed = 2
+replicates = 8
+[numerics]
+patches_axial = 14
+[output]
+standoffs = ["40 mm"]
+solid_reference = {solid}
+"""
+PLATE = """
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+degradation = 0.8
+pattern = { shape = "slot", length = "12 mm", width = "4 mm", spacing = ["8 mm", "16 mm"], staggered = true }
+"""
+UNKNOWN = '[{ distribution = "uniform", low = "-4.5 mm", high = "4.5 mm" }, "1 mm"]'
+ABOUT = '{ distribution = "normal", mean = "8 mm", std = "0.5 mm" }'
+
+
+def text(**changes: str) -> str:
+    given = {"plate": PLATE, "offset": '["2 mm", "0 mm"]', "thickness": '"8 mm"', "solid": "true"}
+    return CAMPAIGN.format(**given | changes)
+
+
+def campaign(**changes: str) -> Campaign:
+    return Campaign.from_text(text(**changes), name="test", folder=Path())
+
+
+@pytest.fixture(scope="module")
+def result() -> xarray.Dataset:
+    return run(campaign(offset=UNKNOWN, thickness=ABOUT), device="cpu")
+
+
+def test_layers_stand_behind_the_plate_in_order() -> None:
+    target = campaign().target
+    assert [layer.gap for layer in target.layers] == [0.05, 0.005]
+    assert target.layers[0].offset == (2e-3, 0.0)
+    np.testing.assert_allclose(target.faces, [[0.0, 4e-3], [54e-3, 57e-3], [62e-3, 70e-3]])
+    solid, steel = target.solid, 7850.0
+    assert solid.areal_density == pytest.approx(target.areal_density, rel=1e-12)
+    holed = steel * 3e-3 * (1 - np.pi * 4 / 81)
+    assert target.areal_density == pytest.approx(target.plate.areal_density + holed + steel * 8e-3, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('gap = "5 mm"', 'gap = "-5 mm"', r"layer\[1\].gap: got \"-5 mm\", but it must be greater than or equal to 0"),
+        ('gap = "5 mm"', 'gapp = "5 mm"', r'layer\[1\]: got the unknown key "gapp"; did you mean "gap"\?'),
+        ('gap = "5 mm"', 'gap = "50 m"', r"layer\[1\].gap: got \"50 m\", but it must be less than or equal to 10"),
+        ('"8 mm"', "{ distribution = 'normal', mean = '1 mm', std = '1 mm' }", r"layer\[1\].thickness: got a normal"),
+        ('["2 mm", "0 mm"]', '"2 mm"', r"layer\[0\].offset: got \"2 mm\", but it must be a list"),
+        ('["2 mm", "0 mm"]', '["2 mm", {distribution = "x"}]', r"layer\[0\].offset\[1\]"),
+        ("patches_axial = 14", 'scheme = "nodal"', r"got numerics.scheme = \"nodal\" beside 2 \[\[layer\]\]"),
+        ("replicates = 8", "irreducible = true", r"got hits.irreducible = true beside layer\[0\] with a pattern"),
+    ],
+)
+def test_a_message_names_the_layer(old: str, new: str, message: str) -> None:
+    with pytest.raises(CampaignError, match=message):
+        Campaign.from_text(text().replace(old, new), name="test", folder=Path())
+
+
+def test_layers_of_one_plate_stand_before_those_of_all(tmp_path: Path) -> None:
+    first = PLATE.replace("[plate]", '[[plate]]\nname = "one"')
+    second = PLATE.replace("[plate]", '[[plate]]\nname = "two"')
+    liner = '[[plate.layer]]\nthickness = "1 mm"\nresistance = "1 GPa"\n'
+    path = tmp_path / "two.toml"
+    path.write_text(text(plate=first + second + liner))
+    one, two = read_plates(path).values()
+    assert [layer.thickness for layer in one.layer] == [3e-3, 8e-3]
+    assert [layer.thickness for layer in two.layer] == [1e-3, 3e-3, 8e-3]
+
+
+def test_a_result_tells_of_every_layer(result: xarray.Dataset) -> None:
+    assert result.sizes["layer"] == 3
+    assert result["layer_status"].attrs["flag_meanings"].split()[-1] == "not_reached"
+    status = result["layer_status"].values
+    left = (status == LayerStatus.PERFORATED) | (status == LayerStatus.MISSED)
+    for name in ("layer_residual_velocity", "layer_tilt", "layer_time"):
+        np.testing.assert_array_equal(np.isfinite(result[name].values), left, err_msg=name)
+    rests = result["stopped_in"].values >= 0
+    np.testing.assert_array_equal(np.isfinite(result["depth"]), rests)
+    assert (status[rests, result["stopped_in"].values[rests]] == LayerStatus.ARRESTED).all()
+    np.testing.assert_allclose(result["layer_front"], [0.0, 54e-3, 62e-3])
+
+
+def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:
+    thickness, offset = result["layer_thickness"].values, result["layer_offset_y"].values
+    assert (thickness[:, :2] == [4e-3, 3e-3]).all()
+    assert len(np.unique(thickness[:, 2])) == len(np.unique(offset[:, 1])) == result.sizes["hit"]
+    assert np.abs(offset[:, 1]).max() <= 4.5e-3
+    assert (offset[:, [0, 2]] == 0.0).all()
+    assert "layer_resistance" not in result
+    # Draws depend on seed and number alone.
+    every = campaign(offset=UNKNOWN, thickness=ABOUT).sampler()
+    np.testing.assert_array_equal(every.shots(5, 4).layer_offset_y, every.shots(0, 16).layer_offset_y[5:9])
+
+
+def test_solid_reference_is_as_heavy_as_all_layers(monkeypatch: pytest.MonkeyPatch) -> None:
+    from warpimpact.campaign import compute
+
+    seen: list[Any] = []
+    simulate = compute.simulate
+    monkeypatch.setattr(compute, "simulate", lambda *args, **rest: seen.append(args) or simulate(*args, **rest))
+    made = campaign()
+    run(made, device="cpu")
+    (reference,) = [scene for scene, shots in seen if not scene.target.layers]
+    assert reference.target.areal_density == pytest.approx(made.target.areal_density, rel=1e-12)
+
+
+@pytest.mark.parametrize("hit", [0, 7])
+def test_replay_gives_the_stored_end_and_every_layer(result: xarray.Dataset, hit: int) -> None:
+    history = replay(result, hit, folder=Path())
+    assert history.attrs["agreement"] == "bit-identical"
+    faces = np.stack([history["layer_front"], history["layer_rear"]], axis=1)
+    thickness = result["layer_thickness"].values[hit]
+    np.testing.assert_allclose(faces[:, 1] - faces[:, 0], thickness, rtol=1e-12)
+    assert faces[2, 0] == pytest.approx(62e-3)
+    assert history["layer_solid_along_y"].values[2].all()
+    holed = campaign(offset=UNKNOWN, thickness=ABOUT).layer[0]
+    y = history["section"].values + float(history["hit_y"]) - result["layer_offset_y"].values[hit, 1]
+    solid = holed.is_solid(y, np.array(float(history["hit_z"]) - 1e-3))
+    np.testing.assert_array_equal(history["layer_solid_along_y"].values[1], solid)
+    assert (np.diff(history["time"]) > 0.0).all()
+    assert history["resistance_share"].max() <= 1.0
+
+
+def test_a_layer_is_a_plate_with_a_place() -> None:
+    layer = Layer(thickness="3 mm", resistance="2 GPa", gap="1 cm")
+    assert (layer.gap, layer.offset) == (0.01, (0.0, 0.0))
+    assert Layer.model_validate(layer.model_dump()) == layer

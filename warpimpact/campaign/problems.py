@@ -1,0 +1,50 @@
+"""What keeps a campaign from being valid, as a sentence."""
+
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from ..scene.units import brief, quoted
+
+
+def sentence(error: ValidationError, data: dict[str, Any]) -> str:
+    """The first problem as a sentence, and how many more there are."""
+    problems = error.errors(include_url=False)
+    place, complaint = _place(problems[0], data), _complaint(problems[0])
+    more = len(problems) - 1
+    also = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
+    return f"{place}: {complaint}{also}" if place else f"{complaint}{also}"
+
+
+def _place(problem: ErrorDetails, data: Any) -> str:
+    """Dotted TOML key of a problem, without the chosen `shape` or `distribution`, which pydantic counts as a key."""
+    place = ""
+    for part in problem["loc"]:
+        if isinstance(data, dict) and part not in data and part in (data.get("shape"), data.get("distribution")):
+            continue
+        place += f"[{part}]" if isinstance(part, int) else f".{part}"
+        data = data.get(part) if isinstance(data, dict) else None
+    if problem["type"].startswith("union_tag"):
+        place += f".{problem['ctx']['discriminator'].strip(chr(39))}"
+    return brief(place.removeprefix("."))
+
+
+def _complaint(problem: ErrorDetails) -> str:
+    """What was got and what is allowed."""
+    context = problem.get("ctx", {})
+    match problem["type"]:
+        case "missing" | "union_tag_not_found":
+            return "is missing, but must be given"
+        case "value_error":
+            return str(context["error"])
+        case "union_tag_invalid":
+            return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
+        case "model_type" | "model_attributes_type":
+            return f"got {quoted(problem['input'])}, but it must be a table"
+        case "too_long":
+            return f"got {quoted(problem['input'])}, but it must have at most {context['max_length']} items"
+        case "tuple_type":
+            return f"got {quoted(problem['input'])}, but it must be a list"
+    allowed = problem["msg"].replace("Input should", "it must")
+    return f"got {quoted(problem['input'])}, but {allowed}"
