@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, exposure, footprint, interaction, passage, plate_grid, rigid_body
+from . import contact, core_surface, earlier, exposure, footprint, interaction, passage, plate_grid, rigid_body
 from . import shots as conditions
 from .variant import Variant
 
@@ -25,8 +25,8 @@ def build(variant: Variant) -> SimpleNamespace:
     Surface, Pose, Plate, Window, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window, laws.Law
     Body, State, Load = motion.Body, motion.State, motion.Load
     Fields, Footprint, Touches, Shots = contacts.Fields, prints.Footprint, contacts.Touches, launch.Shots
-    passages, own = passage.build(variant), launch.own
-    Passage = passages.Passage
+    passages, hits, own = passage.build(variant), earlier.build(variant), launch.own
+    Passage, Earlier = passages.Passage, hits.Earlier
 
     @wp.struct
     class Layers:
@@ -129,6 +129,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def open_layer(
         layers: Layers,
         stack: Stack,
+        past: Earlier,
         common: Fields,
         shots: Shots,
         slot: wp.int32,
@@ -138,20 +139,14 @@ def build(variant: Variant) -> SimpleNamespace:
         ahead: vec3,
     ):
         """Open the window of a layer where the core will reach it, at first that of the plate about the hit."""
-        home = vec3()
-        again = stack.open[slot * layers.count + layer]
-        if layer > 0 or again:
+        here, home = slot * layers.count + layer, vec3()
+        if layer > 0 or stack.open[here]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
         fields = fields_of(layers, common, layer)
-        window = grid.window_at(
-            layers.plates[layer],
-            own_of(layers.thickness, layer, shot),
-            fields.cells_y,
-            fields.cells_z,
-            0,
-            own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]],
-            own(shots.hit_z, shot) + wp.float64(home[2]) - layers.offset_z[layer, shot % layers.offset_z.shape[1]],
-        )
+        y = own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]]
+        z = own(shots.hit_z, shot) + wp.float64(home[2]) - layers.offset_z[layer, shot % layers.offset_z.shape[1]]
+        thickness = own_of(layers.thickness, layer, shot)
+        window = grid.window_at(layers.plates[layer], thickness, fields.cells_y, fields.cells_z, 0, y, z)
         first = slot * layers.nodes + layers.first[layer]
         window.first += first
         window.home += first
@@ -159,7 +154,8 @@ def build(variant: Variant) -> SimpleNamespace:
         if wp.static(variant.degrades):
             if window.weakens:
                 memories.blank(fields, window)
-        here = slot * layers.count + layer
+                if wp.static(variant.burst):
+                    hits.recall(past, fields, layers.plates[layer], window, slot, layer, shot, y, z)
         stack.window[here] = window
         stack.home[here] = home
         stack.open[here] = True
@@ -171,6 +167,7 @@ def build(variant: Variant) -> SimpleNamespace:
         layers: Layers,
         fields: Fields,
         stack: Stack,
+        past: Earlier,
         passage: Passage,
         shots: Shots,
         slot: wp.int32,
@@ -208,12 +205,12 @@ def build(variant: Variant) -> SimpleNamespace:
                 if not stack.open[here]:
                     ahead = real((front - pose.position[0]) / wp.max(state.velocity[0], one)) * state.velocity
                     ahead = wp.min(one, surface.bounding_radius / (wp.length(ahead) + tiny)) * ahead
-                    open_layer(layers, stack, fields, shots, slot, k, shot, pose, ahead)
+                    open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, ahead)
                 plate = layers.plates[k]
                 seen = in_layer(layers, stack, slot, k, shot, pose)
                 touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
                 if not touch.inside and not stack.near[here] and prints.is_beside(stack.window[here], touch):
-                    open_layer(layers, stack, fields, shots, slot, k, shot, pose, vec3())
+                    open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, vec3())
                     seen = in_layer(layers, stack, slot, k, shot, pose)
                     touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
                 window = stack.window[here]
@@ -226,7 +223,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     reached.first = wp.min(reached.first, k)
                     reached.last = k
                     found.last_ring = surface.rings - 1
-                    found.inside = found.inside and (touch.inside or not window.weakens)
+                    found.inside = found.inside and (touch.inside or not layers.weakens[k])
                 stack.found[here] = touch
                 near = True
             elif low > rear and not passages.has_left(passage, shot, k):
@@ -324,6 +321,14 @@ def build(variant: Variant) -> SimpleNamespace:
             inside = reached.foremost > front and reached.rearmost < rear
             passages.conclude(passage, shot, k, status, inside, reached.deepest - front)
 
+    @wp.func
+    def keep(layers: Layers, common: Fields, stack: Stack, past: Earlier, slot: wp.int32, shot: wp.int32):
+        """Keep what a shot of a burst has added to the layers that it reached, each in its last window there."""
+        for k in range(layers.count):
+            here = slot * layers.count + k
+            if stack.open[here] and layers.weakens[k]:
+                hits.keep(past, common, stack.window[here], slot, shot)
+
     return SimpleNamespace(
         Layers=Layers,
         Stack=Stack,
@@ -335,4 +340,5 @@ def build(variant: Variant) -> SimpleNamespace:
         load_on=load_on,
         free_time=free_time,
         conclude=conclude,
+        keep=keep,
     )

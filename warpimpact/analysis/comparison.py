@@ -238,7 +238,12 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     if not {attr.CORE, attr.IMPACT} <= told.keys():
         raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
-    return {"core": json.loads(told[attr.CORE]), "impact": _in_degrees(json.loads(told[attr.IMPACT])), "output": output}
+    burst = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
+    return burst | {
+        "core": json.loads(told[attr.CORE]),
+        "impact": _in_degrees(json.loads(told[attr.IMPACT])),
+        "output": output,
+    }
 
 
 def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:

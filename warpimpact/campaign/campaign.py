@@ -13,6 +13,8 @@ from ..results.files import ResultError
 from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES
 from ..scene import (
     AnyCore,
+    Burst,
+    BurstSampler,
     Hits,
     Impact,
     Interaction,
@@ -94,6 +96,7 @@ class Campaign(Model):
     scatter: Scatter = Scatter()
     posterior: InputFile | None = None
     stop: Stop | None = None
+    burst: Burst | None = None
     _source: str = PrivateAttr("")
 
     @property
@@ -178,9 +181,17 @@ class Campaign(Model):
     def sampler(self) -> Sampler:
         """Its shots."""
         sampled = (self.impact, self.hits, self.plate, self.scatter, self.replicates)
-        if self.drawn is None:
-            return Sampler(*sampled)
-        return DrawnSampler(self.drawn, self.plate, self.hits.seed, len(self.symmetries), *sampled)
+        if self.drawn is not None:
+            return DrawnSampler(self.drawn, self.plate, self.hits.seed, len(self.symmetries), *sampled)
+        if self.burst is not None:
+            own: dict[str, Any] = {"scatter": self.scatter, "replicates": self.replicates}
+            return BurstSampler(self.impact, self.hits, self.plate, self.burst, **own)
+        return Sampler(*sampled)
+
+    @property
+    def at_a_plate(self) -> int:
+        """Shots at one plate."""
+        return 1 if self.burst is None else self.burst.count
 
     @property
     def drawn(self) -> Posterior | None:
@@ -214,7 +225,8 @@ class Campaign(Model):
     def _stop_computes_no_image(self) -> Self:
         """An answer costs least from the irreducible part of the cell (tests/benchmarks/NOTES.md)."""
         hits = self.hits
-        if self.stop is not None and "irreducible" not in hits.model_fields_set and hits.area == "cell":
+        asked = "irreducible" in hits.model_fields_set or hits.area != "cell"
+        if self.stop is not None and self.burst is None and not asked:
             part = hits.model_copy(update={"irreducible": hits.sampling in ("sobol", "random")})
             with suppress(ValueError):  # of what has no symmetry every hit is computed
                 check_scatter(part, self.scatter)
@@ -254,6 +266,7 @@ class Campaign(Model):
             farthest = 0.5 * max(covered)
         else:
             farthest = max(float(np.abs(listed[name]).max()) for name in ("hit_y", "hit_z"))
+        farthest += 0.0 if self.burst is None else self.burst.reach
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
         allowed = min(_FARTHEST, 2**30 * cell)
@@ -274,6 +287,16 @@ class Campaign(Model):
     def _scheme_knows_layers(self) -> Self:
         if self.layer and self.numerics.scheme == "nodal":
             raise ValueError(f'got numerics.scheme = "nodal" beside {len(self.layer)} [[layer]], but {ONE_PLATE}')
+        return self
+
+    @model_validator(mode="after")
+    def _plate_takes_a_burst(self) -> Self:
+        if self.burst is not None and self.hits.irreducible:
+            raise ValueError("got hits.irreducible = true beside burst, but the hits of a burst have no images")
+        if self.burst is not None and self.numerics.scheme == "nodal":
+            raise ValueError('got numerics.scheme = "nodal" beside burst, but it must be "consistent"')
+        if self.burst is not None and self.posterior is not None:
+            raise ValueError("got a posterior beside burst, but the shots of a burst share one plate, not their draws")
         return self
 
     @model_validator(mode="after")

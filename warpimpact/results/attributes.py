@@ -55,6 +55,9 @@ SYMMETRIES = "symmetries"
 IMAGES = "images"
 """How many hits in a row are images of each other. SYMMETRIES, IMAGES and COMPUTED_HITS need `hits.irreducible`."""
 COMPUTED_HITS = "computed_hits"
+BURST = "burst"
+"""JSON of the burst; likewise only of a campaign of bursts:"""
+SHOTS_AT_A_PLATE = "shots_at_a_plate"
 
 # Core, plate and output
 CORE = "core"

@@ -232,6 +232,7 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
             optional = (
                 *v.SCATTER_VARIABLES,
                 v.POSTERIOR_DRAW,
+                *v.BURST_VARIABLES,
                 *v.ESTIMATE_VARIABLES,
                 *v.LAYER_VARIABLES,
                 *v.LAYER_FACES,

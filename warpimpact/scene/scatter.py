@@ -24,7 +24,7 @@ from pydantic import (
 )
 
 from .model import Array, Model
-from .shots import Obliquity, Shots, Tilt
+from .shots import OF_A_BURST, Obliquity, Shots, Tilt
 from .units import (
     Angle,
     AngularVelocity,
@@ -289,7 +289,7 @@ AnyDistribution = Annotated[
 PURE_NUMBERS = {"distribution", "sigma", "shape", "weights"}
 
 
-class _Scattering(Model):
+class Scattering(Model):
     """Distributions of quantities; None does not differ from shot to shot."""
 
     _quantities: ClassVar[Mapping[str, Quantity]]
@@ -332,7 +332,7 @@ class _Scattering(Model):
         return {name: value for name in self._quantities if (value := getattr(self, name)) is not None}
 
 
-class LayerScatter(_Scattering):
+class LayerScatter(Scattering):
     """Distributions of the quantities of one layer that differ from shot to shot; None does not differ."""
 
     _quantities = OF_A_LAYER
@@ -345,7 +345,7 @@ class LayerScatter(_Scattering):
     offset_z: AnyDistribution | None = None
 
 
-class Scatter(_Scattering):
+class Scatter(Scattering):
     """Distributions of the quantities that differ from shot to shot, beside the hit point; None does not differ.
 
     In a campaign file a distribution takes the place of the value:
@@ -389,4 +389,6 @@ def _read(read: Any, name: str, value: Any) -> Any:
 
 
 assert set(QUANTITIES) == set(Scatter.model_fields) - {"layers"}
-assert {"hit_y", "hit_z", *QUANTITIES, *(f"layer_{name}" for name in OF_A_LAYER)} == set(Shots.__dataclass_fields__)
+assert {"hit_y", "hit_z", *QUANTITIES, *OF_A_BURST, *(f"layer_{name}" for name in OF_A_LAYER)} == set(
+    Shots.__dataclass_fields__
+)
