@@ -191,7 +191,7 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
     for label, measure in zip(labels, measures, strict=True):
         row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
-    if not with_solid:
+    if not with_solid and attr.OPEN_AREA in dataset.attrs:
         rows.append(
             "There is no solid plate to compare with: the result has no shots at one. They are computed unless "
             'output.solid_reference is false, and stand in the group "solid" of the file.'

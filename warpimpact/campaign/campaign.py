@@ -136,6 +136,10 @@ class Campaign(Model):
                 f"{name}: plate: got {len(plates)} plates, but this takes one; warpimpact compare {name} runs them all "
                 "and compares them"
             )
+        if "sweep" in data:
+            raise CampaignError(
+                f"{name}: sweep: this takes one combination of inputs; warpimpact sweep {name} runs them all"
+            )
         if count is not None:
             _override_count(data, count)
         data = with_scatter_apart(data, name)

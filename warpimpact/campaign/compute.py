@@ -1,4 +1,7 @@
-"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here."""
+"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here.
+
+Long because everything that a Dataset tells of its campaign is gathered here.
+"""
 
 from __future__ import annotations
 
@@ -137,6 +140,7 @@ def described(
             attr.HITS_PER_SECOND: computed / elapsed,
         }
         | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
+        | ({attr.LAYERS: _layers(campaign)} if campaign.layer else {})
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, computed) if campaign.hits.irreducible else {})
         | dict(attributes),
@@ -317,6 +321,14 @@ def _plate(campaign: Campaign) -> str:
     if isinstance(file := told["pattern"].get("file"), str):
         told["pattern"]["file"] = Path(file).name
     return json.dumps(told)
+
+
+def _layers(campaign: Campaign) -> str:
+    """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
+    layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
+    for (name, k), given in campaign.scatter.of_layers.items():
+        layers[str(k + 1)][name] = given.model_dump()
+    return json.dumps(layers)
 
 
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:

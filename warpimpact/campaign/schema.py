@@ -33,6 +33,11 @@ def campaign_schema() -> Schema:
     _complete(schema, Campaign)
     _take_distributions(schema)
     _take_plates(schema)
+    schema["properties"]["sweep"] = {
+        "description": 'Values of inputs, such as obliquity or "plate.pattern.width", for warpimpact sweep.',
+        "type": "object",
+        "additionalProperties": {"type": "array", "minItems": 1},
+    }
     definitions["Stop"]["properties"]["half_width"]["type"] = ["number", "string"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

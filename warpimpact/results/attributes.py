@@ -61,6 +61,8 @@ CORE = "core"
 PLATE = "plate"
 IMPACT = "impact"
 MATERIAL = "material"
+LAYERS = "layers"
+"""JSON of what stands behind the plate, by its number; not there where that is nothing."""
 STANDOFF_POINT = "standoff_point"
 OPEN_AREA = "open_area"
 AREAL_DENSITY = "areal_density"
@@ -68,6 +70,10 @@ LIGAMENT = "ligament"
 PLATE_PERIOD = "plate_period"
 PLATE_THICKNESS = "plate_thickness"
 FAILED_SHARE = "failed_share"
+
+# A sweep
+SWEEP = "sweep"
+"""JSON of the swept inputs: name of the dimension → values as they were written."""
 
 # The stop rule
 STOP_QUANTITY = "stop_quantity"

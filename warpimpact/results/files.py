@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
@@ -182,7 +183,10 @@ def open_result(path: str | Path) -> xarray.Dataset:
     """
     with opened(Path(path)):
         pass  # it is a sound result
-    return _opened(Path(path))
+    dataset = _opened(Path(path))
+    found = dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
+    found.set_close(dataset.close)
+    return found
 
 
 @contextmanager
@@ -210,6 +214,12 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
     with _netcdf(path) as dataset:
         if v.SETTING in dataset.variables:
             raise ResultError(f"{path}: is a study of the numerics, as warpimpact study writes, not a map of hits")
+        if attr.SWEEP in dataset.attrs and dataset.get(v.STATUS, dataset).dims != (v.HIT,):
+            inputs = list(json.loads(dataset.attrs[attr.SWEEP]))
+            raise ResultError(
+                f"{path}: is a sweep of {' and '.join(inputs)}; its points are results, or choose one with "
+                f"isel({', '.join(f'{name}=0' for name in inputs)})"
+            )
         missing = {*v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
@@ -228,6 +238,19 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
             )
             _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
+
+
+def read_sweep(path: Path) -> xarray.Dataset:
+    """Read a sweep into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not a sweep.
+    """
+    with _netcdf(path) as dataset:
+        if attr.SWEEP not in dataset.attrs or v.STATUS not in dataset.variables:
+            raise ResultError(f"{path}: is not a sweep, as warpimpact sweep writes")
+        found = dataset.load()
+    return found.set_xindex(v.HIT)
 
 
 def read_study(path: Path) -> xarray.Dataset:

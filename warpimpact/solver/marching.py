@@ -1,4 +1,7 @@
-"""Marches the shots of a scene on a device: windows, memory and threads."""
+"""Marches the shots of a scene on a device: windows, memory and threads.
+
+Long because the windows, the memory and the threads of a march share its state.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +24,7 @@ from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
 from warpimpact.solver.bending import bending_columns
 from warpimpact.solver.device import cores, free_memory, load
+from warpimpact.solver.exits import exits
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.layering import Passages, deep_cells
 from warpimpact.solver.resolution import Fidelity
@@ -144,15 +148,14 @@ class March:
         )
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
         status = contact.status.numpy().astype(np.int8)
-        values |= _exits(contact, status)
+        values |= exits(contact, status)
         bent = self._bending(status) if self.variant.bends else {}
         return {"status": status} | values | bent | self.passages.columns()
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
         """What is known of the bending of every shot."""
         breaks = self.scene.core.strength is not None or self.shots.strength is not None
-        known = self.variant.bends
-        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks) if known else {}
+        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks)
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""
@@ -320,17 +323,6 @@ class March:
             finally:
                 for future in waiting:
                     future.cancel()
-
-
-def _exits(contact: Any, status: NDArray[np.int8]) -> dict[str, Array]:
-    """The state of every core at the end of contact; NaN where the computation failed."""
-    failed, arrested = (status >= Status.UNFINISHED)[:, None], (status == Status.ARRESTED)[:, None]
-    state = {
-        "exit_velocity": np.where(arrested, 0.0, _host(contact.velocity)),
-        "exit_axis": _host(contact.axis),
-        "exit_position": _host(contact.position),
-    }
-    return {name: np.where(failed, np.nan, values) for name, values in state.items()}
 
 
 def _after(finished: int, total: int, progress: Progress) -> Progress1:
