@@ -73,8 +73,9 @@ def read(path: Path) -> xarray.DataTree:
     except Exception as error:  # a file that was altered leads xarray into errors of any class
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
     missing = [name for name in GROUPS if name not in loaded.children]
-    if missing or attr.WARPIMPACT_VERSION not in loaded.attrs or FIT not in loaded.attrs:
-        what = f'group "{missing[0]}"' if missing else f'attribute "{FIT}"'
+    untold = [name for name in (attr.WARPIMPACT_VERSION, FIT, MATERIAL) if name not in loaded.attrs]
+    if missing or untold:
+        what = f'group "{missing[0]}"' if missing else f'attribute "{untold[0]}"'
         raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
     return loaded
 
