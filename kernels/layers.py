@@ -74,13 +74,15 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Reached:
         """Layers that a step can touch, and the ends of the core along x [m]. `first` > `last` if there is none.
-        `deepest` is the largest x that the core has reached so far."""
+        `deepest` is the largest x that the core has reached so far; `clearance` is a lower bound of its distance from
+        the material of layers that it passes through a hole or beside [m]."""
 
         first: wp.int32
         last: wp.int32
         rearmost: real
         foremost: real
         deepest: real
+        clearance: real
 
     @wp.func
     def own_of(values: wp.array2d(dtype=wp.float64), layer: wp.int32, shot: wp.int32):
@@ -106,20 +108,6 @@ def build(variant: Variant) -> SimpleNamespace:
             stack.open[slot * layers.count + k] = False
             stack.near[slot * layers.count + k] = False
         passages.begin(passage, shot, layers.count)
-
-    @wp.func
-    def ends_of(surface: Surface, pose: Pose):
-        """The rearmost and the foremost x of the core [m]."""
-        rearmost, foremost = real(far), real(-far)
-        broadside = surfaces.broadside(pose)
-        index = int(0)
-        while index < surface.rings:
-            ring = surfaces.ring_at(surface, pose, index)
-            aslant, along = ring.half_radial * broadside, ring.half_axial * pose.axis[0]
-            rearmost = wp.min(rearmost, ring.centre[0] - ring.radius * broadside - wp.abs(along - aslant))
-            foremost = wp.max(foremost, ring.centre[0] + ring.radius * broadside + wp.abs(along + aslant))
-            index += 1
-        return rearmost, foremost
 
     @wp.func
     def in_layer(layers: Layers, stack: Stack, slot: wp.int32, layer: wp.int32, shot: wp.int32, pose: Pose):
@@ -194,10 +182,11 @@ def build(variant: Variant) -> SimpleNamespace:
         """Find what a step can touch of every layer; open the windows of layers that are reached for the first time,
         and record the layers that the core has left."""
         reached = Reached()
-        rearmost, foremost = ends_of(surface, pose)
+        rearmost, foremost = surfaces.ends_of(surface, pose)
         reached.rearmost = rearmost
         reached.foremost = foremost
         reached.deepest = wp.max(before.deepest, foremost)
+        reached.clearance = real(far)
         reached.first = layers.count
         reached.last = -1
         margin = half * dt * pose.speed
@@ -224,10 +213,12 @@ def build(variant: Variant) -> SimpleNamespace:
                     open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, vec3())
                     seen = in_layer(layers, stack, slot, k, shot, pose)
                     touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
-                if touch.last_ring >= 0:
-                    if prints.is_clear(plate, stack.window[here], touch):
-                        touch.last_ring = -1
-                        touch.inside = True
+                window = stack.window[here]
+                beside = prints.clearance_at(plate, window, seen.position[1], seen.position[2])
+                reached.clearance = wp.min(reached.clearance, wp.max(zero, beside - surface.bounding_radius))
+                if touch.last_ring >= 0 and prints.is_clear(plate, window, touch):
+                    touch.last_ring = -1
+                    touch.inside = True
                 if touch.last_ring >= 0:
                     reached.first = wp.min(reached.first, k)
                     reached.last = k
@@ -241,12 +232,13 @@ def build(variant: Variant) -> SimpleNamespace:
         return found, reached
 
     @wp.func
-    def jump_of(layers: Layers, shot: wp.int32, reached: Reached):
+    def jump_of(layers: Layers, stack: Stack, slot: wp.int32, shot: wp.int32, reached: Reached):
         """Onset speed of contact per time step [m/s²] of the layers that a step can touch."""
         jump, most = real(0.0), real(0.0)
         for k in range(reached.first, reached.last + 1):
-            jump += layers.onset_jump[k, shot % layers.onset_jump.shape[1]]
-            most = wp.max(most, layers.most_jump[k, shot % layers.most_jump.shape[1]])
+            if stack.found[slot * layers.count + k].last_ring >= 0:
+                jump += layers.onset_jump[k, shot % layers.onset_jump.shape[1]]
+                most = wp.max(most, layers.most_jump[k, shot % layers.most_jump.shape[1]])
         return wp.min(jump, most)
 
     @wp.func
@@ -310,7 +302,10 @@ def build(variant: Variant) -> SimpleNamespace:
                 behind = wp.min(behind, reached.rearmost - rear)
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, vec3(one, zero, zero)))
         forwards, backwards = turning + state.velocity[0], turning - state.velocity[0]
+        across = turning + wp.length(vec3(zero, state.velocity[1], state.velocity[2]))
         time = surface.bounding_radius / wp.max(wp.length(state.velocity), one)
+        if across > zero:
+            time = wp.min(time, reached.clearance / across)
         if forwards > zero:
             time = wp.min(time, ahead / forwards)
         if backwards > zero:

@@ -195,7 +195,7 @@ def build(variant: Variant) -> SimpleNamespace:
             status = ended(surface, body, state, pose, found, touched, initial_energy, thickness)
             if status == RUNNING:
                 if wp.static(variant.layered):
-                    law.onset_jump = stacked.jump_of(target, shot, reached)
+                    law.onset_jump = stacked.jump_of(target, stack, slot, shot, reached)
                 law.onset = laws.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
                 law.steadied = wp.where(motion.swings(body, before_last, last), steadied * law.onset, zero)
                 before_last = last

@@ -275,6 +275,8 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
             f"The plates differ in weight ({weights}). They are ranked by the ratio to the solid plate of the same "
             "areal density; a measure without that ratio says so."
         )
+    if len({d.attrs.get(attr.LAYERS, "") for d in datasets}) > 1:
+        yield "The targets differ in the layers behind the plate."
     if differences := "; ".join(_materials(datasets, names)):
         yield f"The plates differ in material, which no ranking allows for: {differences}."
     texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]

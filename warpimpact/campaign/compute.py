@@ -92,6 +92,7 @@ def compute(
             attr.HITS_PER_SECOND: len(computed) / elapsed,
         }
         | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
+        | ({attr.LAYERS: _layers(campaign)} if campaign.layer else {})
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, len(computed)) if campaign.hits.irreducible else {})
         | ({} if promise is None else _promised(promise))
@@ -197,6 +198,14 @@ def _material(campaign: Campaign) -> str:
     """What the plate resists with, as JSON: of its material, and of the law of its stress."""
     of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "margin", "pattern"})
     return json.dumps(of_plate | campaign.interaction.model_dump())
+
+
+def _layers(campaign: Campaign) -> str:
+    """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
+    layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
+    for (name, k), given in campaign.scatter.of_layers.items():
+        layers[str(k + 1)][name] = given.model_dump()
+    return json.dumps(layers)
 
 
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:

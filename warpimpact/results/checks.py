@@ -18,9 +18,9 @@ _TEXTS = (
     *(attr.TITLE, attr.HISTORY, attr.REFERENCES, attr.CAMPAIGN, attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     *(attr.DEVICE, attr.NUMERICS, attr.NUMERICS_GIVEN, attr.FINGERPRINT, attr.SAMPLING, attr.SYMMETRIES, attr.CORE),
     *(attr.MATERIAL, attr.CAMPAIGN_ANGLES, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
-    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.BURST),
+    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.LAYERS, attr.BURST),
 )
-_TABLES = (attr.CORE, attr.IMPACT, attr.MATERIAL, attr.NUMERICS_GIVEN, attr.RESOLUTION, attr.BURST)
+_TABLES = (attr.CORE, attr.IMPACT, attr.MATERIAL, attr.LAYERS, attr.NUMERICS_GIVEN, attr.RESOLUTION, attr.BURST)
 """Texts that are JSON objects."""
 _COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS, attr.SHOTS_AT_A_PLATE)
 _NUMBERS = (

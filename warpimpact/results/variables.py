@@ -1,6 +1,6 @@
 """The variables of the Datasets: the one place that knows their names, dimensions, units and meanings.
 
-Long because it is one list.
+Long because it is one table.
 """
 
 from __future__ import annotations
