@@ -29,9 +29,10 @@ from ..scene import (
     Target,
     symmetries_used,
 )
+from ..scene.distributions import EDGE
 from ..scene.files import InputFile
 from ..scene.model import Model
-from ..scene.scatter import EDGE, QUANTITIES, check_range
+from ..scene.scatter import QUANTITIES, check_range
 from ..scene.symmetry import check_layers, check_scatter
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title

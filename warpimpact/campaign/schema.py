@@ -9,8 +9,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from ..scene.distributions import PURE_NUMBERS, Distribution
 from ..scene.model import Model
-from ..scene.scatter import PURE_NUMBERS, QUANTITIES, Distribution
+from ..scene.scatter import QUANTITIES
 from .campaign import Campaign
 
 Schema = dict[str, Any]

@@ -8,10 +8,11 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, field_validator, model_validator
 
+from .distributions import EDGE, AnyDistribution, Distribution
 from .model import Array
 from .plate import Plate
 from .sampling import Sampler, stream
-from .scatter import EDGE, QUANTITIES, AnyDistribution, Distribution, Quantity, Scatter, Scattering
+from .scatter import QUANTITIES, Quantity, Scatter, Scattering
 from .shots import Hits, Impact, Shots
 from .units import Length
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .distributions import EDGE
 from .model import Array
 from .plate import Plate
-from .scatter import EDGE, OF_A_LAYER, QUANTITIES, Scatter
+from .scatter import OF_A_LAYER, QUANTITIES, Scatter
 from .shots import Hits, Impact, Shots
 from .sobol import Sobol
 from .symmetry import check_scatter, irreducible_part, symmetries_used
