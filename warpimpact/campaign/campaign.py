@@ -1,4 +1,7 @@
-"""Campaign: one TOML file, validated, as one immutable value."""
+"""Campaign: one TOML file, validated, as one immutable value.
+
+Long because everything that two tables of a file must agree on is checked here.
+"""
 
 import json
 import math
@@ -79,6 +82,7 @@ class Campaign(Model):
         interaction: stress on the surface of the core.
         numerics: how finely the shots are computed.
         output: what is reported.
+        burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
         posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from ..scene.distributions import PURE_NUMBERS, Distribution
 from ..scene.model import Model
-from ..scene.scatter import QUANTITIES
+from ..scene.scatter import OF_A_LAYER, QUANTITIES
 from .campaign import Campaign
 
 Schema = dict[str, Any]
@@ -131,12 +131,22 @@ def _take_distributions(schema: Schema) -> None:
         "description": "A distribution in the place of a value: each shot draws its own.",
         "oneOf": [{"$ref": f"#/$defs/{name}"} for name in kinds],
     }
-    del schema["properties"]["scatter"], definitions["Scatter"]  # a file has its distributions in the places of values
+    # A file has its distributions in the places of values.
+    del schema["properties"]["scatter"], definitions["Scatter"], definitions["LayerScatter"]
     for name, quantity in QUANTITIES.items():
         for definition in _referred(schema, schema["properties"][quantity.table]):
-            value = definition["properties"][name]
-            told = {key: value.pop(key) for key in ("description", "default") if key in value}
-            definition["properties"][name] = told | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
+            _let_scatter(definition["properties"], name)
+    for name in OF_A_LAYER.keys() & definitions["Layer"]["properties"].keys():
+        _let_scatter(definitions["Layer"]["properties"], name)
+    offset = definitions["Layer"]["properties"]["offset"]
+    offset["prefixItems"] = [{"anyOf": [one, {"$ref": "#/$defs/Distribution"}]} for one in offset["prefixItems"]]
+
+
+def _let_scatter(properties: Schema, name: str) -> None:
+    """A distribution may take the place of this value."""
+    value = properties[name]
+    told = {key: value.pop(key) for key in ("description", "default") if key in value}
+    properties[name] = told | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
 
 
 def _referred(schema: Schema, part: Schema) -> list[Schema]:

@@ -75,7 +75,7 @@ def to_dataset(
         v.AXIS: ["x", "y", "z"],
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, v.POSTERIOR_DRAW)
+    of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
     values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
     ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *v.LAYER_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}

@@ -231,7 +231,7 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         if not is_history(dataset):
             optional = (
                 *v.SCATTER_VARIABLES,
-                v.POSTERIOR_DRAW,
+                *v.POSTERIOR_VARIABLES,
                 *v.BURST_VARIABLES,
                 *v.ESTIMATE_VARIABLES,
                 *v.LAYER_VARIABLES,

@@ -106,6 +106,7 @@ MASS = Variable("mass", _HIT, "kg", "mass of the core")
 STRENGTH = Variable("strength", _HIT, "Pa", "strength of the core, a nominal bending stress")
 
 POSTERIOR_DRAW = Variable("posterior_draw", _HIT, "1", "place of the shot's parameters in the posterior")
+POSTERIOR_VARIABLES = (POSTERIOR_DRAW,)
 """Present only in a campaign with a posterior."""
 
 LAYER_SCATTER = (

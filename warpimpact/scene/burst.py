@@ -23,6 +23,11 @@ _DISTANCE, _DIRECTION, _ALONG_Y, _ALONG_Z = range(len(QUANTITIES), len(QUANTITIE
 _NonNegativeLength = Annotated[Length, Field(ge=0)]
 
 
+def _or_one_length(schema: dict[str, Any]) -> None:
+    """A file may give one length, too."""
+    schema["anyOf"].append({"type": ["number", "string"]})
+
+
 class Burst(Scattering):
     """Shots at one plate, one after another: how many, and how their hits lie. Every sample is a fresh plate.
 
@@ -37,9 +42,11 @@ class Burst(Scattering):
     _quantities = {"spacing": Quantity("burst", _NonNegativeLength)}  # noqa: RUF012 (pydantic keeps it private)
 
     count: Annotated[int, Field(strict=True, ge=2, le=100)]
-    spacing: AnyDistribution | None = None
+    spacing: Annotated[AnyDistribution | None, Field(json_schema_extra=_or_one_length)] = None
     offsets: tuple[tuple[Length, Length], ...] | None = None
-    scatter: tuple[_NonNegativeLength, _NonNegativeLength] | None = None
+    scatter: Annotated[
+        tuple[_NonNegativeLength, _NonNegativeLength] | None, Field(json_schema_extra=_or_one_length)
+    ] = None
 
     @model_validator(mode="before")
     @classmethod

@@ -158,7 +158,12 @@ class Lognormal(Continuous):
 
 
 class Weibull(Distribution):
-    """The strength of the weakest link: 63 % of the values lie below `scale`; a large `shape` has little spread."""
+    """The strength of the weakest link.
+
+    Attributes:
+        shape: a large one has little spread.
+        scale: 63 % of the values lie below it.
+    """
 
     distribution: Literal["weibull"] = "weibull"
     shape: _Positive
