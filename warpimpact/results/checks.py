@@ -68,7 +68,10 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
     """What only a map of hits is held to."""
     if "hit" not in dataset.sizes:
         return None
+    chosen = json.loads(dataset.attrs[attr.SWEEP]) if attr.SWEEP in dataset.attrs else ()  # inputs of a sweep's point
     for one in known:
+        if one in chosen and dataset.variables[one].dims == ():
+            continue
         if one in dataset.variables and dataset.variables[one].dims != one.dims:
             return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
     if dataset.sizes.get("standoff", 1) == 0:

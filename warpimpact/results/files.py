@@ -199,8 +199,6 @@ def opened(path: Path) -> Iterator[xarray.Dataset]:
     with opened_either(path) as dataset:
         if is_history(dataset):
             raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
-        if found := unusable(dataset):
-            raise ResultError(f"{path}: {found}")
         yield dataset
 
 
@@ -229,6 +227,8 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 "one, keep its attributes"
             )
         if not is_history(dataset):
+            if found := unusable(dataset):
+                raise ResultError(f"{path}: {found}")
             optional = (
                 *v.SCATTER_VARIABLES,
                 *v.POSTERIOR_VARIABLES,
