@@ -125,6 +125,7 @@ class LimitMap(HitMap):
             attributes={
                 attr.LIMIT: self.quantity,
                 attr.LIMIT_LAYER: self.layer,
+                **self._weights(campaign),
                 attr.LIMIT_TOLERANCE: self.tolerance,
                 attr.LIMIT_HIGHEST: self.highest,
             }
@@ -159,6 +160,16 @@ class LimitMap(HitMap):
             error=float(told[attr.LIMIT_ERROR_P90]),
             shown=told[attr.LIMIT_ERROR_SHOWN],
         )
+
+    def _weights(self, campaign: Campaign) -> dict[str, float]:
+        """What turns the thickness of the layer into the areal density of the target; nothing of a velocity."""
+        if self.quantity == "velocity":
+            return {}
+        layer = campaign.target.plates[self.layer]
+        return {
+            attr.LIMIT_DENSITY: layer.areal_density / layer.thickness,
+            attr.LIMIT_ELSEWHERE: campaign.target.areal_density - layer.areal_density,
+        }
 
     def _put(self, campaign: Campaign, shots: Shots, limits: Limits, images: int) -> Shots:
         """Shots, with their images, as they just perforate."""
