@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, gather
+from warpimpact.analysis.base import base_thickness, has_base
+from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.summary import sampling_note
 from warpimpact.campaign.parts import first_difference
@@ -147,17 +148,20 @@ def compare(
         _check_same_question(datasets[0], names[0], dataset, name)
     pairs = list(combinations(range(len(datasets)), 2))
     used = [_used(datasets[i], names[i], datasets[j], names[j]) for i, j in pairs]
-    densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
-    differ_in_weight, by_ratio = max(densities) > _SAME_WEIGHT * min(densities), set()
+    differ_in_weight, by_ratio = _differ_in_weight(datasets), set()
+    common = set.intersection(*(set(effect_names(dataset)) for dataset in datasets))
+    asked: dict[str, Any] = {"angle": angle, "standoff": standoff, "only": common}
     each = confidence_of_each(confidence, len(pairs))
     measures: list[list[Measure]] = [[] for _ in datasets]
     differences = []
-    for evidences in zip(*(gather(dataset, angle=angle, standoff=standoff) for dataset in datasets), strict=True):
+    for evidences in zip(*(gather(dataset, **asked) for dataset in datasets), strict=True):
         for told, evidence in zip(measures, evidences, strict=True):
             told.append(evidence.measure)
         if any(evidence.numbers is None for evidence in evidences):
             continue
         name = evidences[0].measure.name
+        if name.startswith("base_depth") and _depths_are_bounds(datasets, measures):
+            continue
         if differ_in_weight and not any(math.isnan(evidence.measure.ratio) for evidence in evidences):
             by_ratio.add(name)
         for (i, j), pair in zip(pairs, used, strict=True):
@@ -172,9 +176,39 @@ def compare(
         for name, dataset, told in zip(names, datasets, measures, strict=True)
     )
     at_equal_weight = frozenset(by_ratio) if differ_in_weight else None
-    return Comparison(
-        plates, tuple(differences), tuple(used), at_equal_weight, confidence, tuple(_notes(datasets, names))
-    )
+    notes = (*_notes(datasets, names), *_notes_of_bases(datasets, plates))
+    return Comparison(plates, tuple(differences), tuple(used), at_equal_weight, confidence, notes)
+
+
+def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
+    """Whether weight counts: a search of limits tells itself how heavy a target must be."""
+    densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
+    return attr.LIMIT not in datasets[0].attrs and max(densities) > _SAME_WEIGHT * min(densities)
+
+
+def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[Measure]]) -> bool:
+    """Whether depths cannot be ranked: cores pierce a base and count with its thickness, and the thicknesses differ."""
+    thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
+    return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, measures))
+
+
+def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[Contestant]) -> Iterator[str]:
+    """What there is to say of the bases behind the plates."""
+    based = [has_base(dataset) for dataset in datasets]
+    if any(based) and not all(based) and attr.LIMIT not in datasets[0].attrs:
+        alone = [plate.name for plate, is_based in zip(plates, based, strict=True) if not is_based]
+        yield f"Without layers, and so without a base: {', '.join(alone)}. Measures of a base are left out."
+        return
+    measures = [plate.measures for plate in plates]
+    if all(based) and _depths_are_bounds(datasets, measures):
+        yield (
+            "Cores pierce a base and count with its thickness as depth. The bases differ in thickness, so depths are "
+            "not ranked."
+        )
+    elif any(
+        notes := [f"{plate.name}: {depth_note(plate.measures)}" for plate in plates if depth_note(plate.measures)]
+    ):
+        yield from notes
 
 
 def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> Pair:
@@ -239,7 +273,8 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
         raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
     burst = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
-    return burst | {
+    limit = {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
+    return burst | limit | {
         "core": json.loads(told[attr.CORE]),
         "impact": _in_degrees(json.loads(told[attr.IMPACT])),
         "output": output,
@@ -269,8 +304,8 @@ def _other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
 
 
 def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
-    densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
-    if max(densities) > _SAME_WEIGHT * min(densities):
+    if _differ_in_weight(datasets):
+        densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
         weights = of_each(names, [f"{density:.4g} kg/m²" for density in densities])
         yield (
             f"The plates differ in weight ({weights}). They are ranked by the ratio to the solid plate of the same "

@@ -82,8 +82,14 @@ def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
     for measure in _compared(comparison):
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
-        rows.append((measure.label, _listed(first) if told_apart else "cannot be told apart"))
+        neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
+        rows.append((measure.label, _listed(first) if told_apart else neither))
     return rows
+
+
+def is_ranked(comparison: Comparison, measure: str) -> bool:
+    """Whether the plates are compared in a measure: the notes say why not."""
+    return any(pair.measure == measure for pair in comparison.differences)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -110,7 +116,8 @@ def _ranking(comparison: Comparison, measure: Measure) -> Ranking:
         told = plate.measures[place]
         against = "" if math.isnan(told.ratio_low) else interval_text(told.ratio_low, told.ratio_high)
         value = (f"{plate.areal_density:.2f}", number(told.value), interval_text(told.low, told.high))
-        rows.append((str(ranks[plate.name]), plate.name, *value, number(told.ratio), against))
+        rank = str(ranks[plate.name]) if is_ranked(comparison, measure.name) else "-"
+        rows.append((rank, plate.name, *value, number(told.ratio), against))
     what = " in the ratio to the solid plate" if by_ratio else ""
     return Ranking(
         f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}",

@@ -8,7 +8,7 @@ plate those of statistics/comparisons.py.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -111,13 +111,26 @@ def effectiveness(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: fl
     return [evidence.measure for evidence in gather(dataset, angle=angle, standoff=standoff)]
 
 
+def effect_names(dataset: xarray.Dataset) -> list[str]:
+    """Names of the effects of a result, in the order of its measures."""
+    return [effect.name for effect in effects(dataset, angle=ANGLE, standoff=None)]
+
+
 def gather(
-    dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None, confidence: float = 0.95
+    dataset: xarray.Dataset,
+    *,
+    angle: float = ANGLE,
+    standoff: float | None = None,
+    confidence: float = 0.95,
+    only: Container[str] | None = None,
 ) -> Iterator[Evidence]:
-    """The measures of `effectiveness` one after the other, each with the numbers that it is made of."""
+    """The measures of `effectiveness` one after the other, each with the numbers that it is made of; of some effects
+    `only`, by their names."""
     dealt = dealing(dataset) | {"confidence": confidence}
     reference = solid_reference(dataset)
     for effect in effects(dataset, angle=angle, standoff=standoff):
+        if only is not None and effect.name not in only:
+            continue
         values, solid = effect.over(dataset), None if reference is None else effect.over(reference)
         if effect.kind == "share":
             yield _averaged(effect, _SHARE, values, solid, dealt)
@@ -175,7 +188,7 @@ def _measure(
     )
 
 
-SHOWN_UNITS = {"1": "", "J mm-2": " [J/mm²]"}
+SHOWN_UNITS = {"1": "", "mm": " [mm]", "J mm-2": " [J/mm²]", "kg m-2": " [kg/m²]"}
 """Units behind a label."""
 
 
@@ -191,12 +204,26 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
     for label, measure in zip(labels, measures, strict=True):
         row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
-    if not with_solid and attr.OPEN_AREA in dataset.attrs:
+    if note := depth_note(measures):
+        rows.append(note)
+    if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
         rows.append(
             "There is no solid plate to compare with: the result has no shots at one. They are computed unless "
             'output.solid_reference is false, and stand in the group "solid" of the file.'
         )
     return "\n".join(rows)
+
+
+def depth_note(measures: Sequence[Measure]) -> str:
+    """What to know of the depths in a base that some cores pierce; empty if none does."""
+    share = {measure.name: measure.value for measure in measures}.get("base_pierced_share", 0.0)
+    if not share > 0.0:
+        return ""
+    return (
+        f"{share:.1%} of the cores pierce the base. They count with its thickness as depth, so the depths are lower "
+        "bounds. A thicker base, a witness block, tells the depths; warpimpact limit --quantity thickness --layer N "
+        "tells the thickness that each hit needs."
+    )
 
 
 def plate_text(dataset: xarray.Dataset) -> str:

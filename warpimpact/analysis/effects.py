@@ -11,6 +11,7 @@ import xarray
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
+from warpimpact.analysis import base
 from warpimpact.analysis.summary import slices
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -20,7 +21,8 @@ from warpimpact.scene import AnyCore, Core
 
 Array = NDArray[np.float64]
 
-_NEEDED = (v.STATUS, v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.BROKEN)
+_OF_LIMITS = v.LIMITS["thickness"].value
+_NEEDED = (v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.BROKEN, _OF_LIMITS, *base.NEEDED)
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class Effect:
     Attributes:
         name: for programs.
         label: for people.
-        units: "1", or "J mm-2".
+        units: "1", "mm", "J mm-2" or "kg m-2".
         definition: one sentence.
         source: where it comes from.
         higher_is_better: for whoever is behind the plate.
@@ -54,7 +56,7 @@ class Effect:
 
 
 def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) -> Iterator[Effect]:
-    """All there are for a result.
+    """All there are for a result: of the base first, if there is one; of a search of the limit thickness, the limits.
 
     Args:
         angle: inclination beyond which a core counts as tilted [rad].
@@ -63,6 +65,11 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
     Raises:
         ResultError: the result has no such stand-off.
     """
+    if _OF_LIMITS in dataset:
+        yield from _of_limits(dataset)
+        return
+    if base.has_base(dataset):
+        yield from _of_base()
     standoff, degrees = _at_standoff(dataset, standoff), math.degrees(angle)
     at = f"{standoff * 1e3:g} mm"
     yield Effect(
@@ -135,6 +142,81 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
         higher_is_better=True,
         kind="share",
         values=lambda part: np.where(passed(part), _is_broken(part), np.where(failed(part), np.nan, 1.0)),
+    )
+
+
+def _of_base() -> Iterator[Effect]:
+    """Of the base behind the other layers."""
+    yield Effect(
+        name="base_perforated_share",
+        label="P(base perforated)",
+        units="1",
+        definition="Share of the shots that pass the last layer, the base: they perforate it, or go through a hole of "
+        "it or past its rim. Of the solid plate: the share that perforates it.",
+        source="complete penetration as in MIL-STD-662F, V50 Ballistic Test for Armor",
+        higher_is_better=False,
+        kind="share",
+        values=lambda part: np.where(failed(part), np.nan, passed(part)),
+    )
+    yield Effect(
+        name="base_pierced_share",
+        label="P(base pierced)",
+        units="1",
+        definition="Share of the shots in which the core comes out of the rear face of the last layer, the base, "
+        "whether it rests there or passes.",
+        source="Army criterion; P(base perforated) is that of the Navy: J. A. Zukas and others, Impact Dynamics, Wiley "
+        "1982",
+        higher_is_better=False,
+        kind="share",
+        values=base.is_pierced,
+    )
+    yield Effect(
+        name="base_depth",
+        label="depth in the base",
+        units="mm",
+        definition="How far behind the front face of the last layer, the base, any point of a core comes that rests in "
+        "it, at most the thickness of the base; 0 for a core that stops before the base or bounces off it. A core that "
+        "passes the base counts with this thickness, too: the numbers are lower bounds if any core pierces the base.",
+        source="residual depth of penetration in a backing: Z. Rosenberg, E. Dekel, Terminal Ballistics, Springer 2012",
+        higher_is_better=False,
+        kind="mean",
+        values=lambda part: 1e3 * base.base_depth(part),
+    )
+
+
+def _of_limits(dataset: xarray.Dataset) -> Iterator[Effect]:
+    """Of the thickness that a layer needs to stop every core."""
+    told = dataset.attrs
+    layer, highest = int(told[attr.LIMIT_LAYER]), float(told[attr.LIMIT_HIGHEST])
+    whose = f"layer {layer}" if layer else "the plate"
+
+    def limits(part: xarray.Dataset) -> Array:
+        return np.where(failed(part), np.nan, np.minimum(part[_OF_LIMITS].values, highest))
+
+    yield Effect(
+        name="limit_thickness",
+        label=f"limit thickness of {whose}",
+        units="mm",
+        definition=f"Thickness of {whose} that a core just perforates; a core that perforates the largest thickness "
+        f"tried, {highest * 1e3:g} mm, counts with that.",
+        source="ballistic limit as in MIL-STD-662F, V50 Ballistic Test for Armor, of the thickness at one velocity",
+        higher_is_better=False,
+        kind="mean",
+        values=lambda part: 1e3 * limits(part),
+    )
+    if attr.LIMIT_ELSEWHERE not in told:
+        return
+    elsewhere, density = float(told[attr.LIMIT_ELSEWHERE]), float(told[attr.LIMIT_DENSITY])
+    yield Effect(
+        name="limit_areal_density",
+        label="areal density needed",
+        units="kg m-2",
+        definition=f"Mass per area of the whole target where {whose} has the limit thickness of the hit.",
+        source="armour is compared by its areal density at the limit: Z. Rosenberg, E. Dekel, Terminal Ballistics, "
+        "Springer 2012",
+        higher_is_better=False,
+        kind="mean",
+        values=lambda part: elsewhere + density * limits(part),
     )
 
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray
 
+from warpimpact.analysis import base
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
 from warpimpact.solver.promise import PROMISES
-from warpimpact.statistics.intervals import Estimate
+from warpimpact.statistics.intervals import Estimate, estimate_of
 
 SLICE = 2**18
 """Hits in memory at a time."""
@@ -44,13 +45,15 @@ class Spread:
 class Summary:
     """Outcome counts by status, and the spread of what left the rear face.
 
-    Velocities are in m/s, angles in degrees; ``tilt`` is keyed by the stand-off [m].
+    Velocities are in m/s, angles in degrees; ``tilt`` is keyed by the stand-off [m]. ``base_depth`` [m] counts as
+    `analysis.base.base_depth`; None where no layer is behind the plate.
     """
 
     counts: dict[str, int]
     residual_velocity: Spread
     deflection: Spread
     tilt: dict[float, Spread]
+    base_depth: Spread | None = None
 
 
 def promise_text(dataset: xarray.Dataset) -> str | None:
@@ -85,7 +88,16 @@ def summary(dataset: xarray.Dataset) -> Summary:
         residual_velocity=Spread.of(estimates[velocity]),
         deflection=Spread.of(estimates[deflection]),
         tilt={at: Spread.of(estimates[measure]) for at, measure in zip(standoffs, tilt, strict=True)},
+        base_depth=_base_depth(dataset),
     )
+
+
+def _base_depth(dataset: xarray.Dataset) -> Spread | None:
+    if not base.has_base(dataset):
+        return None
+    needed = dataset[[name for name in base.NEEDED if name in dataset]]
+    depths = np.concatenate([base.base_depth(part) for part in slices(needed)])
+    return Spread.of(estimate_of("mean", depths, **dealing(dataset)))
 
 
 def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
@@ -143,6 +155,10 @@ def summary_text(dataset: xarray.Dataset) -> str:
         _spread_row("deflection", result.deflection, "°"),
     ]
     rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°") for standoff, tilt in result.tilt.items()]
+    if (depth := result.base_depth) is not None and depth.count:
+        shown = replace(depth, mean=1e3 * depth.mean, standard_deviation=1e3 * depth.standard_deviation)
+        low, high = depth.interval
+        rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm"))
     return "\n".join([*rows, *stop_lines(dataset)])
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import xarray
 
+from warpimpact.analysis.proxy import proxy
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import HitMap, described, pilot_of
 from warpimpact.campaign.text import CampaignError
@@ -19,7 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, with_limits
 from warpimpact.results.measures import dealing
-from warpimpact.scene import Shots
+from warpimpact.scene import Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     MOST_RUNS,
@@ -127,6 +128,7 @@ class LimitMap(HitMap):
             attributes={
                 attr.LIMIT: self.quantity,
                 attr.LIMIT_LAYER: self.layer,
+                **self.weights(campaign.target),
                 attr.LIMIT_TOLERANCE: self.tolerance,
                 attr.LIMIT_HIGHEST: self.highest,
             }
@@ -161,6 +163,16 @@ class LimitMap(HitMap):
             error=float(told[attr.LIMIT_ERROR_P90]),
             shown=told[attr.LIMIT_ERROR_SHOWN],
         )
+
+    def weights(self, target: Target) -> dict[str, float]:
+        """What turns the thickness of the layer into the areal density of the target; nothing of a velocity."""
+        if self.quantity == "velocity":
+            return {}
+        layer = target.plates[self.layer]
+        return {
+            attr.LIMIT_DENSITY: layer.areal_density / layer.thickness,
+            attr.LIMIT_ELSEWHERE: target.areal_density - layer.areal_density,
+        }
 
     def _put(self, campaign: Campaign, shots: Shots, limits: Limits, images: int) -> Shots:
         """Shots, with their images, as they just perforate."""
@@ -235,6 +247,7 @@ def limits_text(dataset: xarray.Dataset) -> str:
         for hit, obliquity in enumerate(dataset[v.OBLIQUITY].values):
             ends = f"{factor * lower[hit]:.5g} and {factor * upper[hit]:.5g} {unit}"
             rows.append(f"{hit:>4} {obliquity:>9.4g}° {factor * value[hit]:>11.5g} {unit:<4}   {ends}")
+        rows += _proxy_lines(dataset)
     else:
         for name, estimate in quantiles(dataset).items():
             ends = f"{factor * estimate.low:.5g} to {factor * estimate.high:.5g}"
@@ -253,6 +266,18 @@ def limits_text(dataset: xarray.Dataset) -> str:
     rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
     rows.append(promise_line(dataset))
     return "\n".join(rows)
+
+
+def _proxy_lines(dataset: xarray.Dataset) -> list[str]:
+    """The proxy beside the limit thickness of a solid plate; none of another search."""
+    found = proxy(dataset) if dataset.attrs[attr.LIMIT] == "thickness" else None
+    if found is None:
+        return []
+    rows = ["proxy: energy over presented area and resistance, as a depth, and its ratio to the limit thickness"]
+    rows.append(f"{'hit':>4} {'inclination':>12} {'proxy':>12}   ratio")
+    for hit, (inclination, depth, ratio) in enumerate(zip(*found, strict=True)):
+        rows.append(f"{hit:>4} {inclination:>11.4g}° {1e3 * depth:>9.4g} mm   {ratio:.3f}")
+    return rows
 
 
 def promise_line(dataset: xarray.Dataset) -> str:

@@ -50,8 +50,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
     for measures, (left, right) in zip(effects, panels, strict=True):
         _draw_plates(left, comparison, measures)
         _draw_differences(right, comparison, measures)
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    legend = dict(zip(labels, handles, strict=True))  # each entry once
+    entries = [zip(*reversed(left.get_legend_handles_labels()), strict=True) for left in panels[:, 0]]
+    legend = {label: handle for some in entries for label, handle in some}  # each entry once
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
     used = "\n".join(hits_used(comparison))
     figure.suptitle(f"{used}\n95 % intervals; hollow marker: cannot be told apart", fontsize="medium")
@@ -97,12 +97,16 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Mea
             _, marker, colour, offset = _STYLES[_statistic(names[pair.measure])]
             hollow = not pair.told_apart
             _draw_interval(axes, line + offset, pair, (marker, colour), hollow=hollow)
+    if not lines:
+        axes.set_axis_off()
+        axes.set_title("not ranked", fontsize="medium", loc="left")
+        return
     axes.axvline(0.0, color=_GREY, linewidth=1.0)
     _furnish(axes, [f"{one} − {other}" for one, other in lines])
     by_ratio = measures[0].name in (comparison.at_equal_weight or ())
-    difference = "difference of the ratios to the solid plates" if by_ratio else "difference"
+    difference = "difference of the ratios to the solid plates;\n" if by_ratio else "difference; "
     better = "right" if measures[0].higher_is_better else "left"
-    axes.set_title(f"{difference}; {better} of 0 the first plate is better", fontsize="medium", loc="left")
+    axes.set_title(f"{difference}{better} of 0 the first plate is better", fontsize="medium", loc="left")
 
 
 def _draw_interval(

@@ -10,6 +10,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.hit_map import hit_points
+from warpimpact.analysis.proxy import inclination
 from warpimpact.optimisation.limit import QUANTILES, promise_line, quantiles
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.results import attributes as attr
@@ -56,12 +57,15 @@ def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
 
 
 def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
-    """Limits of hits at one place, with the secant of the obliquity from the least oblique one on."""
+    """Limits of hits at one place, with the secant of the obliquity from the least oblique one on; where all have one
+    obliquity, against the inclination of the core."""
     unit, factor = _UNITS[quantity]
     figure = Figure(figsize=(7.4, 5.2), layout="constrained")
     axes = figure.subplots()
     value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
-    axes.plot(obliquity, factor * value, "o", color=_BLUE, label=f"limit {quantity}")
+    yawed = np.ptp(obliquity) == 0.0
+    along = np.degrees(inclination(dataset)) if yawed else obliquity
+    axes.plot(along, factor * value, "o", color=_BLUE, label=f"limit {quantity}")
     first = int(np.argmin(obliquity))
     if np.ptp(obliquity) > 0.0 and np.isfinite(value[first]):
         angles = np.linspace(obliquity.min(), obliquity.max())
@@ -69,7 +73,8 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
         law = growth if quantity == "velocity" else 1.0 / growth
         label = "as 1/cos(obliquity)" if quantity == "velocity" else "as cos(obliquity)"
         axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=label)
-    axes.set(xlabel="obliquity [°]", ylabel=f"limit {quantity} [{unit}]")
+    across = "between axis and line of fire on impact" if yawed else "obliquity"
+    axes.set(xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
     axes.grid(color="0.9")
     axes.set_axisbelow(True)
     axes.legend(frameon=False)

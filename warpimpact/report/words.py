@@ -14,7 +14,7 @@ import xarray
 
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
-from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.effectiveness import depth_note, effectiveness
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.study import QUANTITIES
 from warpimpact.analysis.study_text import study_text
@@ -54,7 +54,7 @@ class Row(NamedTuple):
 
 def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
-    attributes = dataset.attrs
+    attributes, measures = dataset.attrs, effectiveness(dataset)
     return {
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
@@ -62,11 +62,11 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "asked": _asked(dataset),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),
-        "caveats": _caveats(dataset),
+        "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures)])],
         "tables": _tables(dataset),
         "statuses": list(_statuses(dataset)),
         "numbers": list(_numbers(dataset)),
-        "measures": effectiveness(dataset),
+        "measures": measures,
         "plate": _plate(dataset),
         "provenance": {words(key): str(attributes[key]) for key in _PROVENANCE if key in attributes},
         "speed": float(f"{attributes.get(attr.HITS_PER_SECOND, 0.0):.2g}"),

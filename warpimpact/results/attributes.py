@@ -91,6 +91,10 @@ LIMIT = "limit"
 """The quantity: "velocity" or "thickness"."""
 LIMIT_LAYER = "limit_layer"
 """Whose thickness was searched; 0 is the plate."""
+LIMIT_DENSITY = "limit_density"
+"""Mass per area and thickness of that layer, its holes included."""
+LIMIT_ELSEWHERE = "limit_elsewhere"
+"""Areal density of all other layers."""
 LIMIT_TOLERANCE = "limit_tolerance"
 LIMIT_HIGHEST = "limit_highest"
 LIMIT_RESOLUTION = "limit_resolution"
@@ -115,6 +119,8 @@ UNITS = {
     TOLERANCE_TILT: "degree",
     OPEN_AREA: "1",
     AREAL_DENSITY: "kg m-2",
+    LIMIT_DENSITY: "kg m-3",
+    LIMIT_ELSEWHERE: "kg m-2",
     LIGAMENT: "m",
     PLATE_PERIOD: "m",
     PLATE_THICKNESS: "m",

@@ -109,8 +109,10 @@ POSTERIOR_DRAW = Variable("posterior_draw", _HIT, "1", "place of the shot's para
 POSTERIOR_VARIABLES = (POSTERIOR_DRAW,)
 """Present only in a campaign with a posterior."""
 
+LAYER_THICKNESS = Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer")
+
 LAYER_SCATTER = (
-    Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer"),
+    LAYER_THICKNESS,
     Variable("layer_resistance", _IN_LAYER, "Pa", "resistance of each layer"),
     Variable("layer_shear_coefficient", _IN_LAYER, "1", "friction per normal stress of each layer"),
     Variable("layer_degradation", _IN_LAYER, "1", "share of the resistance left after contact, of each layer"),

@@ -1,0 +1,186 @@
+"""Protection in the base behind a plate: what counts where, by hand; rankings by it; the proxy beside the limit."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import best_rows, comparison_text
+from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiveness_text
+from warpimpact.analysis.proxy import proxy
+from warpimpact.analysis.summary import summary, summary_text
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.plates import read_plates
+from warpimpact.kernels.status import Status
+from warpimpact.optimisation.limit import LimitMap, limits_text
+from warpimpact.plotting import comparison_figure
+from warpimpact.results.dataset import with_limits
+from warpimpact.results.files import ResultError
+from warpimpact.results.variables import STATUS
+from warpimpact.solver.limit import Limits
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+
+
+def layered(
+    result: xarray.Dataset, stopped_in: np.ndarray, depth: np.ndarray, base: float = 10e-3, **columns: np.ndarray
+) -> xarray.Dataset:
+    """The same of a plate of 4 mm, 100 mm of air and a base of this thickness [m]."""
+    return result.assign(
+        stopped_in=("hit", stopped_in),
+        depth=("hit", depth),
+        layer_status=(("hit", "layer"), np.zeros((len(depth), 2), dtype=np.int8)),
+        layer_front=("layer", [0.0, 0.104]),
+        layer_rear=("layer", [0.004, 0.104 + base]),
+        **{name: (("hit", "layer"), values) for name, values in columns.items()},
+    )
+
+
+def named(dataset: xarray.Dataset) -> dict[str, Measure]:
+    return {measure.name: measure for measure in effectiveness(dataset)}
+
+
+@pytest.fixture
+def mixed(make_plate_result) -> xarray.Dataset:
+    """Cores that pass, rest in the base with and without the nose behind it, stop in the plate, bounce off, fail."""
+    status = [
+        Status.PERFORATED,
+        Status.ARRESTED,
+        Status.ARRESTED,
+        Status.ARRESTED,
+        Status.RICOCHETED,
+        Status.UNFINISHED,
+    ]
+    velocity, nan = np.array([400.0, 0.0, 0.0, 0.0, 90.0, np.nan]), np.nan
+    result = make_plate_result(velocity, 0.0, np.array(status))
+    depth = np.array([nan, 6e-3, 17e-3, 25e-3, nan, nan])
+    result["status"].attrs, result["deflection"] = STATUS.attributes, result["residual_velocity"]
+    return layered(result, np.array([-1, 1, 1, 0, -1, -1]), depth)
+
+
+def test_what_counts_in_the_base(mixed) -> None:
+    measures = named(mixed)
+    assert measures["base_perforated_share"].value == pytest.approx(1 / 5)
+    assert measures["base_pierced_share"].value == pytest.approx(2 / 5)
+    assert measures["base_depth"].value == pytest.approx((10 + 6 + 10 + 0 + 0) / 5)
+    assert (measures["base_depth_worst_point"].value, measures["base_depth"].units) == (pytest.approx(10.0), "mm")
+    text = effectiveness_text(mixed)
+    assert text.index("P(base perforated)") < text.index("residual energy fraction")
+    assert "40.0% of the cores pierce the base" in text
+    assert summary(mixed).base_depth.mean == pytest.approx(5.2e-3)
+    assert "depth in the base" in summary_text(mixed)
+
+
+def test_a_base_that_holds_needs_no_note_and_a_single_plate_has_no_base(mixed, make_plate_result) -> None:
+    held = mixed.isel(hit=[1, 3, 4])
+    assert "of the cores pierce" not in effectiveness_text(held)
+    assert named(held)["base_depth"].value == pytest.approx(2.0)
+    alone = make_plate_result(np.full(3, 500.0))
+    assert not [name for name in named(alone) if name.startswith("base")]
+    alone["status"].attrs, alone["deflection"] = STATUS.attributes, alone["residual_velocity"]
+    assert summary(alone).base_depth is None
+
+
+def test_the_thickness_of_the_base_is_that_of_the_shot(mixed) -> None:
+    own = np.stack([np.full(6, 4e-3), [8e-3, 9e-3, 12e-3, 5e-3, 5e-3, 5e-3]], axis=1)
+    scattered = mixed.assign(layer_thickness=(("hit", "layer"), own))
+    assert named(scattered)["base_depth"].value == pytest.approx((8 + 6 + 12 + 0 + 0) / 5)
+
+
+def test_worst_tenth_and_intervals(make_plate_result) -> None:
+    depth = np.linspace(1e-3, 9e-3, 1000)
+    result = make_plate_result(np.zeros(1000), 0.0, Status.ARRESTED)
+    measures = named(layered(result, np.ones(1000, dtype=int), depth))
+    mean, worst = measures["base_depth"], measures["base_depth_worst_tenth"]
+    assert (mean.value, worst.value) == (pytest.approx(5.0), pytest.approx(8.6, abs=0.01))
+    assert mean.low < mean.value < mean.high
+    assert worst.low < worst.value < worst.high
+
+
+def test_the_solid_plate_of_the_whole_target_is_perforated_or_not(make_plate_result) -> None:
+    status = np.where(np.arange(400) % 4 == 0, Status.PERFORATED, Status.ARRESTED)
+    result = layered(make_plate_result(np.full(400, 100.0), 0.0, status), np.ones(400, dtype=int), np.full(400, 5e-3))
+    solid = result.assign(
+        solid_status=("solid_hit", [np.int8(0)]),
+        solid_residual_velocity=("solid_hit", [300.0]),
+        solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
+    )
+    measure = named(solid)["base_perforated_share"]
+    assert (measure.value, measure.solid, measure.ratio) == (pytest.approx(0.25), 1.0, pytest.approx(0.25))
+    assert math.isnan(named(solid)["base_depth"].solid)
+
+
+def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -> None:
+    numbers, held = np.random.default_rng(2), np.ones(400, dtype=int)
+    depth = numbers.uniform(2e-3, 6e-3, 400)
+    result = make_plate_result(np.zeros(400), 0.0, Status.ARRESTED)
+    good, bad = layered(result, held, depth), layered(result, held, depth + 1e-3)
+    comparison = compare([bad, good], ["bad", "good"])
+    assert dict(best_rows(comparison))["depth in the base, mean"] == "good"
+    assert comparison.ranks("base_depth") == {"bad": 2, "good": 1}
+    # A thinner base that is pierced would win by its bound alone.
+    thin = layered(result, held, depth + 1e-3, base=3e-3)
+    comparison = compare([thin, good], ["thin", "good"])
+    assert dict(best_rows(comparison))["depth in the base, mean"] == "not ranked"
+    assert dict(best_rows(comparison))["P(base pierced)"] == "good"
+    assert "depths are not ranked" in comparison_text(comparison)
+    assert "not ranked" in {axes.get_title(loc="left") for axes in comparison_figure(comparison).axes}
+
+
+def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result, mixed) -> None:
+    alone = make_plate_result(np.full(6, 500.0))
+    comparison = compare([mixed, alone], ["layered", "alone"])
+    assert [one.name for one in comparison.plates[0].measures] == [one.name for one in effectiveness(alone)]
+    assert "Without layers, and so without a base: alone." in comparison_text(comparison)
+
+
+def limits(result: xarray.Dataset, thickness: np.ndarray, elsewhere: float) -> xarray.Dataset:
+    """The result of a search of the limit thickness of a base [m] behind so many kg/m²."""
+    ends = (thickness, thickness, np.ones(len(thickness)), np.ones(len(thickness), dtype=bool))
+    found = with_limits(result, "thickness", Limits(thickness, *ends, None, None), 1)
+    told = {"limit": "thickness", "limit_layer": 1, "limit_highest": 20e-3, "limit_density": 8000.0}
+    return found.assign_attrs(told | {"limit_elsewhere": elsewhere})
+
+
+def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> None:
+    result, numbers = make_plate_result(np.zeros(400)), np.random.default_rng(2)
+    thickness = numbers.uniform(4e-3, 6e-3, 400)
+    thickness[0] = np.inf  # not stopped by 20 mm
+    front, base = limits(result, thickness - 1e-3, 20.0), limits(result, thickness, 0.0)
+    measures = named(front)
+    expected = np.minimum(thickness - 1e-3, 20e-3)
+    assert measures["limit_thickness"].value == pytest.approx(1e3 * expected.mean())
+    assert measures["limit_areal_density"].value == pytest.approx(20.0 + 8000.0 * expected.mean())
+    assert "solid plate" not in effectiveness_text(front)
+    comparison = compare([front, base.assign_attrs(areal_density=99.0)], ["with a plate", "base alone"])
+    assert dict(best_rows(comparison))["limit thickness of layer 1, mean"] == "with a plate"
+    assert dict(best_rows(comparison))["areal density needed, mean"] == "base alone"
+    assert comparison.at_equal_weight is None
+    with pytest.raises(ResultError, match="limit"):
+        compare([front, result], ["limits", "run"])
+
+
+def test_a_search_tells_the_weights_of_the_target() -> None:
+    target = read_plates(CAMPAIGNS / "base_thickness.toml")["base of 5 mm"].target
+    told = LimitMap("thickness", 1e-5, 0.1, 1).weights(target)
+    assert told["limit_density"] == pytest.approx(7850.0)
+    assert told["limit_elsewhere"] + 7850.0 * 5e-3 == pytest.approx(target.areal_density)
+    assert LimitMap("velocity", 1.0, 3000.0).weights(target) == {}
+
+
+def test_the_proxy_beside_the_limit_thickness() -> None:
+    """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
+    campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
+    job = LimitMap.of(campaign, "thickness")
+    dataset = job.compute(campaign, campaign.sampler().shots(0, 7), promise=None, device="cpu")
+    thickness, found = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
+    assert found is not None
+    assert found.inclination == pytest.approx([0, 15, 30, 45, 60, 75, 85])
+    assert thickness[[0, -1]] == pytest.approx([6.3, 2.3], abs=0.1)
+    assert thickness[0] / thickness[-1] == pytest.approx(2.8, abs=0.1)
+    assert found.depth[0] / found.depth[-1] == pytest.approx(4.44, abs=0.01)
+    assert found.ratio == pytest.approx([1.51, 1.01, 1.01, 1.08, 1.10, 1.04, 0.95], abs=0.03)
+    assert "proxy" in limits_text(dataset)
