@@ -36,7 +36,8 @@ class LayerStatus(IntEnum):
     UNFINISHED = 4
     LEFT_WINDOW = 5
     NOT_FINITE = 6
-    NOT_REACHED = 7
+    GAINED_ENERGY = 7
+    NOT_REACHED = 8
 
 
 _SENTENCES = {

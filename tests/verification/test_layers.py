@@ -241,3 +241,19 @@ def test_ricochet_from_a_layer_is_that_of_the_target(device: str) -> None:
     assert (outcomes.layer_status[:, 1] == LayerStatus.RICOCHETED).all()
     assert (outcomes.stopped_in == -1).all()
     assert np.isnan(outcomes.depth).all()
+
+
+def test_a_layer_tells_how_the_computation_failed_in_it(device: str) -> None:
+    # In single precision the spin of so slender a body is what rounding leaves of its tumbling.
+    thin = PAPER_CORE.model_copy(update={"inertia_axial": 1e-7 * CORE.inertia_axial})
+    hard = solid_plate(thickness=4e-3, resistance=1e11)
+    shots = shots_at([0.0], [0.0], velocity=20.0, obliquity=28.6, pitch=57.3, spin=1e5)
+    got = layered(hard, layer(hard, gap=50e-3), shots=shots, core=thin, fidelity="draft", device=device)
+    assert (got.status == Status.GAINED_ENERGY).all()
+    assert got.layer_status.tolist() == [[LayerStatus.GAINED_ENERGY, LayerStatus.NOT_REACHED]]
+
+
+def test_codes_of_layers_are_those_of_shots() -> None:
+    codes = {status.name: status.value for status in LayerStatus}
+    assert codes.pop("NOT_REACHED") not in list(Status)
+    assert codes == {status.name: status.value for status in Status}

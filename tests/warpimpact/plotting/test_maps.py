@@ -252,7 +252,7 @@ def test_overview_has_no_map_of_one_colour(perforated):
     assert len(overview(perforated.isel(standoff=[1])).axes) == 6  # three maps, each with its colour bar
 
 
-@pytest.mark.parametrize("status", [Status.PERFORATED, Status.ARRESTED, Status.NOT_FINITE])
+@pytest.mark.parametrize("status", [Status.PERFORATED, Status.ARRESTED, Status.NOT_FINITE, Status.GAINED_ENERGY])
 def test_uniform_results_draw_without_complaint(make_result, status):
     dataset = make_result([status] * 100)
     dataset["residual_velocity"][:] = 764.0

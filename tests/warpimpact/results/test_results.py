@@ -117,6 +117,7 @@ def test_status_codes_reads_the_flags(make_result):
     codes = status_codes(make_result())
     assert codes["arrested"] == Status.ARRESTED
     assert codes["not_finite"] == Status.NOT_FINITE
+    assert codes["gained_energy"] == Status.GAINED_ENERGY
     assert len(codes) == len(Status)
 
 
