@@ -274,11 +274,15 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
     burst = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
     limit = {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
-    return burst | limit | {
-        "core": json.loads(told[attr.CORE]),
-        "impact": _in_degrees(json.loads(told[attr.IMPACT])),
-        "output": output,
-    }
+    return (
+        burst
+        | limit
+        | {
+            "core": json.loads(told[attr.CORE]),
+            "impact": _in_degrees(json.loads(told[attr.IMPACT])),
+            "output": output,
+        }
+    )
 
 
 def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
