@@ -47,7 +47,7 @@ from warpimpact.scene import (
     TrianglePattern,
     make_shots,
 )
-from warpimpact.solver.promise import PILOT, PROMISES, keep
+from warpimpact.solver.promise import PROMISES, keep
 from warpimpact.solver.refinement import simulate_to_tolerance
 from warpimpact.solver.resolution import FIDELITIES, LADDER, Fidelity
 from warpimpact.solver.simulate import simulate
@@ -273,7 +273,7 @@ class Row:
 
 def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
     """The promise of a name, found by a pilot of other hits."""
-    promise = keep(case.scene, Numerics(fidelity=name), case.shots(PILOT, seed=77), device="cpu")
+    promise = keep(case.scene, Numerics(fidelity=name), case.shots(PROMISES[name].pilot, seed=77), device="cpu")
     answer, cost = bench.run(case, promise.fidelity)
     velocity, tilt = off(answer, truth)
     allowed = PROMISES[name].tolerance

@@ -66,7 +66,7 @@ def promise_text(dataset: xarray.Dataset) -> str | None:
         fixed = ("tolerance", "time_step", "patches_axial", "patches_around", "grid_spacing")
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
-    tolerance, _ = PROMISES[given["fidelity"]]
+    tolerance = PROMISES[given["fidelity"]].tolerance
     stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
     found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg"

@@ -28,7 +28,7 @@ from warpimpact.scene import Burst, Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.promise import PILOT, Promise, keep
+from warpimpact.solver.promise import PROMISES, Promise, keep
 from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
@@ -212,7 +212,8 @@ def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | No
     """
     if campaign.numerics.explicit is not None:
         return None
-    return keep(campaign.scene, campaign.numerics, pilot_of(campaign, PILOT), device=device, progress=progress)
+    pilot = pilot_of(campaign, PROMISES[campaign.numerics.fidelity].pilot)
+    return keep(campaign.scene, campaign.numerics, pilot, device=device, progress=progress)
 
 
 def pilot_of(campaign: Campaign, most: int) -> Shots:

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpimpact.scene import Numerics
 from warpimpact.solver.limit import Limits, short_steps
-from warpimpact.solver.promise import MARGIN, SHARE
+from warpimpact.solver.promise import MARGIN, upper_place
 from warpimpact.solver.resolution import Fidelity, level
 
 PILOT = 16
@@ -70,11 +70,11 @@ def keep_limits(search: Callable[[Fidelity], Limits], numerics: Numerics, *, squ
 
 
 def _error(coarse: Limits, fine: Limits) -> tuple[float, float]:
-    """The change that SHARE of the limits stay within, times its margin, and their median."""
+    """The change that 90 % of the limits stay within, but for `promise.RISK`, times its margin, and their median."""
     same = (coarse.value == fine.value) | (np.isnan(coarse.value) & np.isnan(fine.value))
     with np.errstate(invalid="ignore"):
         change = np.where(same, 0.0, np.abs(coarse.value - fine.value))
     change[np.isnan(change)] = math.inf
     finite = fine.value[np.isfinite(fine.value)]
-    place = math.ceil(SHARE * len(change)) - 1
+    place = upper_place(len(change)) - 1
     return MARGIN[1] * float(np.sort(change)[place]), float(np.median(finite)) if len(finite) else 0.0

@@ -23,11 +23,9 @@ from warpimpact.solver.simulate import Outcomes, simulate
 
 _logger = logging.getLogger(__name__)
 
-PILOT = 32
-"""Shots of a pilot."""
-SHARE = 0.94
-"""Share of the pilot's shots whose error is at most the estimate: all but one of 32. Their 90th percentile would too
-often lie below that of all shots."""
+RISK = 1.0 / 6.0
+"""Probability at most that the estimate from the pilot's shots lies below the 90th percentile of all shots; where there
+are enough shots for that."""
 MARGIN = {1: 2.0, 2: 1.4}
 """Factor of an estimate by the number of levels to the finer one. In 40 random scenes, 83 to 98 % of the
 estimates are then at least the 90th percentile that other hits show (tests/benchmarks/random_scenes.py)."""
@@ -35,16 +33,18 @@ estimates are then at least the 90th percentile that other hits show (tests/benc
 
 class Named(NamedTuple):
     """What a name stands for: errors of 90 % of the hits, in residual velocity and in tilt at the largest stand-off,
-    and the level of LADDER from which on it is looked for."""
+    the level of LADDER from which on it is looked for, and the shots of its pilot. More shots make a lower estimate
+    safe; those of fine levels are dear."""
 
     tolerance: Tolerance
     first: int
+    pilot: int
 
 
 PROMISES = {
-    "draft": Named(Tolerance(residual_velocity=5.0, tilt="5 deg"), 0),
-    "standard": Named(Tolerance(residual_velocity=1.0, tilt="1 deg"), 2),
-    "reference": Named(Tolerance(residual_velocity=0.2, tilt="0.2 deg"), 4),
+    "draft": Named(Tolerance(residual_velocity=5.0, tilt="5 deg"), 0, 64),
+    "standard": Named(Tolerance(residual_velocity=1.0, tilt="1 deg"), 2, 64),
+    "reference": Named(Tolerance(residual_velocity=0.2, tilt="0.2 deg"), 4, 32),
 }
 
 
@@ -78,7 +78,7 @@ def keep(
 
     Args:
         numerics: its fidelity and precision count; single settings would promise nothing (`Numerics.explicit`).
-        pilot: shots like those that are to be computed, some PILOT of them.
+        pilot: shots like those that are to be computed, some `Named.pilot` of them.
         device: as in `simulate`.
         progress: called with (0, shots) while a level is computed; an exception that it raises ends the search.
 
@@ -88,7 +88,7 @@ def keep(
     Raises:
         DeviceError: the device is absent.
     """
-    tolerance, first = PROMISES[numerics.fidelity]
+    tolerance, first, _ = PROMISES[numerics.fidelity]
     known: dict[int, Outcomes] = {}
     follow = progress and (lambda _, total: progress(0, total))
     found = Promise(level(first, numerics), False, math.inf, math.inf)
@@ -113,8 +113,19 @@ def keep(
 
 
 def _errors(coarse: Outcomes, fine: Outcomes) -> NDArray[np.float64]:
-    """Changes of residual velocity [m/s] and last tilt [rad] that SHARE of the shots stay within."""
+    """Changes of residual velocity [m/s] and last tilt [rad] that 90 % of all shots stay within, but for RISK."""
     change = Change.between(coarse, fine)
     last = change.tilt[:, -1] if change.tilt.shape[1] else np.zeros(len(change.tilt))
-    place = math.ceil(SHARE * len(last)) - 1
+    place = upper_place(len(last)) - 1
     return np.array([np.sort(errors)[place] for errors in (change.residual_velocity, last)])
+
+
+def upper_place(count: int) -> int:
+    """Place of the order statistic of so many shots that lies below their 90th percentile with a probability of at
+    most RISK; the last one, if none does: so many of the shots lie below it, or more, where each does by 0.9."""
+    below = 0.0
+    for place in range(count, 0, -1):
+        below += math.comb(count, place) * 0.9**place * 0.1 ** (count - place)
+        if below > RISK:
+            return min(place + 1, count)
+    return 1

@@ -13,7 +13,7 @@ from warpimpact.campaign.compute import promise_in
 from warpimpact.campaign.replay import replay
 from warpimpact.scene import CirclePattern, Hits, Impact, Numerics, OgiveCore, Plate, Record, Scene, make_shots
 from warpimpact.solver import promise
-from warpimpact.solver.promise import MARGIN, PROMISES, keep
+from warpimpact.solver.promise import MARGIN, PROMISES, RISK, keep, upper_place
 from warpimpact.solver.refinement import Change
 from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import Outcomes, simulate
@@ -128,3 +128,10 @@ def test_a_result_tells_its_promise_and_replays_on_its_level(hits: str) -> None:
 def test_a_single_setting_promises_nothing() -> None:
     campaign = Campaign.from_text(CAMPAIGN + "patches_axial = 20\n", name="t", folder=Path())
     assert not {"promise_kept", "resolution", "tilt_error_p90"} & run(campaign, device="cpu").attrs.keys()
+
+
+def test_an_estimate_is_rarely_below_the_percentile_that_it_stands_for() -> None:
+    assert [upper_place(count) for count in (1, 16, 32, 64)] == [1, 16, 31, 61]
+    errors = np.random.default_rng(3).exponential(size=(20000, 64))
+    below = np.sort(errors)[:, upper_place(64) - 1] < -np.log(0.1)
+    assert 0.08 < below.mean() < RISK
