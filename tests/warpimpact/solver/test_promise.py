@@ -70,7 +70,7 @@ def test_what_cannot_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     # With a ladder of two levels and a promise of nothing, the finest level that can be judged is taken.
     monkeypatch.setattr(promise, "LADDER", LADDER[:2])
     nothing = PROMISES["draft"].tolerance.model_copy(update={"residual_velocity": 1e-9})
-    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0))
+    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0, 8))
     found = keep(SCENE, Numerics(fidelity="draft"), PILOT[:8], device="cpu")
     assert not found.kept
     assert found.fidelity == LADDER[0]
