@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from warpimpact import Campaign, replay, run
-from warpimpact.plotting import dispersion, hit_maps, marginals, overview, trajectory, uncertainty
+from warpimpact.plotting import bursts_figure, dispersion, hit_maps, marginals, overview, trajectory, uncertainty
 from warpimpact.plotting.pressure import pressure
 
 HERE = Path(__file__).parent
@@ -33,6 +33,7 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
     yaw = {"distribution": "normal", "mean": "-2 deg", "std": "1 deg"}
     scattered = run(oblique.model_copy(update={"scatter": {"yaw": yaw}}))
     yield "gallery/uncertainty.png", uncertainty(scattered, "tilt"), 1100
+    yield "gallery/bursts.png", bursts_figure(run(Campaign.from_toml(HERE / "burst_of_five.toml"))), 900
     edge = np.hypot(slotted.hit_y - HIT[0], slotted.hit_z - HIT[1])
     hit = replay(slotted, int(edge.argmin("hit")), folder=HERE)
     for draw in (trajectory.passage, trajectory.flight, trajectory.plate, pressure):

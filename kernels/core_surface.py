@@ -128,6 +128,20 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.sqrt(wp.max(zero, one - pose.axis[0] * pose.axis[0]))
 
     @wp.func
+    def ends_of(surface: Surface, pose: Pose):
+        """The rearmost and the foremost x of the core [m]."""
+        rearmost, foremost = real(1.0e9), real(-1.0e9)
+        wide = broadside(pose)
+        index = int(0)
+        while index < surface.rings:
+            ring = ring_at(surface, pose, index)
+            aslant, along = ring.half_radial * wide, ring.half_axial * pose.axis[0]
+            rearmost = wp.min(rearmost, ring.centre[0] - ring.radius * wide - wp.abs(along - aslant))
+            foremost = wp.max(foremost, ring.centre[0] + ring.radius * wide + wp.abs(along + aslant))
+            index += 1
+        return rearmost, foremost
+
+    @wp.func
     def reach_along_x(ring: Ring, pose: Pose, broadside: real, advance: real, turning: real):
         """Largest distance along x between the ring's centre and any part of the ring within the step [m]. `advance` is
         half of the way of the centre of mass along x in the step [m]; `turning` is half of the step's rotation
@@ -217,6 +231,7 @@ def build(variant: Variant) -> SimpleNamespace:
         pose_of=pose_of,
         ring_at=ring_at,
         broadside=broadside,
+        ends_of=ends_of,
         reach_along_x=reach_along_x,
         behind_face=behind_face,
         patch_at=patch_at,

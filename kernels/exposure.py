@@ -194,6 +194,7 @@ def build(variant: Variant) -> SimpleNamespace:
         gather=gather,
         scatter=scatter,
         scatter_plain=scatter_plain,
+        clear=clear,
         blank=blank,
         spread=spread,
         settle=settle,

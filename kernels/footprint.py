@@ -89,16 +89,20 @@ def build(variant: Variant) -> SimpleNamespace:
         return found
 
     @wp.func
+    def clearance_at(plate: Plate, window: Window, y: real, z: real):
+        """A lower bound of a point's distance from material: in a hole, or beside a finite plate [m]."""
+        beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
+        return wp.max(beside, plate.clear[grid.tile_at(plate, window, y, z)])
+
+    @wp.func
     def is_clear(plate: Plate, window: Window, found: Footprint):
-        """Whether the nodes around the rings in the slab lie in a hole or beside a finite layer, with a node to
-        spare."""
+        """Whether there is no material at the nodes around the rings in the slab, with a node to spare."""
         y = half * real(found.box.y_low + found.box.y_high - 2 * (window.cells_y // 2)) * plate.spacing
         z = half * real(found.box.z_low + found.box.z_high - 2 * (window.cells_z // 2)) * plate.spacing
         wide = half * real(found.box.y_high - found.box.y_low) + one
         long = half * real(found.box.z_high - found.box.z_low) + one
         reach = wp.sqrt(wide * wide + long * long) * plate.spacing
-        beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
-        return beside > reach or plate.clear[grid.tile_at(plate, window, y, z)] > reach
+        return clearance_at(plate, window, y, z) > reach
 
     @wp.func
     def is_beside(window: Window, found: Footprint):
@@ -110,4 +114,10 @@ def build(variant: Variant) -> SimpleNamespace:
             or found.box.z_low >= window.cells_z
         )
 
-    return SimpleNamespace(Footprint=Footprint, footprint_of=footprint_of, is_clear=is_clear, is_beside=is_beside)
+    return SimpleNamespace(
+        Footprint=Footprint,
+        footprint_of=footprint_of,
+        is_clear=is_clear,
+        is_beside=is_beside,
+        clearance_at=clearance_at,
+    )

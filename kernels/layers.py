@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, exposure, footprint, interaction, passage, plate_grid, rigid_body
+from . import contact, core_surface, earlier, exposure, footprint, interaction, passage, plate_grid, rigid_body
 from . import shots as conditions
 from .variant import Variant
 
@@ -25,8 +25,8 @@ def build(variant: Variant) -> SimpleNamespace:
     Surface, Pose, Plate, Window, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window, laws.Law
     Body, State, Load = motion.Body, motion.State, motion.Load
     Fields, Footprint, Touches, Shots = contacts.Fields, prints.Footprint, contacts.Touches, launch.Shots
-    passages, own = passage.build(variant), launch.own
-    Passage = passages.Passage
+    passages, hits, own = passage.build(variant), earlier.build(variant), launch.own
+    Passage, Earlier = passages.Passage, hits.Earlier
 
     @wp.struct
     class Layers:
@@ -74,13 +74,15 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Reached:
         """Layers that a step can touch, and the ends of the core along x [m]. `first` > `last` if there is none.
-        `deepest` is the largest x that the core has reached so far."""
+        `deepest` is the largest x that the core has reached so far; `clearance` is a lower bound of its distance from
+        the material of layers that it passes through a hole or beside [m]."""
 
         first: wp.int32
         last: wp.int32
         rearmost: real
         foremost: real
         deepest: real
+        clearance: real
 
     @wp.func
     def own_of(values: wp.array2d(dtype=wp.float64), layer: wp.int32, shot: wp.int32):
@@ -108,20 +110,6 @@ def build(variant: Variant) -> SimpleNamespace:
         passages.begin(passage, shot, layers.count)
 
     @wp.func
-    def ends_of(surface: Surface, pose: Pose):
-        """The rearmost and the foremost x of the core [m]."""
-        rearmost, foremost = real(far), real(-far)
-        broadside = surfaces.broadside(pose)
-        index = int(0)
-        while index < surface.rings:
-            ring = surfaces.ring_at(surface, pose, index)
-            aslant, along = ring.half_radial * broadside, ring.half_axial * pose.axis[0]
-            rearmost = wp.min(rearmost, ring.centre[0] - ring.radius * broadside - wp.abs(along - aslant))
-            foremost = wp.max(foremost, ring.centre[0] + ring.radius * broadside + wp.abs(along + aslant))
-            index += 1
-        return rearmost, foremost
-
-    @wp.func
     def in_layer(layers: Layers, stack: Stack, slot: wp.int32, layer: wp.int32, shot: wp.int32, pose: Pose):
         """The pose in the frame of a layer."""
         seen = pose
@@ -141,6 +129,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def open_layer(
         layers: Layers,
         stack: Stack,
+        past: Earlier,
         common: Fields,
         shots: Shots,
         slot: wp.int32,
@@ -150,20 +139,14 @@ def build(variant: Variant) -> SimpleNamespace:
         ahead: vec3,
     ):
         """Open the window of a layer where the core will reach it, at first that of the plate about the hit."""
-        home = vec3()
-        again = stack.open[slot * layers.count + layer]
-        if layer > 0 or again:
+        here, home = slot * layers.count + layer, vec3()
+        if layer > 0 or stack.open[here]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
         fields = fields_of(layers, common, layer)
-        window = grid.window_at(
-            layers.plates[layer],
-            own_of(layers.thickness, layer, shot),
-            fields.cells_y,
-            fields.cells_z,
-            0,
-            own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]],
-            own(shots.hit_z, shot) + wp.float64(home[2]) - layers.offset_z[layer, shot % layers.offset_z.shape[1]],
-        )
+        y = own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]]
+        z = own(shots.hit_z, shot) + wp.float64(home[2]) - layers.offset_z[layer, shot % layers.offset_z.shape[1]]
+        thickness = own_of(layers.thickness, layer, shot)
+        window = grid.window_at(layers.plates[layer], thickness, fields.cells_y, fields.cells_z, 0, y, z)
         first = slot * layers.nodes + layers.first[layer]
         window.first += first
         window.home += first
@@ -171,7 +154,8 @@ def build(variant: Variant) -> SimpleNamespace:
         if wp.static(variant.degrades):
             if window.weakens:
                 memories.blank(fields, window)
-        here = slot * layers.count + layer
+                if wp.static(variant.burst):
+                    hits.recall(past, fields, layers.plates[layer], window, slot, layer, shot, y, z)
         stack.window[here] = window
         stack.home[here] = home
         stack.open[here] = True
@@ -183,6 +167,7 @@ def build(variant: Variant) -> SimpleNamespace:
         layers: Layers,
         fields: Fields,
         stack: Stack,
+        past: Earlier,
         passage: Passage,
         shots: Shots,
         slot: wp.int32,
@@ -197,10 +182,11 @@ def build(variant: Variant) -> SimpleNamespace:
         """Find what a step can touch of every layer; open the windows of layers that are reached for the first time,
         and record the layers that the core has left."""
         reached = Reached()
-        rearmost, foremost = ends_of(surface, pose)
+        rearmost, foremost = surfaces.ends_of(surface, pose)
         reached.rearmost = rearmost
         reached.foremost = foremost
         reached.deepest = wp.max(before.deepest, foremost)
+        reached.clearance = real(far)
         reached.first = layers.count
         reached.last = -1
         margin = half * dt * pose.speed
@@ -219,24 +205,25 @@ def build(variant: Variant) -> SimpleNamespace:
                 if not stack.open[here]:
                     ahead = real((front - pose.position[0]) / wp.max(state.velocity[0], one)) * state.velocity
                     ahead = wp.min(one, surface.bounding_radius / (wp.length(ahead) + tiny)) * ahead
-                    open_layer(layers, stack, fields, shots, slot, k, shot, pose, ahead)
+                    open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, ahead)
                 plate = layers.plates[k]
                 seen = in_layer(layers, stack, slot, k, shot, pose)
                 touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
                 if not touch.inside and not stack.near[here] and prints.is_beside(stack.window[here], touch):
-                    open_layer(layers, stack, fields, shots, slot, k, shot, pose, vec3())
+                    open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, vec3())
                     seen = in_layer(layers, stack, slot, k, shot, pose)
                     touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
                 window = stack.window[here]
-                if touch.last_ring >= 0:
-                    if prints.is_clear(plate, window, touch):
-                        touch.last_ring = -1
-                        touch.inside = True
+                beside = prints.clearance_at(plate, window, seen.position[1], seen.position[2])
+                reached.clearance = wp.min(reached.clearance, wp.max(zero, beside - surface.bounding_radius))
+                if touch.last_ring >= 0 and prints.is_clear(plate, window, touch):
+                    touch.last_ring = -1
+                    touch.inside = True
                 if touch.last_ring >= 0:
                     reached.first = wp.min(reached.first, k)
                     reached.last = k
                     found.last_ring = surface.rings - 1
-                    found.inside = found.inside and (touch.inside or not window.weakens)
+                    found.inside = found.inside and (touch.inside or not layers.weakens[k])
                 stack.found[here] = touch
                 near = True
             elif low > rear and not passages.has_left(passage, shot, k):
@@ -245,12 +232,13 @@ def build(variant: Variant) -> SimpleNamespace:
         return found, reached
 
     @wp.func
-    def jump_of(layers: Layers, shot: wp.int32, reached: Reached):
+    def jump_of(layers: Layers, stack: Stack, slot: wp.int32, shot: wp.int32, reached: Reached):
         """Onset speed of contact per time step [m/s²] of the layers that a step can touch."""
         jump, most = real(0.0), real(0.0)
         for k in range(reached.first, reached.last + 1):
-            jump += layers.onset_jump[k, shot % layers.onset_jump.shape[1]]
-            most = wp.max(most, layers.most_jump[k, shot % layers.most_jump.shape[1]])
+            if stack.found[slot * layers.count + k].last_ring >= 0:
+                jump += layers.onset_jump[k, shot % layers.onset_jump.shape[1]]
+                most = wp.max(most, layers.most_jump[k, shot % layers.most_jump.shape[1]])
         return wp.min(jump, most)
 
     @wp.func
@@ -314,7 +302,10 @@ def build(variant: Variant) -> SimpleNamespace:
                 behind = wp.min(behind, reached.rearmost - rear)
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, vec3(one, zero, zero)))
         forwards, backwards = turning + state.velocity[0], turning - state.velocity[0]
+        across = turning + wp.length(vec3(zero, state.velocity[1], state.velocity[2]))
         time = surface.bounding_radius / wp.max(wp.length(state.velocity), one)
+        if across > zero:
+            time = wp.min(time, reached.clearance / across)
         if forwards > zero:
             time = wp.min(time, ahead / forwards)
         if backwards > zero:
@@ -330,6 +321,14 @@ def build(variant: Variant) -> SimpleNamespace:
             inside = reached.foremost > front and reached.rearmost < rear
             passages.conclude(passage, shot, k, status, inside, reached.deepest - front)
 
+    @wp.func
+    def keep(layers: Layers, common: Fields, stack: Stack, past: Earlier, slot: wp.int32, shot: wp.int32):
+        """Keep what a shot of a burst has added to the layers that it reached, each in its last window there."""
+        for k in range(layers.count):
+            here = slot * layers.count + k
+            if stack.open[here] and layers.weakens[k]:
+                hits.keep(past, common, stack.window[here], slot, shot)
+
     return SimpleNamespace(
         Layers=Layers,
         Stack=Stack,
@@ -341,4 +340,5 @@ def build(variant: Variant) -> SimpleNamespace:
         load_on=load_on,
         free_time=free_time,
         conclude=conclude,
+        keep=keep,
     )

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from . import bending, contact, core_surface, damping, footprint, interaction, layers, nodal, plate_grid, rigid_body
+from . import earlier as earlier_hits
 from . import shots as conditions
 from . import trace as tracing
 from .status import Status
@@ -22,7 +23,7 @@ def build(variant: Variant) -> SimpleNamespace:
     most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
-    stacked = layers.build(variant)
+    stacked, hits = layers.build(variant), earlier_hits.build(variant)
     scheme = (nodal if variant.nodal else contact).build(variant)
     Surface, Pose, Plate, Law = surfaces.Surface, surfaces.Pose, grid.Plate, laws.Law
     Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
@@ -30,6 +31,7 @@ def build(variant: Variant) -> SimpleNamespace:
     Sections, Bending = bends.Sections, bends.Bending
     Shots, Pace, own = launch.Shots, launch.Pace, launch.own
     Layers, Stack, Passage, Reached = stacked.Layers, stacked.Stack, stacked.Passage, stacked.Reached
+    Earlier = hits.Earlier
     PERFORATED, ARRESTED, RICOCHETED = (
         wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
     )
@@ -118,13 +120,17 @@ def build(variant: Variant) -> SimpleNamespace:
         fields: Fields,
         touches: Touches,
         stack: Stack,
+        earlier: Earlier,
         # outputs
         outcomes: Outcomes,
         passage: Passage,
         bending: wp.array(dtype=Bending),
         trace: wp.array2d(dtype=real),
     ):
-        """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots."""
+        """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots.
+
+        Shots at one plate are numbered in a row, and are computed one after another in one slot.
+        """
         shot = order[first + wp.tid()]
         body = launch.body_of(shots, shot)
         law = launch.law_of(law, shots, shot)
@@ -134,13 +140,18 @@ def build(variant: Variant) -> SimpleNamespace:
         max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
         slot = wp.tid() % slots
         thickness = real(own(shots.thickness, shot))
+        if wp.static(variant.burst):
+            hits.begin(earlier, slot, shot)
         if wp.static(variant.layered):
             stacked.begin(target, stack, passage, slot, shot)
             reached = Reached()
             straight = launch.line_of_flight(shots, shot)
             flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
         else:
-            window = scheme.open_window(plate, thickness, fields, slot, own(shots.hit_y, shot), own(shots.hit_z, shot))
+            hit_y, hit_z = own(shots.hit_y, shot), own(shots.hit_z, shot)
+            window = scheme.open_window(plate, thickness, fields, slot, hit_y, hit_z)
+            if wp.static(variant.burst):
+                hits.recall(earlier, fields, plate, window, slot, 0, shot, hit_y, hit_z)
         state = launch.launch_state(surface, body, shots, shot)
         axis = motion.axis_of(state.attitude)
         initial_energy = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
@@ -172,6 +183,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     target,
                     fields,
                     stack,
+                    earlier,
                     passage,
                     shots,
                     slot,
@@ -188,7 +200,7 @@ def build(variant: Variant) -> SimpleNamespace:
             status = ended(surface, body, state, pose, found, touched, initial_energy, thickness)
             if status == RUNNING:
                 if wp.static(variant.layered):
-                    law.onset_jump = stacked.jump_of(target, shot, reached)
+                    law.onset_jump = stacked.jump_of(target, stack, slot, shot, reached)
                 law.onset = laws.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
                 law.steadied = wp.where(motion.swings(body, before_last, last), steadied * law.onset, zero)
                 before_last = last
@@ -233,6 +245,11 @@ def build(variant: Variant) -> SimpleNamespace:
             status = UNFINISHED
         if wp.static(variant.layered):
             stacked.conclude(target, passage, shot, status, reached)
+        if wp.static(variant.burst):
+            if wp.static(variant.layered):
+                stacked.keep(target, fields, stack, earlier, slot, shot)
+            else:
+                hits.keep(earlier, fields, window, slot, shot)
         axis = motion.axis_of(state.attitude)
         outcomes.status[shot] = status
         outcomes.steps[shot] = step
@@ -264,4 +281,5 @@ def build(variant: Variant) -> SimpleNamespace:
         Layers=Layers,
         Stack=Stack,
         Passage=Passage,
+        Earlier=Earlier,
     )

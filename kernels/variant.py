@@ -27,6 +27,7 @@ class Variant:
         rimmed: the plate is finite.
         bends: the core's largest bending moment is recorded.
         layered: the target has several layers.
+        burst: several shots hit one and the same plate.
     """
 
     double: bool = False
@@ -37,6 +38,7 @@ class Variant:
     rimmed: bool = False
     bends: bool = False
     layered: bool = False
+    burst: bool = False
 
     @property
     def real(self) -> Any:

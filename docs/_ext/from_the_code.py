@@ -147,7 +147,7 @@ class CampaignReference(FromTheCode):
 
     def default(self, part: dict[str, Any]) -> str:
         default = part.get("default")
-        if default is None or isinstance(default, dict):
+        if default is None or default == [] or isinstance(default, dict):
             return ""
         unit = self.leaf(part).get("unit", "") or self.leaf(part).get("items", {}).get("unit", "")
         told = str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""

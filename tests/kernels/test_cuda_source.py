@@ -12,7 +12,13 @@ from warpimpact.kernels.variant import Variant
 
 @pytest.mark.parametrize("stage", [march, free_flight])
 @pytest.mark.parametrize(
-    "variant", [Variant(bends=True), Variant(double=True, nodal=True), Variant(bends=True, layered=True)]
+    "variant",
+    [
+        Variant(bends=True),
+        Variant(double=True, nodal=True),
+        Variant(bends=True, layered=True),
+        Variant(burst=True, layered=True),
+    ],
 )
 def test_kernel_compiles_to_ptx(stage: Any, variant: Variant, tmp_path: Path) -> None:
     kernel = stage.build(variant).kernel

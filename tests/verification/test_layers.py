@@ -158,8 +158,8 @@ def test_a_layer_that_is_missed_changes_nothing(device: str) -> None:
     assert_alike(plain, simulate(slots, **scene), velocity=1e-3, angle=np.inf)  # stand-offs lie behind all layers
     between = layered(slots, missed, base.model_copy(update={"gap": 11e-3}), **scene)
     without = layered(slots, base, **scene)
-    # Kernels of two and of three layers differ by rounding.
-    assert_alike(between, without, velocity=1e-3, angle=1e-3)
+    # A compiler may sum the loads of three layers in another order than those of two: measured, one ulp.
+    assert_alike(between, without, velocity=5e-4, angle=5e-4)
 
 
 STACK = Target(

@@ -272,8 +272,9 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     if not {attr.CORE, attr.IMPACT} <= told.keys():
         raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
-    limit = {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
-    return limit | {
+    told_of = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
+    told_of |= {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
+    return told_of | {
         "core": json.loads(told[attr.CORE]),
         "impact": _in_degrees(json.loads(told[attr.IMPACT])),
         "output": output,
@@ -310,6 +311,8 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
             f"The plates differ in weight ({weights}). They are ranked by the ratio to the solid plate of the same "
             "areal density; a measure without that ratio says so."
         )
+    if len({d.attrs.get(attr.LAYERS, "") for d in datasets}) > 1:
+        yield "The targets differ in the layers behind the plate."
     if differences := "; ".join(_materials(datasets, names)):
         yield f"The plates differ in material, which no ranking allows for: {differences}."
     texts = [dataset.attrs[attr.NUMERICS_GIVEN] for dataset in datasets if attr.NUMERICS_GIVEN in dataset.attrs]

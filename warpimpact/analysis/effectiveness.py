@@ -206,7 +206,7 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
     if note := depth_note(measures):
         rows.append(note)
-    if not with_solid and attr.LIMIT not in dataset.attrs:
+    if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
         rows.append(
             "There is no solid plate to compare with: the result has no shots at one. They are computed unless "
             'output.solid_reference is false, and stand in the group "solid" of the file.'

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import xarray
 
+from warpimpact.analysis.bursts import bursts, bursts_text
 from warpimpact.analysis.effectiveness import effectiveness_text
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.plate import plate_numbers
@@ -37,7 +38,15 @@ _SHOWN = {"Pa": ("GPa", 1e-9)}
 
 def inspect_text(dataset: xarray.Dataset) -> str:
     """All that a person may ask of a hit map, as text; of an open file only a part is in memory at a time."""
-    tables = [_origin(dataset), _statuses(dataset), _numbers(dataset), [effectiveness_text(dataset)], failures(dataset)]
+    tables: list[Iterable[str]] = [
+        _origin(dataset),
+        _statuses(dataset),
+        _numbers(dataset),
+        [effectiveness_text(dataset)],
+        failures(dataset),
+    ]
+    if v.BURST_ORDER in dataset:
+        tables.insert(3, [bursts_text(bursts(dataset))])
     return "\n\n".join("\n".join(table) for table in tables)
 
 

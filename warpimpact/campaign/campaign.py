@@ -1,4 +1,7 @@
-"""Campaign: one TOML file, validated, as one immutable value."""
+"""Campaign: one TOML file, validated, as one immutable value.
+
+Long because everything that two tables of a file must agree on is checked here.
+"""
 
 import json
 import math
@@ -13,6 +16,8 @@ from ..results.files import ResultError
 from ..results.variables import BENDING_VARIABLES, BROKEN_VARIABLES
 from ..scene import (
     AnyCore,
+    Burst,
+    BurstSampler,
     Hits,
     Impact,
     Interaction,
@@ -27,9 +32,10 @@ from ..scene import (
     Target,
     symmetries_used,
 )
+from ..scene.distributions import EDGE
 from ..scene.files import InputFile
 from ..scene.model import Model
-from ..scene.scatter import EDGE, QUANTITIES, check_range
+from ..scene.scatter import QUANTITIES, check_range
 from ..scene.symmetry import check_layers, check_scatter
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
@@ -76,6 +82,7 @@ class Campaign(Model):
         interaction: stress on the surface of the core.
         numerics: how finely the shots are computed.
         output: what is reported.
+        burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
         posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
@@ -94,6 +101,7 @@ class Campaign(Model):
     scatter: Scatter = Scatter()
     posterior: InputFile | None = None
     stop: Stop | None = None
+    burst: Burst | None = None
     _source: str = PrivateAttr("")
 
     @property
@@ -136,6 +144,10 @@ class Campaign(Model):
                 f"{name}: plate: got {len(plates)} plates, but this takes one; warpimpact compare {name} runs them all "
                 "and compares them"
             )
+        if "sweep" in data:
+            raise CampaignError(
+                f"{name}: sweep: this takes one combination of inputs; warpimpact sweep {name} runs them all"
+            )
         if count is not None:
             _override_count(data, count)
         data = with_scatter_apart(data, name)
@@ -174,9 +186,17 @@ class Campaign(Model):
     def sampler(self) -> Sampler:
         """Its shots."""
         sampled = (self.impact, self.hits, self.plate, self.scatter, self.replicates)
-        if self.drawn is None:
-            return Sampler(*sampled)
-        return DrawnSampler(self.drawn, self.plate, self.hits.seed, len(self.symmetries), *sampled)
+        if self.drawn is not None:
+            return DrawnSampler(self.drawn, self.plate, self.hits.seed, len(self.symmetries), *sampled)
+        if self.burst is not None:
+            own: dict[str, Any] = {"scatter": self.scatter, "replicates": self.replicates}
+            return BurstSampler(self.impact, self.hits, self.plate, self.burst, **own)
+        return Sampler(*sampled)
+
+    @property
+    def at_a_plate(self) -> int:
+        """Shots at one plate."""
+        return 1 if self.burst is None else self.burst.count
 
     @property
     def drawn(self) -> Posterior | None:
@@ -210,7 +230,8 @@ class Campaign(Model):
     def _stop_computes_no_image(self) -> Self:
         """An answer costs least from the irreducible part of the cell (tests/benchmarks/NOTES.md)."""
         hits = self.hits
-        if self.stop is not None and "irreducible" not in hits.model_fields_set and hits.area == "cell":
+        asked = "irreducible" in hits.model_fields_set or hits.area != "cell"
+        if self.stop is not None and self.burst is None and not asked:
             part = hits.model_copy(update={"irreducible": hits.sampling in ("sobol", "random")})
             with suppress(ValueError):  # of what has no symmetry every hit is computed
                 check_scatter(part, self.scatter)
@@ -250,6 +271,7 @@ class Campaign(Model):
             farthest = 0.5 * max(covered)
         else:
             farthest = max(float(np.abs(listed[name]).max()) for name in ("hit_y", "hit_z"))
+        farthest += 0.0 if self.burst is None else self.burst.reach
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
         allowed = min(_FARTHEST, 2**30 * cell)
@@ -270,6 +292,16 @@ class Campaign(Model):
     def _scheme_knows_layers(self) -> Self:
         if self.layer and self.numerics.scheme == "nodal":
             raise ValueError(f'got numerics.scheme = "nodal" beside {len(self.layer)} [[layer]], but {ONE_PLATE}')
+        return self
+
+    @model_validator(mode="after")
+    def _plate_takes_a_burst(self) -> Self:
+        if self.burst is not None and self.hits.irreducible:
+            raise ValueError("got hits.irreducible = true beside burst, but the hits of a burst have no images")
+        if self.burst is not None and self.numerics.scheme == "nodal":
+            raise ValueError('got numerics.scheme = "nodal" beside burst, but it must be "consistent"')
+        if self.burst is not None and self.posterior is not None:
+            raise ValueError("got a posterior beside burst, but the shots of a burst share one plate, not their draws")
         return self
 
     @model_validator(mode="after")

@@ -1,4 +1,7 @@
-"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here."""
+"""From shots of a campaign to a Dataset; every run, local or distributed, goes through here.
+
+Long because everything that a Dataset tells of its campaign is gathered here.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ from warpimpact.campaign.drawn import Posterior
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_dataset
-from warpimpact.scene import Numerics, Scene, Shots, Symmetry
+from warpimpact.scene import Burst, Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
@@ -30,6 +33,9 @@ from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_t
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
 from warpimpact.solver.unfold import unfolded, unfolded_estimates
+
+_FEWEST_BURSTS = 8
+"""Of a pilot, however many shots they have."""
 
 
 def compute(
@@ -137,8 +143,10 @@ def described(
             attr.HITS_PER_SECOND: computed / elapsed,
         }
         | ({} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count})
+        | ({attr.LAYERS: _layers(campaign)} if campaign.layer else {})
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, computed) if campaign.hits.irreducible else {})
+        | ({} if campaign.burst is None else _burst(campaign.burst))
         | dict(attributes),
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
         double=is_double(campaign),
@@ -194,7 +202,7 @@ def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | No
     """The promise that a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself.
 
     The pilot takes the first hits of a Sobol or random sampling. It takes hits at even distances from a grid or a list.
-    So it depends on the campaign alone.
+    So it depends on the campaign alone. It takes whole bursts, as a later hit meets what the earlier ones left.
 
     Args:
         device, progress: as in `simulate`.
@@ -208,14 +216,15 @@ def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | No
 
 
 def pilot_of(campaign: Campaign, most: int) -> Shots:
-    """Some of the hits of a campaign, no two of them images of each other."""
-    sampler, group = campaign.sampler(), len(campaign.symmetries)
-    hits = len(sampler) // group
-    count = min(most, hits)
+    """Some of the hits of a campaign, no two of them images of each other; of bursts, whole ones."""
+    sampler, images, at_a_plate = campaign.sampler(), len(campaign.symmetries), campaign.at_a_plate
+    group = images * at_a_plate
+    groups = len(sampler) // group
+    count = min(most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS), groups)
     if campaign.hits.sampling in ("sobol", "random"):
-        return sampler.shots(0, count * group)[::group]
-    places = np.linspace(0, hits, count, endpoint=False).astype(int)
-    return Shots.joined([sampler.shots(int(place) * group, 1) for place in places])
+        return sampler.shots(0, count * group)[::images]
+    places = np.linspace(0, groups, count, endpoint=False).astype(int)
+    return Shots.joined([sampler.shots(int(place) * group, group)[::images] for place in places])
 
 
 def _promised(promise: Promise) -> dict[str, Any]:
@@ -319,9 +328,22 @@ def _plate(campaign: Campaign) -> str:
     return json.dumps(told)
 
 
+def _layers(campaign: Campaign) -> str:
+    """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
+    layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
+    for (name, k), given in campaign.scatter.of_layers.items():
+        layers[str(k + 1)][name] = given.model_dump()
+    return json.dumps(layers)
+
+
 def _symmetry(group: Sequence[Symmetry], computed: int) -> dict[str, Any]:
     """Symmetries by which hits were unfolded, and the number of computed hits."""
     return {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
+
+
+def _burst(burst: Burst) -> dict[str, Any]:
+    """How many shots hit a plate, and how they lie."""
+    return {attr.BURST: burst.model_dump_json(exclude_none=True), attr.SHOTS_AT_A_PLATE: burst.count}
 
 
 def made_by(device: str) -> dict[str, str]:

@@ -38,15 +38,17 @@ FEWEST, MOST, SHARDS = 2**11, 2**16, 32
 """Shots per shard, and how many shards are aimed at between these. A shard costs some 40 ms beside its computing."""
 
 
-def extent(count: int) -> int:
-    """Shots per shard of a campaign of so many: a power of two, which follows from the campaign alone."""
-    return min(MOST, max(FEWEST, 1 << (count // SHARDS).bit_length()))
+def extent(count: int, at_a_plate: int = 1) -> int:
+    """Shots per shard of a campaign of so many, which follows from the campaign alone: a power of two plates, each with
+    so many shots."""
+    shots = min(MOST, max(FEWEST, 1 << (count // SHARDS).bit_length()))
+    return at_a_plate << max(0, (shots // at_a_plate).bit_length() - 1)
 
 
 def manifest(campaign: Campaign, made_by: Mapping[str, str]) -> dict[str, Any]:
     """What decides every bit of a result: the campaign with the contents of its files, versions and kind of device."""
     contents = json.loads(json.dumps(campaign.model_dump(), default=_digest))
-    dealt = {"replicates": campaign.replicates, "extent": extent(len(campaign.sampler()))}
+    dealt = {"replicates": campaign.replicates, "extent": extent(len(campaign.sampler()), campaign.at_a_plate)}
     return {"campaign": contents, **dealt, **made_by}
 
 

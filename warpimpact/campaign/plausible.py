@@ -29,6 +29,9 @@ def warn_of(campaign: Campaign) -> None:
     usual = USUAL | {"hits": hit_bounds(campaign.plate.sampled_cell, campaign.plate.size)}
     for sentence in implausible(_values(campaign), usual):
         warnings.warn(sentence, Implausible, stacklevel=2)
+    if campaign.burst is not None and campaign.plate.degradation == 1.0 and campaign.scatter.degradation is None:
+        told = "burst: the plate does not weaken (plate.degradation = 1), so earlier hits change nothing"
+        warnings.warn(told, Implausible, stacklevel=2)
 
 
 def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:

@@ -25,7 +25,11 @@ from warpimpact.solver.unfold import image_of
 ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
 """Largest change of an outcome by the rounding of another device [m/s, degree]. Between single and double precision,
 6144 hits on the slotted plate (825, 300 and 200 m/s) differ by 0.012 m/s and 0.04 degrees at most."""
-_OF_A_MAP = (attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES)
+_OF_A_MAP = (
+    *(attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES),
+    attr.SHOTS_AT_A_PLATE,
+    attr.BURST,
+)
 
 
 def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xarray.Dataset:
@@ -58,12 +62,15 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xar
         raise ResultError(f"hit: got {hit}, but the campaign and the files it names give only {len(sampler)} hits")
     scene, group = campaign.scene, campaign.symmetries
     image = hit % len(group)
-    images = _at_their_limit(scene, sampler.shots(hit - image, len(group)), result, place)
-    computed, shot = images[:1], images[image:][:1]
+    # Every image of the hit, or every hit of its burst up to it.
+    before = hit % campaign.at_a_plate
+    drawn = sampler.shots(hit - image - before, len(group) + before)
+    images = _at_their_limit(scene, drawn, result, place)
+    computed, shot = images[: 1 + before], images[image + before :][:1]
     if campaign.drawn is not None:
         ((_, scene),) = campaign.drawn.scenes(scene, computed)
     again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place))
-    home, away = ((float(at.hit_y[0]), float(at.hit_z[0])) for at in (computed, shot))
+    home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
     period, double = campaign.hits.covered(campaign.plate), is_double(campaign)
     ended = to_dataset(scene, shot, again.outcomes, period=period, attributes={}, double=double)

@@ -52,7 +52,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
     """
     total = len(campaign.sampler())
     with local_team(campaign, device) as team:
-        held = _Held(extent(total))
+        held = _Held(extent(total, campaign.at_a_plate))
         end = _fill(campaign, held, team, progress or (lambda standing: None))
     shards = [held.load(index) for index in range(end.shards)]
     dataset = shards[0]
@@ -204,7 +204,9 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
     elsewhere = (v.HIT_Y, v.HIT_Z, "layer_offset_y", "layer_offset_z")
     conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
     alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
-    return shots[: 1 if alike else _MOST_SOLID]
+    if alike and campaign.burst is None:
+        return shots[:1]
+    return shots[: max(1, _MOST_SOLID // campaign.at_a_plate) * campaign.at_a_plate]
 
 
 def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
@@ -246,7 +248,7 @@ class _Watch:
         self._rule = campaign.stop
         last = campaign.output.standoffs[-1]
         measures = measures or ("mean(residual_velocity)", f"mean(tilt@{last * 1e3:.10g}mm)")
-        dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries)}
+        dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
         self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
         if self._rule is not None:
             rule = self._rule

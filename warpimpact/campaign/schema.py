@@ -9,8 +9,9 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from ..scene.distributions import PURE_NUMBERS, Distribution
 from ..scene.model import Model
-from ..scene.scatter import PURE_NUMBERS, QUANTITIES, Distribution
+from ..scene.scatter import OF_A_LAYER, QUANTITIES
 from .campaign import Campaign
 
 Schema = dict[str, Any]
@@ -33,6 +34,11 @@ def campaign_schema() -> Schema:
     _complete(schema, Campaign)
     _take_distributions(schema)
     _take_plates(schema)
+    schema["properties"]["sweep"] = {
+        "description": 'Values of inputs, such as obliquity or "plate.pattern.width", for warpimpact sweep.',
+        "type": "object",
+        "additionalProperties": {"type": "array", "minItems": 1},
+    }
     definitions["Stop"]["properties"]["half_width"]["type"] = ["number", "string"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -125,12 +131,22 @@ def _take_distributions(schema: Schema) -> None:
         "description": "A distribution in the place of a value: each shot draws its own.",
         "oneOf": [{"$ref": f"#/$defs/{name}"} for name in kinds],
     }
-    del schema["properties"]["scatter"], definitions["Scatter"]  # a file has its distributions in the places of values
+    # A file has its distributions in the places of values.
+    del schema["properties"]["scatter"], definitions["Scatter"], definitions["LayerScatter"]
     for name, quantity in QUANTITIES.items():
         for definition in _referred(schema, schema["properties"][quantity.table]):
-            value = definition["properties"][name]
-            told = {key: value.pop(key) for key in ("description", "default") if key in value}
-            definition["properties"][name] = told | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
+            _let_scatter(definition["properties"], name)
+    for name in OF_A_LAYER.keys() & definitions["Layer"]["properties"].keys():
+        _let_scatter(definitions["Layer"]["properties"], name)
+    offset = definitions["Layer"]["properties"]["offset"]
+    offset["prefixItems"] = [{"anyOf": [one, {"$ref": "#/$defs/Distribution"}]} for one in offset["prefixItems"]]
+
+
+def _let_scatter(properties: Schema, name: str) -> None:
+    """A distribution may take the place of this value."""
+    value = properties[name]
+    told = {key: value.pop(key) for key in ("description", "default") if key in value}
+    properties[name] = told | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
 
 
 def _referred(schema: Schema, part: Schema) -> list[Schema]:

@@ -27,12 +27,14 @@ from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
 from .start import add_completion, add_examples, add_new, add_schema
+from .sweep import add_sweep
 
 _COMMANDS = (
     add_examples,
     add_new,
     add_run,
     add_limit,
+    add_sweep,
     add_inspect,
     add_plot,
     add_compare,

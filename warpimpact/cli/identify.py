@@ -29,7 +29,7 @@ def add_identify(commands: Commands) -> None:
         "uncertainty. Hit points that are not known are integrated out. Write the posterior as one netCDF file, which "
         "ArviZ reads, and figures beside it. Print what the shots determine, and whether the computation has "
         "converged.",
-        example="identify campaigns/paper_fit.toml -o paper_fit.nc",
+        example="identify campaigns/fits/paper_fit.toml -o paper_fit.nc",
     )
     parser.add_argument(
         "fit", type=Path, metavar="FIT.toml", help="fit file: scene, measured shots, and priors of what is unknown"

@@ -43,6 +43,7 @@ def add_run(commands: Commands) -> None:
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    from warpimpact.analysis.bursts import bursts, orders_text
     from warpimpact.analysis.summary import promise_text, summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.campaign.run import run_to_file
@@ -70,6 +71,8 @@ def _run(arguments: argparse.Namespace) -> int:
         )
     with files.opened(output) as dataset:
         print(summary_text(dataset))
+        if attr.BURST in dataset.attrs:
+            print(orders_text(bursts(dataset)))
         if attr.SYMMETRIES in dataset.attrs:
             print(symmetry_text(dataset))
         if (promise := promise_text(dataset)) is not None:

@@ -120,4 +120,9 @@ def _plate(arguments: argparse.Namespace) -> None:
     numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)
     for name, number in numbers.items():
         print(f"{name:<18}  {number}")
+    for place, layer in enumerate(campaign.layer, start=1):
+        told = f"{1e3 * layer.thickness:g} mm, {1e3 * layer.gap:g} mm behind the one before, {layer.open_area:.1%} open"
+        print(f"{f'layer {place}':<18}  {told}")
+    if campaign.layer:
+        print(f"{'whole target':<18}  {campaign.target.areal_density:.1f} kg/m²")
     print(output)

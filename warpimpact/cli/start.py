@@ -10,6 +10,8 @@ from .options import Commands, add_command, add_output, add_overwrite
 from .paths import check_output
 
 _SCHEMA = "warpimpact.schema.json"
+_FITS = "fits"
+"""Folder of the examples that warpimpact identify takes; the schema is that of campaigns."""
 
 
 def add_examples(commands: Commands) -> None:
@@ -17,8 +19,8 @@ def add_examples(commands: Commands) -> None:
         commands,
         "examples",
         _examples,
-        summary="list the campaigns that come with warpimpact",
-        description="List the campaigns that come with warpimpact, each with the question that it answers. "
+        summary="list the campaigns and fits that come with warpimpact",
+        description="List the campaigns and fits that come with warpimpact, each with the question that it answers. "
         "warpimpact new copies one.",
         example="examples",
     )
@@ -65,19 +67,22 @@ def _new(arguments: argparse.Namespace) -> None:
         check_output(file, overwrite=arguments.overwrite)
     for one, copy in copies.items():
         shutil.copyfile(one, copy)
-    output.write_text(f"#:schema {_SCHEMA}\n{text}", encoding="utf-8")
-    schema = output.parent / _SCHEMA
-    schema.write_text(_schema_text(), encoding="utf-8")
-    for written in (output, *copies.values(), schema):
+    is_fit = source.parent.name == _FITS
+    output.write_text(text if is_fit else f"#:schema {_SCHEMA}\n{text}", encoding="utf-8")
+    schema = [] if is_fit else [output.parent / _SCHEMA]
+    for one in schema:
+        one.write_text(_schema_text(), encoding="utf-8")
+    for written in (output, *copies.values(), *schema):
         print(written)
 
 
 def _campaigns() -> dict[str, Path]:
-    """Names of the campaigns of this installation, and their files."""
+    """Names of the campaigns and fits of this installation, and their files."""
     from importlib.resources import files
 
     folder = Path(str(files("warpimpact.campaigns")))
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+    paths = [*folder.glob("*.toml"), *folder.glob(f"{_FITS}/*.toml")]
+    return {path.stem: path for path in sorted(paths, key=lambda path: path.stem)}
 
 
 def _named(value: Any) -> Iterator[str]:

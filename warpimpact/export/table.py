@@ -18,8 +18,8 @@ from warpimpact.results.files import aside
 def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
-    A variable with stand-offs or axes gets one column for each: ``tilt_130mm``, ``angular_velocity_x``. ``status`` is a
-    word.
+    A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
+    ``layer_tilt_0``. ``status`` is a word.
     """
     columns: dict[str, Any] = {name: array.values for name, array in _columns(dataset)}
     words = {code: word for word, code in status_codes(dataset).items()}
@@ -39,11 +39,14 @@ def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
         elif array.dims == ("hit", "axis"):
             for index, axis in enumerate(dataset[v.AXIS].values):
                 yield f"{name}_{axis}", array[:, index]
+        elif array.dims == ("hit", "layer"):
+            for layer in range(array.sizes["layer"]):
+                yield f"{name}_{layer}", array[:, layer]
 
 
 def _units(dataset: xarray.Dataset) -> dict[str, str]:
     """Units of the columns; a status is a word."""
-    return {name: "1" if name == v.STATUS else array.attrs["units"] for name, array in _columns(dataset)}
+    return {name: "1" if name == v.STATUS else str(array.attrs["units"]) for name, array in _columns(dataset)}
 
 
 def write_csv(dataset: xarray.Dataset, path: Path) -> None:

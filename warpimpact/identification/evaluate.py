@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +134,8 @@ def repeated(shots: Shots, columns: Mapping[str, Array], sets: int) -> Shots:
         columns: by the name of the quantity, each of shape [sets].
     """
     again = shots[np.tile(np.arange(len(shots)), sets)]
-    return replace(again, **{name: np.repeat(column, len(shots)) for name, column in columns.items()})
+    own: dict[str, Any] = {name: np.repeat(column, len(shots)) for name, column in columns.items()}
+    return replace(again, **own)
 
 
 def data_of(fit: Fit, shot: MeasuredShot) -> Data:

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from warpimpact.identification.parameters import FitError, is_distribution, read_distribution
 from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmetries_used
+from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Array
-from warpimpact.scene.scatter import EDGE, Distribution
 from warpimpact.scene.units import Length, quantity, quoted
 
 if TYPE_CHECKING:

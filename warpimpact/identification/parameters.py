@@ -12,8 +12,8 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene import AnyCore, Interaction, Plate
+from warpimpact.scene.distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from warpimpact.scene.model import Array, Model
-from warpimpact.scene.scatter import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from warpimpact.scene.units import quoted
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path
 

@@ -26,8 +26,9 @@ from warpimpact.identification.parameters import (
 )
 from warpimpact.results.measures import Measure
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
+from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
-from warpimpact.scene.scatter import QUANTITIES, Distribution
+from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.bending import check_bending
 from warpimpact.solver.columns import Path

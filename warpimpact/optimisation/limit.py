@@ -72,6 +72,8 @@ class LimitMap(HitMap):
         """
         if campaign.stop is not None:
             raise CampaignError("got a stop rule, but limits are searched for every hit: leave out the table [stop]")
+        if campaign.burst is not None:
+            raise CampaignError("got a burst, but limits are searched for every hit alone: leave out the table [burst]")
         if campaign.numerics.tolerance is not None:
             raise CampaignError(
                 "got numerics.tolerance, but limits take a fidelity; warpimpact limit has a --tolerance of its own"

@@ -6,6 +6,7 @@ analysis and the rooms below it, but neither export nor report. Text in figures 
 
 import matplotlib as mpl
 
+from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
 from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
@@ -16,6 +17,7 @@ from warpimpact.plotting.trajectory import course, flight, largest_load, passage
 mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error
 
 __all__ = [
+    "bursts_figure",
     "comparison_figure",
     "course",
     "dispersion",

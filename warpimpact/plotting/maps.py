@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
 from warpimpact.plotting.distribution import dispersion, is_uncertain, marginals, uncertainty
 from warpimpact.results import attributes as attr
@@ -108,6 +109,8 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
     figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
     if is_uncertain(dataset, v.RESIDUAL_VELOCITY):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
+    if v.BURST_ORDER in dataset:
+        figures["bursts"] = bursts_figure(dataset)
     return _saved(figures, folder, stem, overwrite=overwrite)
 
 

@@ -55,12 +55,17 @@ SYMMETRIES = "symmetries"
 IMAGES = "images"
 """How many hits in a row are images of each other. SYMMETRIES, IMAGES and COMPUTED_HITS need `hits.irreducible`."""
 COMPUTED_HITS = "computed_hits"
+BURST = "burst"
+"""JSON of the burst; likewise only of a campaign of bursts:"""
+SHOTS_AT_A_PLATE = "shots_at_a_plate"
 
 # Core, plate and output
 CORE = "core"
 PLATE = "plate"
 IMPACT = "impact"
 MATERIAL = "material"
+LAYERS = "layers"
+"""JSON of what stands behind the plate, by its number; not there where that is nothing."""
 STANDOFF_POINT = "standoff_point"
 OPEN_AREA = "open_area"
 AREAL_DENSITY = "areal_density"
@@ -68,6 +73,10 @@ LIGAMENT = "ligament"
 PLATE_PERIOD = "plate_period"
 PLATE_THICKNESS = "plate_thickness"
 FAILED_SHARE = "failed_share"
+
+# A sweep
+SWEEP = "sweep"
+"""JSON of the swept inputs: name of the dimension → values as they were written."""
 
 # The stop rule
 STOP_QUANTITY = "stop_quantity"

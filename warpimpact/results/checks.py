@@ -19,13 +19,17 @@ _TEXTS = (
     *(attr.TITLE, attr.HISTORY, attr.REFERENCES, attr.CAMPAIGN, attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     *(attr.DEVICE, attr.NUMERICS, attr.NUMERICS_GIVEN, attr.FINGERPRINT, attr.SAMPLING, attr.SYMMETRIES, attr.CORE),
     *(attr.MATERIAL, attr.CAMPAIGN_ANGLES, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
-    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.PRECISION, attr.MACHINE),
-    *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION),
+    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.LAYERS, attr.PRECISION, attr.MACHINE),
+    *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION, attr.SWEEP),
+    attr.BURST,
     *(f"{name}_units" for name in attr.UNITS),
 )
-_TABLES = (attr.CORE, attr.PLATE, attr.IMPACT, attr.MATERIAL, attr.NUMERICS_GIVEN, attr.RESOLUTION)
+_TABLES = (
+    *(attr.SWEEP, attr.CORE, attr.PLATE, attr.IMPACT, attr.MATERIAL, attr.LAYERS, attr.NUMERICS_GIVEN),
+    *(attr.RESOLUTION, attr.BURST),
+)
 """Texts that are JSON objects."""
-_COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS)
+_COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS, attr.SHOTS_AT_A_PLATE)
 _NUMBERS = (
     *(attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.SEED, attr.OPEN_AREA, attr.AREAL_DENSITY, attr.LIGAMENT),
     *(attr.PLATE_THICKNESS, attr.FAILED_SHARE, attr.ESTIMATE, attr.CONFIDENCE, attr.HIT),
@@ -40,6 +44,7 @@ _TOGETHER = (
     (attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     (attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS, attr.CONFIDENCE),
     (attr.COMPUTED_HITS, attr.SYMMETRIES),
+    (attr.BURST, attr.SHOTS_AT_A_PLATE),
     (attr.PROMISE_KEPT, attr.RESOLUTION, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.NUMERICS_GIVEN),
 )
 """Attributes of which the first needs the others."""
@@ -63,7 +68,10 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
     """What only a map of hits is held to."""
     if "hit" not in dataset.sizes:
         return None
+    chosen = json.loads(dataset.attrs[attr.SWEEP]) if attr.SWEEP in dataset.attrs else ()  # inputs of a sweep's point
     for one in known:
+        if one in chosen and dataset.variables[one].dims == ():
+            continue
         if one in dataset.variables and dataset.variables[one].dims != one.dims:
             return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
     if dataset.sizes.get("standoff", 1) == 0:

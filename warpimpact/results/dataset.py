@@ -75,7 +75,8 @@ def to_dataset(
         v.AXIS: ["x", "y", "z"],
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    values |= {name: shots.columns[name] for name in (*v.SCATTER_VARIABLES, v.POSTERIOR_DRAW) if name in shots.columns}
+    of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
+    values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
     ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *v.LAYER_VARIABLES)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
     values |= _of_layers(scene, shots)
@@ -83,7 +84,7 @@ def to_dataset(
         zero = np.zeros(len(shots))
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
-    told = (*v.SCATTER_VARIABLES, v.POSTERIOR_DRAW, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
+    told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
     optional = (*told, *v.LAYER_VARIABLES, *v.LAYER_FACES)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:
@@ -334,6 +335,11 @@ def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
 def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
     return np.isin(dataset[v.STATUS].values, [status for status in Status if status.failed])
+
+
+def shots_at_a_plate(dataset: xarray.Dataset) -> int:
+    """How many hits in a row are on one plate; 1 without bursts."""
+    return int(dataset.attrs.get(attr.SHOTS_AT_A_PLATE, 1))
 
 
 def images(dataset: xarray.Dataset) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import shutil
@@ -182,7 +183,10 @@ def open_result(path: str | Path) -> xarray.Dataset:
     """
     with opened(Path(path)):
         pass  # it is a sound result
-    return _opened(Path(path))
+    dataset = _opened(Path(path))
+    found = dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
+    found.set_close(dataset.close)
+    return found
 
 
 @contextmanager
@@ -195,8 +199,6 @@ def opened(path: Path) -> Iterator[xarray.Dataset]:
     with opened_either(path) as dataset:
         if is_history(dataset):
             raise ResultError(f"{path}: is the history of a single hit, not a map of hits")
-        if found := unusable(dataset):
-            raise ResultError(f"{path}: {found}")
         yield dataset
 
 
@@ -210,6 +212,12 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
     with _netcdf(path) as dataset:
         if v.SETTING in dataset.variables:
             raise ResultError(f"{path}: is a study of the numerics, as warpimpact study writes, not a map of hits")
+        if attr.SWEEP in dataset.attrs and dataset.get(v.STATUS, dataset).dims != (v.HIT,):
+            inputs = list(json.loads(dataset.attrs[attr.SWEEP]))
+            raise ResultError(
+                f"{path}: is a sweep of {' and '.join(inputs)}; its points are results, or choose one with "
+                f"isel({', '.join(f'{name}=0' for name in inputs)})"
+            )
         missing = {*v.COORDINATES, *v.VARIABLES} - {v.HIT} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a warpimpact result, it has no variable "{min(missing)}"')
@@ -219,15 +227,31 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 "one, keep its attributes"
             )
         if not is_history(dataset):
+            if found := unusable(dataset):
+                raise ResultError(f"{path}: {found}")
             optional = (
                 *v.SCATTER_VARIABLES,
-                v.POSTERIOR_DRAW,
+                *v.POSTERIOR_VARIABLES,
+                *v.BURST_VARIABLES,
                 *v.ESTIMATE_VARIABLES,
                 *v.LAYER_VARIABLES,
                 *v.LAYER_FACES,
             )
             _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
+
+
+def read_sweep(path: Path) -> xarray.Dataset:
+    """Read a sweep into memory.
+
+    Raises:
+        ResultError: The file is missing, is not netCDF, or is not a sweep.
+    """
+    with _netcdf(path) as dataset:
+        if attr.SWEEP not in dataset.attrs or v.STATUS not in dataset.variables:
+            raise ResultError(f"{path}: is not a sweep, as warpimpact sweep writes")
+        found = dataset.load()
+    return found.set_xindex(v.HIT)
 
 
 def read_study(path: Path) -> xarray.Dataset:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images, is_choice, passed
+from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -172,7 +172,9 @@ class Tally:
 
 
 def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
-    """Arguments of `Dealt` that fit the sampling of a result. Chosen hits are no longer dealt out in turn."""
+    """Arguments of `Dealt` that fit the sampling of a result. The shots at one plate count as one, like images. Chosen
+    hits are no longer dealt out in turn."""
     if is_choice(dataset):
         return {"replicates": 1, "images": 1}
-    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": images(dataset)}
+    together = images(dataset) * shots_at_a_plate(dataset)
+    return {"replicates": int(dataset.attrs.get(attr.REPLICATES, 1)), "images": together}

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import netCDF4
 import xarray
 
 from warpimpact.results import attributes as attr
@@ -67,21 +68,32 @@ def read(path: Path) -> xarray.DataTree:
     if not path.is_file():
         raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
     try:
-        with uninterrupted(), xarray.open_datatree(path, engine="netcdf4") as tree:
-            loaded = tree.load()
+        with uninterrupted():
+            loaded = _loaded(path)
     except Exception as error:  # a file that was altered leads xarray into errors of any class
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
     missing = [name for name in GROUPS if name not in loaded.children]
-    if missing or attr.WARPIMPACT_VERSION not in loaded.attrs or FIT not in loaded.attrs:
-        what = f'group "{missing[0]}"' if missing else f'attribute "{FIT}"'
+    untold = [name for name in (attr.WARPIMPACT_VERSION, FIT, MATERIAL) if name not in loaded.attrs]
+    if missing or untold:
+        what = f'group "{missing[0]}"' if missing else f'attribute "{untold[0]}"'
         raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
     return loaded
 
 
+def _loaded(path: Path) -> xarray.DataTree:
+    """The groups in memory, read one after the other.
+
+    Each is closed before the next one opens. A tree that stays open is closed when Python collects it, in the middle of
+    another access, which crashes netCDF.
+    """
+    with netCDF4.Dataset(path) as file:
+        names = list(file.groups)
+    groups = {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}
+    return xarray.DataTree.from_dict({"/": xarray.load_dataset(path, engine="netcdf4"), **groups})
+
+
 def is_posterior(path: Path) -> bool:
     """Whether a file says that it is a posterior."""
-    import netCDF4
-
     try:
         with netCDF4.Dataset(path) as file:
             return "posterior" in file.groups

@@ -106,6 +106,7 @@ MASS = Variable("mass", _HIT, "kg", "mass of the core")
 STRENGTH = Variable("strength", _HIT, "Pa", "strength of the core, a nominal bending stress")
 
 POSTERIOR_DRAW = Variable("posterior_draw", _HIT, "1", "place of the shot's parameters in the posterior")
+POSTERIOR_VARIABLES = (POSTERIOR_DRAW,)
 """Present only in a campaign with a posterior."""
 
 LAYER_THICKNESS = Variable("layer_thickness", _IN_LAYER, "m", "thickness of each layer")
@@ -121,6 +122,14 @@ LAYER_SCATTER = (
 
 SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH, *LAYER_SCATTER)
 """Present only in a campaign in which they differ from shot to shot."""
+
+# --- Bursts ---
+SAMPLE = Variable("sample", _HIT, "1", "number of the plate that the shot hits")
+BURST_ORDER = Variable("burst_order", _HIT, "1", "number of hits on that plate before")
+NEAREST_EARLIER_HIT = Variable("nearest_earlier_hit", _HIT, "m", "distance from the nearest earlier hit on that plate")
+
+BURST_VARIABLES = (SAMPLE, BURST_ORDER, NEAREST_EARLIER_HIT)
+"""Present only in a campaign of bursts."""
 
 # --- How the shot ended ---
 STATUS = Variable("status", _HIT, "1", "how the shot ended", flags=Status)
@@ -417,8 +426,8 @@ def shown_by(command: str) -> tuple[Variable, ...]:
 
 
 def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
-    """Names of the variables of the impact, and of plate and core where they differ; hit points are not included."""
-    return [*SHOT_VARIABLES, *(name for name in SCATTER_VARIABLES if name in dataset)]
+    """Names of the variables of the impact, of plate and core where they differ, and of bursts; no hit points."""
+    return [*SHOT_VARIABLES, *(name for name in (*SCATTER_VARIABLES, *BURST_VARIABLES) if name in dataset)]
 
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:

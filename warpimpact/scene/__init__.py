@@ -4,6 +4,7 @@ Change cores, plates, patterns, shots and their scatter here; a message says wha
 imports no other room: neither a kernel nor a Dataset.
 """
 
+from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction
 from .numerics import Numerics, Tolerance
@@ -33,6 +34,8 @@ __all__ = [
     "OF_THE_SCENE",
     "AnyCore",
     "AnyPattern",
+    "Burst",
+    "BurstSampler",
     "CirclePattern",
     "ConeCore",
     "Core",

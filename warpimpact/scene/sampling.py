@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .distributions import EDGE
 from .model import Array
 from .plate import Plate
-from .scatter import EDGE, OF_A_LAYER, QUANTITIES, Scatter
+from .scatter import OF_A_LAYER, QUANTITIES, Scatter
 from .shots import Hits, Impact, Shots
 from .sobol import Sobol
 from .symmetry import check_scatter, irreducible_part, symmetries_used
@@ -99,7 +100,7 @@ class Sampler:
             points = self._net(first, count)
             return [points[:, column] for column in columns]
         hits = self._grid(first, count) if self._hits.sampling == "grid" else _pairs(self._hits.seed, first, count)
-        return [*hits, *(_stream(self._hits.seed, column, first, count) for column in columns[_HIT_COLUMNS:])]
+        return [*hits, *(stream(self._hits.seed, (column,), first, count) for column in columns[_HIT_COLUMNS:])]
 
     def _grid(self, first: int, count: int) -> tuple[Array, Array]:
         """Cell centres, row by row."""
@@ -138,9 +139,9 @@ def _pairs(seed: int, first: int, count: int) -> tuple[Array, Array]:
     return pairs[::2], pairs[1::2]
 
 
-def _stream(seed: int, column: int, first: int, count: int) -> Array:
-    """Independent numbers of one column, shape [count]: shot k has draw k."""
-    return _draws(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(column,))), first, count)
+def stream(seed: int, key: tuple[int, ...], first: int, count: int) -> Array:
+    """Independent numbers of one key, such as a column, shape [count]: shot k has draw k."""
+    return _draws(np.random.Philox(np.random.SeedSequence(seed, spawn_key=key)), first, count)
 
 
 def _draws(generator: np.random.Philox, first: int, count: int) -> NDArray[np.float64]:

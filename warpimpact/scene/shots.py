@@ -42,6 +42,8 @@ Tilt = Annotated[
     Angle, AfterValidator(_is_tilt), Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90})
 ]
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
+OF_A_BURST = ("sample", "burst_order", "nearest_earlier_hit")
+"""Columns of shots that share their plates."""
 
 
 EXPORTED = {"impact_velocity": "velocity", "impact_pitch": "pitch", "impact_yaw": "yaw"}
@@ -203,6 +205,10 @@ class Shots:
         layer_thickness [m], layer_resistance [Pa], layer_shear_coefficient, layer_degradation, layer_offset_y [m],
             layer_offset_z [m]: of the layers behind the plate, shape [shots, layers]; NaN where a layer has the scene's
             own value, None where all layers have.
+        sample: number of the plate that a shot hits, where several hit one and the same; those are in a row. None where
+            every shot has a plate of its own.
+        burst_order: how many shots have hit that plate before.
+        nearest_earlier_hit: distance from the nearest hit on that plate before [m]; NaN for the first one.
     """
 
     hit_y: Array
@@ -225,6 +231,9 @@ class Shots:
     layer_degradation: Array | None = None
     layer_offset_y: Array | None = None
     layer_offset_z: Array | None = None
+    sample: NDArray[np.int64] | None = None
+    burst_order: NDArray[np.int64] | None = None
+    nearest_earlier_hit: Array | None = None
 
     def __len__(self) -> int:
         """Number of shots."""
@@ -235,9 +244,24 @@ class Shots:
         return type(self)(**{name: values[which] for name, values in self.columns.items()})
 
     @property
-    def columns(self) -> dict[str, Array]:
+    def columns(self) -> dict[str, NDArray[Any]]:
         """The arrays that there are, by name."""
         return {f.name: values for f in fields(self) if (values := getattr(self, f.name)) is not None}
+
+    @property
+    def at_a_plate(self) -> int:
+        """How many shots in a row hit one and the same plate.
+
+        Raises:
+            ValueError: the shots at a plate are not complete, or not in order.
+        """
+        if self.sample is None or self.burst_order is None or not len(self):
+            return 1
+        count = int(self.burst_order.max()) + 1
+        plates, rest = divmod(len(self), count)
+        if rest or not np.array_equal(self.burst_order, np.tile(np.arange(count), plates)):
+            raise ValueError(f"got {len(self)} shots of bursts of {count}, but they must be whole bursts in order")
+        return count
 
     def own(self, name: str, otherwise: float) -> Array:
         """A quantity of every shot, shape [shots]; where they do not have one of their own that of the scene, [1]."""
@@ -260,4 +284,5 @@ class Shots:
 
 def _listable(required: tuple[str, ...]) -> tuple[str, ...]:
     """Quantities that a list of hits may have beside those required: one number per shot."""
-    return tuple(f.name for f in fields(Shots) if f.name not in required and not f.name.startswith("layer_"))
+    foreign = {*required, *OF_A_BURST}
+    return tuple(f.name for f in fields(Shots) if f.name not in foreign and not f.name.startswith("layer_"))

@@ -1,4 +1,6 @@
-"""Scrambled Sobol points by their number: the points of scipy.stats.qmc.Sobol, without a second of imports.
+"""Scrambled Sobol points by their number, without a second of imports: up to TOGETHER dimensions those of
+scipy.stats.qmc.Sobol, whose scrambling of each dimension depends on how many there are. Further dimensions have a
+scrambling of their own, so that one more changes none of the others.
 
 Direction numbers: S. Joe and F. Y. Kuo, "Constructing Sobol sequences with better two-dimensional projections", SIAM J.
 Sci. Comput. 30 (2008). Scrambling: J. Matoušek's linear matrix and a digital shift.
@@ -15,6 +17,10 @@ from .model import Array
 
 Integers = NDArray[np.uint32]
 
+TOGETHER = 13
+"""Dimensions that are scrambled together: the hit, and the eleven quantities that could scatter at first."""
+_APART = 7
+"""Part of the key of dimensions that are scrambled on their own."""
 BITS = 30
 """Binary digits of a coordinate; a sequence has 2^BITS points."""
 _WEIGHTS = 1 << np.arange(BITS - 1, -1, -1, dtype=np.uint32)
@@ -61,13 +67,25 @@ class Sobol:
     @cached_property
     def _scrambled(self) -> tuple[Integers, Integers]:
         """Digital shift, shape [dimensions], and scrambled direction numbers, shape [dimensions, BITS]."""
-        draw = np.random.default_rng(self._seed).spawn(1)[0]  # as scipy does
-        shift = draw.integers(2, size=(self.dimensions, BITS), dtype=np.uint32) @ _WEIGHTS[::-1]
-        matrix = np.tril(draw.integers(2, size=(self.dimensions, BITS, BITS), dtype=np.uint32))
-        matrix[:, range(BITS), range(BITS)] = 1
-        digits = (_directions(self.dimensions)[:, None, :] & _WEIGHTS[:, None]) > 0
-        scrambled = (matrix @ digits) & np.uint32(1)
-        return shift, (scrambled * _WEIGHTS[:, None]).sum(axis=1, dtype=np.uint32)
+        directions, key = _directions(self.dimensions), self._seed.spawn_key
+        draw = np.random.default_rng(np.random.SeedSequence(self._seed.entropy, spawn_key=key)).spawn(1)[0]  # as scipy
+        parts = [_scramble(directions[:TOGETHER], draw)]
+        for place in range(TOGETHER, self.dimensions):
+            own = np.random.SeedSequence(self._seed.entropy, spawn_key=(*key, _APART, place))
+            parts.append(_scramble(directions[place : place + 1], np.random.default_rng(own)))
+        shift, scrambled = zip(*parts, strict=True)
+        return np.concatenate(shift), np.concatenate(scrambled)
+
+
+def _scramble(directions: Integers, draw: np.random.Generator) -> tuple[Integers, Integers]:
+    """Digital shift and scrambled direction numbers of some dimensions."""
+    dimensions = len(directions)
+    shift = draw.integers(2, size=(dimensions, BITS), dtype=np.uint32) @ _WEIGHTS[::-1]
+    matrix = np.tril(draw.integers(2, size=(dimensions, BITS, BITS), dtype=np.uint32))
+    matrix[:, range(BITS), range(BITS)] = 1
+    digits = (directions[:, None, :] & _WEIGHTS[:, None]) > 0
+    scrambled = (matrix @ digits) & np.uint32(1)
+    return shift, (scrambled * _WEIGHTS[:, None]).sum(axis=1, dtype=np.uint32)
 
 
 def _directions(dimensions: int) -> Integers:

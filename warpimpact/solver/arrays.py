@@ -88,16 +88,18 @@ class Arrays:
 def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
     """The build of the kernels that a scene needs."""
     plates, interaction, scattered = scene.target.plates, scene.interaction, shots.columns
+    degrades = any(weakens(scene.target, scattered))
     return Variant(
         double=resolution.double,
         nodal=resolution.nodal,
-        degrades=any(weakens(scene.target, scattered)),
+        degrades=degrades,
         rubs=any(plate.shear_coefficient > 0.0 for plate in plates)
         or not scattered.keys().isdisjoint(("shear_coefficient", "layer_shear_coefficient")),
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
         rimmed=any(plate.size is not None for plate in plates),
         bends=scene.record.bending,
         layered=len(plates) > 1,
+        burst=degrades and shots.at_a_plate > 1,
     )
 
 

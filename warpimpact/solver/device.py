@@ -6,14 +6,16 @@ import logging
 import os
 import tempfile
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import psutil
 import warp as wp
 
 _logger = logging.getLogger(__name__)
+Scratch = TypeVar("Scratch")
 
 
 class DeviceError(RuntimeError):
@@ -88,3 +90,15 @@ def load(kernel: Any, device: Any) -> None:
     begin = time.perf_counter()
     kernel.module.load(device, 1 if device.is_cpu else 256)
     _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)
+
+
+def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
+    """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
+    estimate."""
+    while True:
+        try:
+            return slots, allocate(slots)
+        except (RuntimeError, MemoryError) as error:
+            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
+                raise
+        slots //= 2

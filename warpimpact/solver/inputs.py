@@ -38,6 +38,7 @@ class Inputs:
     Attributes:
         stage: the build of the march that the scene needs.
         put: puts values on the device.
+        count: number of shots.
         surface, sections, plate, law, shots, pace, target: structs on the device.
     """
 
@@ -49,6 +50,7 @@ class Inputs:
         self.target = self._target(arrays)
         self.sections = self._sections(arrays)
         self.shots = self._shots(arrays)
+        self.count = len(arrays.shots["hit_y"])
         self.law = self.stage.Law()
         self.law.by_path, self.law.a2 = arrays.materials[0].by_path, arrays.materials[0].a2
         self.law.onset_share, self.law.onset_limit = arrays.onset, LARGEST_ONSET
@@ -57,8 +59,11 @@ class Inputs:
         self.pace.rows = arrays.rows
 
     def give_up_after(self, way: float) -> None:
-        """Give up every shot after this distance [m] at impact velocity."""
-        self.shots.longest_way.fill_(way)
+        """Give up the last shot after this distance [m] at impact velocity."""
+        longest_way = self.shots.longest_way.numpy()
+        ways = np.resize(longest_way, max(len(longest_way), self.count))
+        ways[-1] = way
+        self.shots.longest_way = self.put(ways, wp.float64)
 
     def _target(self, arrays: Arrays) -> Any:
         """The layers of a target (kernels/layers.py), all but their windows; empty if the plate stands alone."""

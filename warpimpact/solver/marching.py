@@ -1,14 +1,17 @@
-"""Marches the shots of a scene on a device: windows, memory and threads."""
+"""Marches the shots of a scene on a device: windows, memory and threads.
+
+Long because the windows, the memory and the threads of a march share its state.
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from functools import partial
 from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -20,7 +23,18 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
 from warpimpact.solver.bending import bending_columns
-from warpimpact.solver.device import cores, free_memory, load
+from warpimpact.solver.bursts import (
+    bytes_of,
+    check_bursts,
+    chunk_of,
+    earlier_hits,
+    in_turns,
+    spoilt,
+    turns,
+    whole_plates,
+)
+from warpimpact.solver.device import cores, free_memory, halving, load
+from warpimpact.solver.exits import exits
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.layering import Passages, deep_cells
 from warpimpact.solver.resolution import Fidelity
@@ -28,7 +42,6 @@ from warpimpact.solver.resolution import Fidelity
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 Progress1 = Callable[[int], None]
-Scratch = TypeVar("Scratch")
 
 CPU_CHUNK = 64
 """Most shots per launch on the CPU: few enough for an even load of the threads."""
@@ -63,9 +76,11 @@ class March:
     ) -> None:
         self.scene, self.shots, self.device = scene, shots, device
         self.threads = threads or cores()
+        check_bursts(shots, numerics)
         self.arrays = arrays_of(scene, numerics, shots, traced=traced)
         self.inputs = Inputs(self.arrays, device)
         self.variant, self.stage = self.arrays.variant, self.inputs.stage
+        self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.passages = Passages(self.stage, len(shots), len(self.inputs.plates), self.variant, device)
@@ -79,10 +94,11 @@ class March:
         pending = np.arange(count)
         for _ in range(MAX_DOUBLINGS):
             self._march_some(pending, outcomes, _after(count - len(pending), count, progress))
-            pending = np.flatnonzero(outcomes.status.numpy() == Status.LEFT_WINDOW)
+            pending = whole_plates(outcomes.status.numpy() == Status.LEFT_WINDOW, self.at_a_plate)
             if not len(pending) or not self._fits(2 * self.cells[0], 2 * self.cells[1]):
                 break
             self.cells = (2 * self.cells[0], 2 * self.cells[1])
+        outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
         progress(count, count)
         return outcomes
 
@@ -92,36 +108,41 @@ class March:
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
     def plate_after(self, steps: int, time_step: float) -> Array:
-        """Share of the plate's resistance that is left after some steps of the first shot on the CPU, in the window of
-        its march."""
-        scratch = self._scratch(1, *self.cells)
+        """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of
+        its march. All shots hit one plate."""
+        scratch, before = self._scratch(1, *self.cells), len(self.shots) - 1
+        order = self.inputs.put(np.arange(before + 1), wp.int32)
+        outcomes = self._empty(self.stage.Outcomes, (before + 1,))
+        if self.variant.layered and before:
+            steps = max(1, steps)  # the window of a layer opens with the first step
+        self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[-1])
+        if before:
+            self._launch(order, outcomes, scratch, 1, 0, before)
         for name in self._fields():  # the window of a layer that is not reached stays closed
             getattr(scratch[0], name).zero_()
-        self.inputs.give_up_after((steps - 0.5) * time_step * self.shots.velocity[0])
-        first = self.inputs.put(np.zeros(1), wp.int32)
-        self._launch(first, self._empty(self.stage.Outcomes, (1,)), scratch, 1, 0, 1)
+        self._launch(order, outcomes, scratch, 1, before, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells)
         exposure = np.zeros(math.prod(self.cells))
         if self.variant.degrades and self.arrays.materials[0].weakens:
             exposure = _host(scratch[0].exposure)[: exposure.size]
-        decayed = np.exp(self.arrays.shots["decay_rate"][0] * exposure.reshape(self.cells))
+        decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure.reshape(self.cells))
         return np.asarray(self._material() * decayed)
 
     def body(self) -> MassProperties:
-        """Mass properties of the first shot."""
+        """Mass properties of the last shot."""
         names = ("mass", "inertia_axial", "inertia_transverse")
-        return self.scene.core.mass_properties._replace(**{name: float(self.arrays.shots[name][0]) for name in names})
+        return self.scene.core.mass_properties._replace(**{name: float(self.arrays.shots[name][-1]) for name in names})
 
     def nodes(self) -> tuple[Array, Array]:
-        """Coordinates in the plate of the nodes of the first shot's window, along y and z [m]."""
-        hit = self.shots.hit_y[0], self.shots.hit_z[0]
+        """Coordinates in the plate of the nodes of the last shot's window, along y and z [m]."""
+        hit = self.shots.hit_y[-1], self.shots.hit_z[-1]
         spacing = self.arrays.grid.spacing
         y, z = (at + (np.arange(count) - count // 2) * spacing for at, count in zip(hit, self.cells, strict=True))
         return y, z
 
     def _material(self) -> Array:
-        """Share of material about every node of the first shot's window."""
+        """Share of material about every node of the last shot's window."""
         samples = 16
         fine = (np.arange(samples) + 0.5) / samples - 0.5
         y, z = ((nodes[:, None] + self.arrays.grid.spacing * fine).reshape(-1) for nodes in self.nodes())
@@ -144,15 +165,14 @@ class March:
         )
         values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
         status = contact.status.numpy().astype(np.int8)
-        values |= _exits(contact, status)
+        values |= exits(contact, status)
         bent = self._bending(status) if self.variant.bends else {}
         return {"status": status} | values | bent | self.passages.columns()
 
     def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
         """What is known of the bending of every shot."""
         breaks = self.scene.core.strength is not None or self.shots.strength is not None
-        known = self.variant.bends
-        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks) if known else {}
+        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks)
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""
@@ -193,7 +213,9 @@ class March:
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings: int = self.inputs.surface.rings * per_ring
-        return len(self._fields()) * self._nodes(cells_y, cells_z) * size + self._patches() * (6 * size + 2 * 4) + rings
+        nodes = self._nodes(cells_y, cells_z)
+        earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
+        return len(self._fields()) * nodes * size + earlier + self._patches() * (6 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
@@ -210,15 +232,15 @@ class March:
     def _slots(self, cells_y: int, cells_z: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow."""
         free = free_memory() if self.device.is_cpu else self.device.free_memory
-        wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots))
+        wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots) // self.at_a_plate)
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
-        return min(wanted, affordable, (2**31 - 1) // self._nodes(cells_y, cells_z))
+        return min(wanted, affordable, (2**31 - 1) // (self.at_a_plate * self._nodes(cells_y, cells_z)))
 
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
 
     def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, ...]:
-        """Fields, touches and layers of some slots."""
+        """Fields, touches, layers and earlier hits of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         scratch, touches = self.stage.Fields(), self.stage.Touches()
         scratch.cells_y, scratch.cells_z = cells_y, cells_z
@@ -234,7 +256,8 @@ class March:
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)
-        return scratch, touches, self.passages.stack(slots)
+        earlier = earlier_hits(self.stage, self.at_a_plate, slots, self._windows(cells_y, cells_z), self.device)
+        return scratch, touches, self.passages.stack(slots), earlier
 
     def _launch(
         self,
@@ -273,20 +296,21 @@ class March:
         load(self.stage.kernel, self.device)
         if self.variant.layered:
             self.inputs.place_windows(self._windows(*self.cells))
-        launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
         if self.device.is_cpu:
+            launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)
         else:
-            slots, scratch = _halving(self._slots(*self.cells), lambda slots: self._scratch(slots, *self.cells))
-            for first, count in _chunks(len(which), slots):
-                launch(scratch, slots, first, count)
+            slots, scratch = halving(self._slots(*self.cells), lambda slots: self._scratch(slots, *self.cells))
+            order = self.inputs.put(in_turns(which, self.at_a_plate, slots), wp.int32)
+            for first, count in turns(len(which), self.at_a_plate, slots):
+                self._launch(order, outcomes, scratch, slots, first, count)
                 wp.synchronize_device(self.device)
                 progress(first + count)
 
     def _cpu_scratch(self) -> list[Any]:
         """Scratch of one slot for every thread."""
         slots = self._slots(*self.cells)
-        return _halving(slots, lambda slots: [self._scratch(1, *self.cells) for _ in range(slots)])[1]
+        return halving(slots, lambda slots: [self._scratch(1, *self.cells) for _ in range(slots)])[1]
 
     def _on_threads(self, launch: Callable[..., int], slots: list[Any], total: int, progress: Progress1) -> None:
         """Distribute chunks over threads, each with one slot. A CPU launch runs its shots one after another on the
@@ -309,7 +333,7 @@ class March:
             try:
                 while done < total:
                     while begun < total and len(waiting) < 2 * len(slots):
-                        count = min(count, total - begun)
+                        count = min(chunk_of(count, self.at_a_plate), total - begun)
                         waiting.add(pool.submit(work, begun, count))
                         begun += count
                     ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
@@ -322,37 +346,9 @@ class March:
                     future.cancel()
 
 
-def _exits(contact: Any, status: NDArray[np.int8]) -> dict[str, Array]:
-    """The state of every core at the end of contact; NaN where the computation failed."""
-    failed, arrested = (status >= Status.UNFINISHED)[:, None], (status == Status.ARRESTED)[:, None]
-    state = {
-        "exit_velocity": np.where(arrested, 0.0, _host(contact.velocity)),
-        "exit_axis": _host(contact.axis),
-        "exit_position": _host(contact.position),
-    }
-    return {name: np.where(failed, np.nan, values) for name, values in state.items()}
-
-
 def _after(finished: int, total: int, progress: Progress) -> Progress1:
     """Progress of what comes after the shots already finished."""
     return lambda done: progress(finished + done, total)
-
-
-def _chunks(total: int, size: int) -> Iterator[tuple[int, int]]:
-    """(first, count) of consecutive chunks."""
-    return ((first, min(size, total - first)) for first in range(0, total, size))
-
-
-def _halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
-    """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
-    estimate."""
-    while True:
-        try:
-            return slots, allocate(slots)
-        except (RuntimeError, MemoryError) as error:
-            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
-                raise
-        slots //= 2
 
 
 def _host(array: Any) -> Array:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Numerics, Scene, Shots, Tolerance
+from warpimpact.solver.bursts import whole_plates
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import level
 from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
@@ -74,7 +75,8 @@ def simulate_to_tolerance(
     """Compute every shot on the first two levels, and on finer ones until it has converged (CLOSE, FAR).
 
     The outcome is that of the finest level computed. The estimate is its change from the level before: where levels
-    converge, the outcome is nearer to the limit (docs/model.md §4) than that.
+    converge, the outcome is nearer to the limit (docs/model.md §4) than that. Shots at one plate go on together until
+    all of them have converged.
 
     Args:
         numerics: its tolerance and precision; the others as in `simulate`.
@@ -121,7 +123,7 @@ def simulate_to_tolerance(
         estimates.converged[pending] = (near <= CLOSE) | three_agree
         estimates.level[pending] = index
         before, outcomes = with_rows(before, pending, last), with_rows(outcomes, pending, finer)
-        pending = np.flatnonzero(~estimates.converged)
+        pending = whole_plates(~estimates.converged, shots.at_a_plate)
         show(len(shots) - len(pending))
         if not len(pending):
             break

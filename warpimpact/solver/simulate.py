@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -151,7 +151,8 @@ def simulate(
     threads: int | None = None,
     progress: Progress | None = None,
 ) -> Outcomes:
-    """Compute every shot on its own copy of the target (docs/model.md §§1–5).
+    """Compute every shot on its own copy of the target (docs/model.md §§1–5), or those of a sample one after another on
+    one copy (`Shots.sample`, docs/model.md §8).
 
     Args:
         numerics: resolution and scheme; None is the standard fidelity.
@@ -165,7 +166,8 @@ def simulate(
 
     Raises:
         DeviceError: the device is absent.
-        ValueError: the numerics have a tolerance, or they cannot compute the bending moment that the scene records.
+        ValueError: the numerics have a tolerance, or they cannot compute the bending moment that the scene records or
+            several shots at one plate.
     """
     march = March(scene, numerics or Numerics(), shots, find_device(device), threads=threads)
     return _outcomes(march, march.march(progress))
@@ -198,22 +200,22 @@ def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
     return march.traces(march.march())
 
 
-def replay(scene: Scene, shot: Shots, *, numerics: Numerics | Fidelity | None = None, snapshots: int = 6) -> Replay:
+def replay(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None, snapshots: int = 6) -> Replay:
     """Compute one shot again on the CPU, with its history. The outcome equals that of `simulate` on the same CPU, bit
     for bit.
 
     Args:
-        shot: shots of length 1; the numerics as in `simulate`.
+        shots: the shot, after those that hit the same plate before it; the numerics as in `simulate`.
         snapshots: number of instants at which the plate is shown, evenly from the first touch to the end.
     """
-    march = _traced(scene, shot, numerics)
+    march = _traced(scene, shots, numerics)
     contact = march.march()
-    (trace,) = march.traces(contact)
+    trace, outcomes = march.traces(contact)[-1], _outcomes(march, contact)
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     cell_y, cell_z = march.nodes()
     return Replay(
-        outcomes=_outcomes(march, contact),
+        outcomes=replace(outcomes, **{name: values[-1:] for name, values in vars(outcomes).items()}),
         history=History.from_trace(trace, march.body()),
         plate_time=trace[steps, 0] - 0.5 * time_step if march.variant.layered else steps * time_step,
         resistance_share=np.stack([march.plate_after(count, time_step) for count in steps]),

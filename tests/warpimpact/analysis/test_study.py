@@ -245,7 +245,13 @@ def test_report_holds_the_study(
     write(small, tmp_path / "study.nc")
     page = tmp_path / "a.html"
     assert main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "study.nc"), "--trajectories", "0"]) == 0
-    assert study_text(small) in html.unescape(page.read_text())
+    text = html.unescape(page.read_text())
+    for setting in small["setting"].values:
+        one = small.sel(setting=setting).isel(standoff=-1)
+        errors = [*one["residual_velocity_error"].values, *one["tilt_error"].values]
+        cells = [setting, f"{float(one['hits_per_second']):.4g}", *(f"{error:.3f}" for error in errors)]
+        assert "".join(f'<td class="number">{cell}</td>' for cell in cells) in text
+    assert study_text(small).splitlines()[-1] in text  # how uncertain the converged answer is
 
 
 def test_figure_shows_front_fidelities_literal_scheme_and_floor(small: xarray.Dataset) -> None:

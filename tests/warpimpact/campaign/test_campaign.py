@@ -213,7 +213,8 @@ MISTAKES = {
     "stand-off within the plate": (
         '["50 mm", "130 mm"]',
         '["10 mm"]',
-        "got output.standoffs of 0.01 m, but a core of this size is certain to be out of the target only from 0.01805",
+        "got output.standoffs of 0.01 m, but a core of this size is certain to be out of the target only from "
+        "0.01805 m",
     ),
     "a number in place of a table": (
         SLOT,

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact import Campaign
+from warpimpact.campaign.compute import HitMap
 from warpimpact.campaign.run import Standing, run_to_file
 from warpimpact.campaign.team import ClusterError, _compute_alike, cluster_team
 from warpimpact.cli import main
@@ -93,7 +94,7 @@ def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
 def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -> None:
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
-        _compute_alike(campaign, None, campaign.sampler().shots(0, 1), None, "cpu", None, kind)
+        _compute_alike(HitMap(), campaign, None, campaign.sampler().shots(0, 1), None, "cpu", None, kind)
 
 
 @pytest.mark.parametrize("lost", ["closed", "cancelled"])

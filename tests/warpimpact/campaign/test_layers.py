@@ -1,5 +1,6 @@
 """Campaigns with layers behind the plate: how they are read, what a result holds, and that a replay gives it again."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +121,9 @@ def test_a_result_tells_of_every_layer(result: xarray.Dataset) -> None:
     np.testing.assert_array_equal(np.isfinite(result["depth"]), rests)
     assert (status[rests, result["stopped_in"].values[rests]] == LayerStatus.ARRESTED).all()
     np.testing.assert_allclose(result["layer_front"], [0.0, 54e-3, 62e-3])
+    told = json.loads(result.attrs["layers"])
+    assert told["1"]["offset_y"]["distribution"] == "uniform"
+    assert told["2"]["gap"] == 5e-3
 
 
 def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:

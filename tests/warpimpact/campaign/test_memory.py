@@ -13,7 +13,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.scene import Scene, Shots
-from warpimpact.solver import marching, simulate
+from warpimpact.solver import device, marching, simulate
 from warpimpact.solver.simulate import Outcomes
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -66,7 +66,7 @@ def test_scratch_is_halved_until_it_can_be_had() -> None:
             raise RuntimeError(f"Failed to allocate {slots} bytes on device 'cuda:0'")
         return f"{slots} slots"
 
-    assert marching._halving(1000, allocate) == (62, "62 slots")
+    assert device.halving(1000, allocate) == (62, "62 slots")
 
 
 @pytest.mark.parametrize("error", [RuntimeError("Failed to allocate 8 bytes"), MemoryError(), RuntimeError("other")])
@@ -78,7 +78,7 @@ def test_what_halving_cannot_cure_is_told(error: Exception) -> None:
         raise error
 
     with pytest.raises(type(error)):
-        marching._halving(8, allocate)
+        device.halving(8, allocate)
     assert asked == ([8] if str(error) == "other" else [8, 4, 2, 1])
 
 

@@ -8,6 +8,7 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
+from warpimpact.optimisation.sweep import read_sweep
 from warpimpact.scene.plausible import Implausible
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -44,10 +45,11 @@ def warned(text: str, folder: Path) -> list[str]:
 def test_the_campaigns_are_plausible(path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        if path.stem == "two_plates":
-            read_plates(path)
-        else:
-            Campaign.from_toml(path)
+        if path.stem == "base_armour":  # its cores were turned by a plate before
+            warnings.filterwarnings("ignore", "hits.file, column yaw: read as 85 deg", Implausible)
+        text = path.read_text(encoding="utf-8")
+        read = read_plates if "[[plate]]" in text else read_sweep if "[sweep]" in text else Campaign.from_toml
+        read(path)
 
 
 @pytest.mark.parametrize(
@@ -99,7 +101,7 @@ def test_a_hit_list_in_millimetres_is_told(folder: Path) -> None:
 def test_the_command_says_it_once_and_goes_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "a.toml").write_text(TEXT.replace('thickness = "4 mm"', "thickness = 4"))
     for _ in range(2):
-        assert main(["plate", "a.toml"]) == 0
+        assert main(["plate", "a.toml", "--overwrite"]) == 0
         shown = capsys.readouterr()
         assert shown.err == (
             "warpimpact: warning: plate.thickness: read as 4 m, but 0.1 to 200 mm is usual; "

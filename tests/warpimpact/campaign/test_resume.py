@@ -495,14 +495,14 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
 
 HOST_WORK = """
 import sys, time
-from warpimpact.campaign import team
+from warpimpact.campaign.compute import HitMap
 from warpimpact.cli import command
 
 def host_work(*_, **__):  # a ligament, or the compilation of a kernel: one call, which nothing can break off
     print("at work", flush=True)
     time.sleep(120.0)
 
-team.{name} = host_work
+HitMap.{name} = host_work
 command()
 """
 

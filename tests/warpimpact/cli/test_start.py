@@ -8,6 +8,7 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.cli import main
+from warpimpact.identification.reading import read_fit
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -22,7 +23,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["examples"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == sorted(path.stem for path in CAMPAIGNS.glob("*.toml"))
+    paths = [*CAMPAIGNS.glob("*.toml"), *CAMPAIGNS.glob("fits/*.toml")]
+    assert [line.split()[0] for line in lines] == sorted(path.stem for path in paths)
     assert all("?" in line for line in lines)
 
 
@@ -39,6 +41,12 @@ def test_a_new_campaign_can_be_read(name: str, capsys: pytest.CaptureFixture[str
     assert Campaign.from_toml("folder/my.toml") == Campaign.from_toml(CAMPAIGNS / f"{name}.toml").model_copy(
         update={"hits": Campaign.from_toml("folder/my.toml").hits}
     )
+
+
+def test_a_new_fit_can_be_read() -> None:
+    assert main(["new", "paper_fit"]) == 0
+    assert read_fit("paper_fit.toml").observed == 10
+    assert not Path("warpimpact.schema.json").exists()
 
 
 def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> None:

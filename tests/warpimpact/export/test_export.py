@@ -99,7 +99,7 @@ def test_the_ending_of_a_name_decides_the_format_or_is_refused(
     for file, name, sentence in (
         ("a.nc", "a.txt", "a.txt: the name of a table must end in .csv"),
         ("a.nc", "a", "a: the name of a table must end in .csv"),
-        ("hit.nc", "hit.csv", "hit.csv: a history is written as a folder, whose name must have no ending"),
+        ("hit.nc", "hit.csv", "hit.csv: the history of a hit is written as a folder, so give a name without a dot"),
     ):
         assert main(["export", str(tmp_path / file), "-o", str(tmp_path / name)]) == 2
         assert sentence in capsys.readouterr().err

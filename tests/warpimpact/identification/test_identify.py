@@ -47,8 +47,9 @@ def test_the_file_has_the_groups_that_arviz_reads(posterior: Path) -> None:
 
 def test_arviz_reads_it(posterior: Path) -> None:
     arviz = pytest.importorskip("arviz_base")
-    drawn = arviz.extract(arviz.convert_to_datatree(str(posterior)))
-    assert drawn["resistance"].sizes == {"sample": 100}
+    tree = arviz.convert_to_datatree(str(posterior))
+    assert arviz.extract(tree)["resistance"].sizes == {"sample": 100}
+    tree.close()
 
 
 def test_draws_hold_together(posterior: Path) -> None:

@@ -11,6 +11,7 @@ from matplotlib.colors import to_rgb
 from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
+from warpimpact.optimisation.sweep import read_sweep
 from warpimpact.plotting import plate_figure
 from warpimpact.plotting.dimensions import hole_dimensions, smallest_ligament
 from warpimpact.scene import ConeCore, MaskPattern, NoPattern, Plate, SlotPattern
@@ -131,7 +132,8 @@ def test_plates_of_the_library_have_the_ligaments_that_they_say(
 def test_every_campaign_of_the_library_can_be_read_and_says_its_question() -> None:
     for path in CAMPAIGNS.glob("*.toml"):
         text = path.read_text(encoding="utf-8")
-        read_plates(path) if "[[plate]]" in text else Campaign.from_toml(path)
+        read = read_plates if "[[plate]]" in text else read_sweep if "[sweep]" in text else Campaign.from_toml
+        read(path)
         assert text.startswith("# ")
 
 

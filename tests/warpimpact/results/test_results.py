@@ -14,6 +14,7 @@ from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.variables import (
     BENDING_VARIABLES,
+    BURST_VARIABLES,
     EXIT_VARIABLES,
     LAYER_VARIABLES,
     OUTCOME_VARIABLES,
@@ -231,7 +232,7 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
 
 def test_every_field_of_shots_and_outcomes_has_a_variable():
     shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | set(SCATTER_VARIABLES)
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | {*SCATTER_VARIABLES, *BURST_VARIABLES}
     ended = {*OUTCOME_VARIABLES, *EXIT_VARIABLES}
     assert {field.name for field in dataclasses.fields(Outcomes)} == ended
     assert {field.name for field in dataclasses.fields(BentOutcomes)} == ended | set(BENDING_VARIABLES)

@@ -52,7 +52,8 @@ def test_codes_carry_their_meanings() -> None:
 
 
 def test_what_a_command_shows() -> None:
-    assert v.shown_by("report") == (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
+    limits = tuple(variables.value for variables in v.LIMITS.values())
+    assert v.shown_by("report") == (*limits, v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT)
     assert v.shown_by("plot") == (*v.shown_by("report"), v.LARGEST_BENDING_MOMENT, v.BENDING_STRESS)
 
 

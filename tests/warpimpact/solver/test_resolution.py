@@ -12,7 +12,7 @@ from warpimpact.scene import (
     PolynomialCore,
     Scene,
 )
-from warpimpact.solver import arrays
+from warpimpact.solver import materials
 from warpimpact.solver.materials import onset_jump
 from warpimpact.solver.resolution import FASTEST_DECAY, FIDELITIES, NODAL, SLENDER, WEAKENING, decay_rate, resolve
 
@@ -87,7 +87,7 @@ def test_onset_is_a_share_of_what_a_wall_does_in_one_step() -> None:
     wall = 2 * PAPER.max_radius * 4e-3
     longest = 2 * PAPER.max_radius * PAPER.length
     jumps = onset_jump(PAPER, np.array([4e-3, 1.0]), mass * np.array([1.0, 2.0]), np.array([2.6e9, 1e9]))
-    share = arrays.ONSET / mass
+    share = materials.ONSET / mass
     np.testing.assert_allclose(jumps, [share * 2.6e9 * wall, share * 0.5e9 * longest])
     assert onset_jump(PAPER, 4e-3, mass, 0.0) > 0.0
 

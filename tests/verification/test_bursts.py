@@ -1,0 +1,229 @@
+"""Several shots at one plate: exposure adds (docs/model.md §8), and nothing else couples them."""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import log, pi
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import ArrayLike
+
+from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.solver import marching
+from warpimpact.solver import simulate as simulation
+from warpimpact.solver.marching import March
+from warpimpact.solver.refinement import simulate_to_tolerance
+from warpimpact.solver.simulate import Outcomes
+
+from . import references
+from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, solid_plate
+
+SAMPLES, COUNT = 12, 4
+BASE = Layer(**paper_plate(thickness=3e-3, resistance=1.5e9).model_dump(), gap=20e-3)
+TARGETS = pytest.mark.parametrize("behind", [(), (BASE,)], ids=["plate", "two layers"])
+
+
+def bursts_of(offset_y: ArrayLike, offset_z: ArrayLike = 0.0, **arrival: Any) -> Shots:
+    """SAMPLES bursts about scattered hits; offsets [m] of shape [n], or [SAMPLES, n]."""
+    hit_y, hit_z = (at[:, None] for at in scattered_hits(SAMPLES))
+    y, z = np.broadcast_arrays(hit_y + offset_y, hit_z + offset_z)
+    return burst(shots_at(y.ravel(), z.ravel(), **arrival), y.shape[1])
+
+
+def burst(shots: Shots, count: int) -> Shots:
+    """The same shots, so many in a row at one plate."""
+    number = np.arange(len(shots))
+    return replace(shots, sample=number // count, burst_order=number % count)
+
+
+def apart(shots: Shots) -> Shots:
+    """The same shots, each at a plate of its own."""
+    return replace(shots, sample=None, burst_order=None)
+
+
+def near_bursts() -> Shots:
+    """Bursts whose hits lie a few millimetres apart, with arrivals that differ."""
+    rng = np.random.default_rng(2)
+    spread = {"velocity": (600.0, 900.0), "yaw": (-5.0, 5.0), "obliquity": (0.0, 20.0), "spin": (0.0, 2e4)}
+    arrival = {name: rng.uniform(*ends, SAMPLES * COUNT) for name, ends in spread.items()}
+    return bursts_of(*rng.normal(0.0, 2e-3, (2, SAMPLES, COUNT)), **arrival)
+
+
+def scene_of(plate: Plate, behind: tuple[Layer, ...] = ()) -> Scene:
+    return Scene(core=PAPER_CORE, target=Target(plate=plate, layers=behind), record=Record(standoffs=STANDOFFS))
+
+
+def simulate(
+    plate: Plate, shots: Shots, behind: tuple[Layer, ...] = (), device: str = "cpu", **numerics: Any
+) -> Outcomes:
+    numerics = {"fidelity": "draft"} | numerics
+    return simulation.simulate(scene_of(plate, behind), shots, numerics=Numerics(**numerics), device=device)
+
+
+def assert_identical(got: Outcomes, expected: Outcomes) -> None:
+    for name, values in vars(expected).items():
+        np.testing.assert_array_equal(getattr(got, name), values, err_msg=name)
+
+
+@pytest.mark.parametrize("precision", ["single", "double"])
+def test_far_apart_shots_are_independent_to_the_bit(precision: str, device: str) -> None:
+    shots = bursts_of(0.1 * np.arange(COUNT), yaw=3.0, pitch=2.0, spin=1.7e4)
+    got = simulate(paper_plate(), shots, device=device, precision=precision)
+    assert_identical(got, simulate(paper_plate(), apart(shots), device=device, precision=precision))
+
+
+@TARGETS
+def test_far_apart_shots_have_the_bits_of_first_shots(behind: Any, device: str) -> None:
+    # As above, in one build of the kernels: in that of layers a compiler rounds otherwise.
+    shots = bursts_of(0.1 * np.arange(COUNT), yaw=3.0, pitch=2.0, spin=1.7e4)
+    got = simulate(paper_plate(), shots, behind, device)
+    for order in range(COUNT):
+        turned = np.roll(np.arange(len(shots)).reshape(SAMPLES, COUNT), -order, axis=1).ravel()
+        first = simulate(paper_plate(), burst(shots[turned], COUNT), behind, device)
+        for name, values in vars(got).items():
+            np.testing.assert_array_equal(getattr(first, name)[::COUNT], values[order::COUNT], err_msg=name)
+
+
+@TARGETS
+def test_near_shots_notice_each_other_and_the_first_does_not(behind: Any, device: str) -> None:
+    shots = near_bursts()
+    got, alone = (simulate(paper_plate(), s, behind, device) for s in (shots, apart(shots)))
+    faster = (got.residual_velocity - alone.residual_velocity).reshape(SAMPLES, COUNT)
+    np.testing.assert_allclose(faster[:, 0], 0.0, atol=1e-3)  # in another build of the kernels
+    assert (faster[:, 1:] > 5.0).mean() > 0.7
+
+
+def test_without_weakening_earlier_hits_change_nothing(device: str) -> None:
+    shots, plate = bursts_of(np.zeros(COUNT), yaw=3.0), paper_plate(degradation=1.0)
+    assert_identical(simulate(plate, shots, device=device), simulate(plate, apart(shots), device=device))
+
+
+def test_what_touches_a_plate_of_no_resistance_once_passes_it_freely(device: str) -> None:
+    # β → 0: the second core at the same place meets the channel of the first and loses nothing.
+    shots = burst(shots_at(np.zeros(2)), 2)
+    got = simulate(solid_plate(degradation=0.0), shots, device=device)
+    assert got.residual_velocity[1] == 825.0
+    assert got.contact_duration[1] > 0.0
+
+
+@pytest.mark.parametrize("thickness", [4e-3, 12e-3])
+def test_shots_at_one_place_pay_a_geometric_series(thickness: float, device: str) -> None:
+    # Straight flight, η = 0, ℓ → 0, exposure by path: a column is touched over the thickness h, so the first core does
+    # the work Y πR² ∫₀ʰ β^(x/Δs) dx, and each one after it β^(h/Δs) of the work of the one before. A finite ℓ spends
+    # some exposure beyond R: the ratio is off by a share that goes with ℓ.
+    beta, unit, resistance = 0.8, 3e-3, 1.5e9
+    law = {"degradation": beta, "degradation_distance": unit, "degradation_interval": None, "shear_coefficient": 0.0}
+    left, off = beta ** (thickness / unit), []
+    first = resistance * pi * references.PAPER_LARGEST_RADIUS**2 * unit / -log(beta) * (1.0 - left)
+    for length in (0.2e-3, 0.1e-3):
+        plate = solid_plate(thickness=thickness, resistance=resistance, degradation_length=length, **law)
+        work = simulate(plate, burst(shots_at(np.zeros(COUNT)), COUNT), device=device, fidelity="standard").energy_loss
+        off.append([after / before / left - 1.0 for before, after in pairwise(work)])
+    assert work[0] == pytest.approx(first, rel=4e-3)
+    np.testing.assert_allclose(off[1], 0.0, atol=0.025)
+    np.testing.assert_allclose(off[1], 0.5 * np.array(off[0]), rtol=0.15)
+
+
+@pytest.mark.parametrize("offset", [0.0, 1.37e-3])
+def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float) -> None:
+    # Bilinear reading keeps the sum of a field: what the second window holds is what both shots gave. Both cores sweep
+    # a solid plate once, each at its own speed.
+    shots = burst(shots_at([0.0, offset], [0.0, 0.6 * offset]), 2)
+    march = March(scene_of(solid_plate()), Numerics(precision="double"), shots, wp.get_device("cpu"))
+    scratch = march._scratch(1, *march.cells)
+    order, outcomes = march.inputs.put(np.arange(2), wp.int32), march._empty(march.stage.Outcomes, (2,))
+    march._launch(order, outcomes, scratch, 1, 0, 2)
+    added = scratch[3].exposure.numpy().reshape(2, *march.cells)
+    assert (added >= 0.0).all()
+    assert scratch[0].exposure.numpy().sum() == pytest.approx(added.sum(), rel=1e-12)
+    assert added[1].sum() == pytest.approx(added[0].sum(), rel=0.1)
+
+
+@TARGETS
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("chunk", [1, 7, 100])
+def test_any_thread_and_chunk(behind: Any, threads: int, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    shots = near_bursts()
+    expected = simulate(paper_plate(), shots, behind)
+    monkeypatch.setattr(marching, "cores", lambda: threads)
+    monkeypatch.setattr(marching, "CPU_CHUNK", chunk)
+    assert_identical(simulate(paper_plate(), shots, behind), expected)
+
+
+@TARGETS
+@pytest.mark.parametrize("samples", [1, 5])
+def test_any_split_into_whole_bursts(behind: Any, samples: int, device: str) -> None:
+    shots, size = near_bursts(), samples * COUNT
+    parts = [simulate(paper_plate(), shots[k : k + size], behind, device) for k in range(0, len(shots), size)]
+    expected = simulate(paper_plate(), shots, behind, device)
+    for name, values in vars(expected).items():
+        np.testing.assert_array_equal(np.concatenate([getattr(part, name) for part in parts]), values, err_msg=name)
+
+
+@TARGETS
+@pytest.mark.parametrize("slots", [1, 5, SAMPLES])
+def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
+    shots = near_bursts()
+    march = March(scene_of(paper_plate(), behind), Numerics(fidelity="draft"), shots, wp.get_device("cpu"))
+    outcomes = march._empty(march.stage.Outcomes, (len(shots),))
+    if march.variant.layered:
+        march.inputs.place_windows(march._windows(*march.cells))
+    order = march.inputs.put(marching.in_turns(np.arange(len(shots)), COUNT, slots), wp.int32)
+    scratch = march._scratch(slots, *march.cells)
+    for first, number in marching.turns(len(shots), COUNT, slots):
+        march._launch(order, outcomes, scratch, slots, first, number)
+    assert_identical(type(expected := simulate(paper_plate(), shots, behind))(**march.report(outcomes)), expected)
+
+
+def test_a_shot_that_leaves_its_window_is_repeated_with_its_burst(monkeypatch: pytest.MonkeyPatch) -> None:
+    shots = near_bursts()
+    expected = simulate(paper_plate(), shots)
+    monkeypatch.setattr(marching, "WINDOW_SLACK", 0.9)
+    repeated, march_some = [], March._march_some
+
+    def counted(self: March, pending: Any, *rest: Any) -> None:
+        repeated.append(pending)
+        march_some(self, pending, *rest)
+
+    monkeypatch.setattr(March, "_march_some", counted)
+    assert_identical(simulate(paper_plate(), shots), expected)
+    assert 0 < len(repeated[1]) < len(shots)
+    assert len(repeated[1]) % COUNT == 0
+
+
+def test_every_shot_of_a_failed_burst_behind_the_failure_fails() -> None:
+    status = np.array([0, 5, 0, 1, 0, 0, 0, 0], dtype=np.int32)
+    np.testing.assert_array_equal(marching.spoilt(status, 4), [0, 5, 5, 5, 0, 0, 0, 0])
+
+
+@TARGETS
+@pytest.mark.parametrize("order", [0, 2])
+def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
+    shots, numerics = near_bursts(), Numerics(fidelity="draft")
+    at = 5 * COUNT + order
+    again = simulation.replay(scene_of(solid_plate(), behind), shots[5 * COUNT : at + 1], numerics=numerics)
+    for name, values in vars(simulate(solid_plate(), shots, behind)).items():
+        np.testing.assert_array_equal(getattr(again.outcomes, name)[0], values[at], err_msg=name)
+    found = again.resistance_share[0]
+    assert found.max() == 1.0
+    assert (found.min() < 0.3) == (order > 0)
+    assert (np.diff(again.resistance_share, axis=0) <= 1e-6).all()
+
+
+def test_a_tolerance_refines_whole_bursts() -> None:
+    shots = near_bursts()[: 3 * COUNT]
+    loose = Numerics(tolerance={"residual_velocity": 3.0, "tilt": "3 deg"})
+    _, estimates = simulate_to_tolerance(scene_of(paper_plate()), shots, numerics=loose, device="cpu")
+    assert (np.ptp(estimates.level.reshape(-1, COUNT), axis=1) == 0).all()
+
+
+def test_the_literal_scheme_takes_no_burst() -> None:
+    with pytest.raises(ValueError, match='must be "consistent"'):
+        simulate(paper_plate(), near_bursts(), fidelity="standard", scheme="nodal")
+
+
+def test_bursts_must_be_whole() -> None:
+    with pytest.raises(ValueError, match="whole bursts in order"):
+        simulate(paper_plate(), near_bursts()[1:])

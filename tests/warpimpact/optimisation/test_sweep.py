@@ -1,0 +1,130 @@
+"""A sweep: every combination computed as it would be alone, joined with a dimension for every input."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.campaign.campaign import CampaignError
+from warpimpact.campaign.run import run
+from warpimpact.cli import main
+from warpimpact.optimisation import sweep as module
+from warpimpact.optimisation.sweep import folder_of, read_sweep, run_sweep
+from warpimpact.plotting.sweep import sweep_figure
+from warpimpact.results import files
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+TEXT = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8").replace('"standard"', '"draft"')
+TEXT = TEXT.replace("4096", "24")
+TWO = '[sweep]\nobliquity = ["0 deg", "30 deg"]\n"plate.pattern.width" = ["3 mm", "4 mm", "5 mm"]\n'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Holds a sweep of two inputs."""
+    folder = tmp_path_factory.mktemp("sweep")
+    (folder / "a.toml").write_text(TEXT + TWO, encoding="utf-8")
+    run_sweep(read_sweep(folder / "a.toml"), folder / "a.nc", device="cpu")
+    return folder
+
+
+def test_every_point_is_what_its_campaign_gives(folder: Path) -> None:
+    sweep = files.read_sweep(folder / "a.nc")
+    assert dict(sweep.sizes) | {"obliquity": 2, "width": 3, "hit": 24} == dict(sweep.sizes)
+    np.testing.assert_allclose(sweep["obliquity"], [0.0, 30.0], rtol=1e-14)
+    np.testing.assert_allclose(sweep["width"], [3e-3, 4e-3, 5e-3], rtol=1e-14)
+    assert (sweep["obliquity"].attrs["units"], sweep["width"].attrs["units"]) == ("degree", "m")
+    for degrees, width in ((30, 3), (0, 5)):
+        text = TEXT.replace('width = "4 mm"', f'width = "{width} mm"')
+        text = text.replace("[impact]", f'[impact]\nobliquity = "{degrees} deg"')
+        alone = run(Campaign.from_text(text, name="a", folder=folder), device="cpu")
+        point = sweep.sel(obliquity=degrees, width=width * 1e-3, method="nearest")
+        for name in ("status", "residual_velocity", "tilt", "exit_velocity"):
+            np.testing.assert_array_equal(point[name], alone[name], err_msg=name)
+    assert sweep["impact_velocity"].dims == ("hit",)  # which is the same at every point
+
+
+def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    points = sorted(folder_of(folder / "a.nc").glob("*.nc"))
+    assert len(points) == 6
+    assert main(["replay", str(points[4]), "--hit", "3", "-o", str(folder / "hit.nc")]) == 0
+    assert "bit-identical" in capsys.readouterr().out
+    assert main(["inspect", str(folder / "a.nc")]) == 2
+    assert "is a sweep of obliquity and width; its points are results" in capsys.readouterr().err
+    files.read_sweep(folder / "a.nc").isel(obliquity=1, width=0).to_netcdf(folder / "chosen.nc")
+    assert main(["inspect", str(folder / "chosen.nc")]) == 0
+    assert main(["run", str(folder / "a.toml")]) == 2
+    assert "this takes one combination of inputs; warpimpact sweep" in capsys.readouterr().err
+
+
+def test_an_interrupted_sweep_continues_with_the_points_that_are_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: Path
+) -> None:
+    (tmp_path / "a.toml").write_text(TEXT + TWO, encoding="utf-8")
+    sweep, computed = read_sweep(tmp_path / "a.toml"), []
+    original = module.run_to_file
+
+    def broken(campaign: Campaign, path: Path, **options: object) -> None:
+        if len(computed) == 2:
+            raise KeyboardInterrupt
+        computed.append(path.name)
+        original(campaign, path, **options)
+
+    monkeypatch.setattr(module, "run_to_file", broken)
+    with pytest.raises(KeyboardInterrupt):
+        run_sweep(sweep, tmp_path / "a.nc", device="cpu")
+    monkeypatch.setattr(module, "run_to_file", original)
+    with pytest.raises(files.OutputError, match="a_points: exists already; give --resume"):
+        run_sweep(sweep, tmp_path / "a.nc", device="cpu")
+    first = folder_of(tmp_path / "a.nc") / computed[0]
+    before = first.stat().st_mtime_ns
+    run_sweep(sweep, tmp_path / "a.nc", device="cpu", resume=True)
+    assert first.stat().st_mtime_ns == before
+    one, other = files.read_sweep(tmp_path / "a.nc"), files.read_sweep(folder / "a.nc")
+    xarray.testing.assert_equal(one, other)
+
+
+def test_plates_and_cores_are_swept_as_tables_with_names(tmp_path: Path) -> None:
+    head, tail = TEXT.split("[plate]\n")[0], "[impact]" + TEXT.split("[impact]")[1]
+    plates = (
+        'plate = [{ name = "thin", thickness = "2 mm", resistance = "2 GPa" }, '
+        '{ name = "thick", thickness = "6 mm", resistance = "2 GPa" }]'
+    )
+    (tmp_path / "a.toml").write_text(f"{head}{tail}\n[sweep]\n{plates}\n", encoding="utf-8")
+    run_sweep(read_sweep(tmp_path / "a.toml", count=8), tmp_path / "a.nc", device="cpu")
+    sweep = files.read_sweep(tmp_path / "a.nc")
+    assert sweep["plate"].values.tolist() == ["thin", "thick"]
+    velocity = sweep["residual_velocity"].mean("hit")
+    assert float(velocity.sel(plate="thin")) > float(velocity.sel(plate="thick"))
+
+
+def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
+    sweep = files.read_sweep(folder / "a.nc")
+    panels = sweep_figure(sweep).axes
+    assert [axes.get_xlabel() for axes in panels[2:]] == ["obliquity [°]", "obliquity [°]"]
+    lines = [container.lines[0] for container in panels[0].containers]
+    assert len(lines) == 3
+    expected = sweep["residual_velocity"].where(sweep["status"].isin([0, 3])).mean("hit").values.T
+    for line, values in zip(lines, expected, strict=True):
+        np.testing.assert_allclose(line.get_xdata(), [0.0, 30.0])
+        np.testing.assert_allclose(line.get_ydata(), values, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("table", "sentence"),
+    [
+        ("", r"needs a table \[sweep\] of lists"),
+        ("[sweep]\nobliquity = 3\n", "sweep.obliquity: got 3, but it must be a list of values"),
+        ('[sweep]\nobliqity = ["1 deg"]\n', 'got the unknown input "obliqity"; give one of core'),
+        ('[sweep]\nplate = ["thin"]\n', "sweep.plate: must be a list of tables, each with a name"),
+        ("[sweep]\nobliquity = [1, 1]\n", "sweep.obliquity: got a value twice"),
+        ('[sweep]\nobliquity = ["95 deg"]\n', "obliquity = 95 deg: impact.obliquity"),
+        ('[sweep]\nobliquity = [1]\n"impact.obliquity" = [2]\n', "got two lists for one input"),
+    ],
+)
+def test_what_cannot_be_swept_is_told(tmp_path: Path, table: str, sentence: str) -> None:
+    (tmp_path / "a.toml").write_text(TEXT + table, encoding="utf-8")
+    with pytest.raises(CampaignError, match=sentence):
+        read_sweep(tmp_path / "a.toml")

@@ -1,0 +1,62 @@
+"""The command sweep: one campaign at every combination of some values of its inputs."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from .mistakes import memory_told
+from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite
+from .paths import check_picture, check_place, check_suffix
+from .progress import show_standing, warn
+
+
+def add_sweep(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "sweep",
+        _sweep,
+        summary="run a campaign at every combination of some inputs",
+        description="Run a campaign with a table [sweep] at every combination of the values in it. Write one netCDF "
+        "file with a dimension for each input, and a figure beside it. The folder SWEEP_points holds the result of "
+        "every point, which the other commands take.",
+        example="sweep campaigns/obliquity_sweep.toml -o sweep.nc",
+    )
+    add_campaign(parser)
+    add_output(parser, "SWEEP.nc", "file of the sweep (default: the campaign's name, in this folder)")
+    add_device(parser)
+    add_count(parser)
+    parser.add_argument("--resume", action="store_true", help="keep the points that are complete, and compute the rest")
+    add_overwrite(parser, "an existing sweep with its points and its figure")
+
+
+def _sweep(arguments: argparse.Namespace) -> None:
+    from warpimpact.optimisation.sweep import folder_of, read_sweep, run_sweep
+    from warpimpact.plotting.sweep import sweep_figure
+    from warpimpact.results import files
+
+    sweep = read_sweep(arguments.campaign, count=arguments.count)
+    output = arguments.output or Path(arguments.campaign.stem + ".nc")
+    picture = output.with_suffix(".png")
+    check_place(output)
+    check_suffix(output, "a sweep", ".nc")
+    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
+
+    with memory_told(arguments.campaign), show_standing() as follow:
+
+        def named(name: str) -> Any:
+            print(f"point {name}", file=sys.stderr)
+            return follow
+
+        run_sweep(
+            sweep,
+            output,
+            device=arguments.device,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=named,
+            tell=warn,
+        )
+    sweep_figure(files.read_sweep(output)).savefig(picture, dpi=150)
+    for written in (output, folder_of(output), picture):
+        print(written)

@@ -1,0 +1,311 @@
+"""A sweep: one campaign at every combination of some values of its inputs, as one Dataset with a dimension for each."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import math
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+import xarray
+from pydantic import BeforeValidator
+from pydantic.fields import FieldInfo
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.run import run_to_file
+from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.results import attributes as attr
+from warpimpact.results import files
+from warpimpact.results import variables as v
+from warpimpact.scene import Impact, Interaction, Plate
+from warpimpact.scene.units import quoted
+
+_TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
+"""Tables whose keys need no table in front of them, as there is no other key of that name."""
+_WHOLE = ("core", "plate", "plate.pattern", "interaction")
+"""Tables that may be swept as a whole."""
+_IN_GROUPS = {str(name) for group in v.GROUPS.values() for name in group}
+"""Holes and shots at the solid plate, which only the results of the points hold."""
+_MOST = 10_000
+"""Points of a sweep."""
+_OF_A_POINT = (
+    *(attr.CAMPAIGN, attr.HISTORY, attr.FINGERPRINT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.TITLE),
+    *(attr.RESOLUTION, attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.NUMERICS_GIVEN),
+    *(attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS),
+    *(attr.CONFIDENCE, attr.SYMMETRIES, attr.COMPUTED_HITS),
+)
+"""Attributes of the result of a single point."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """An input that is swept.
+
+    Attributes:
+        key: dotted place in the campaign, such as "impact.obliquity".
+        labels: its values as they were written, or the names of tables.
+        values: what stands in the campaign.
+    """
+
+    key: str
+    labels: tuple[str, ...]
+    values: tuple[Any, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the dimension: that of the variable of a hit map that holds the input, else the last part of the
+        key."""
+        last = self.key.rpartition(".")[2]
+        return next((str(one) for one in v.SHOT_VARIABLES if one.field == last), last)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A campaign and the inputs that are swept.
+
+    Attributes:
+        title: of the campaign.
+        text: the campaign file.
+        inputs: in the order of the file; the last one changes fastest.
+        campaigns: of every combination, in that order, by names that are fit for files.
+    """
+
+    title: str
+    text: str
+    inputs: tuple[Input, ...]
+    campaigns: dict[str, Campaign]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of every input."""
+        return tuple(len(one.values) for one in self.inputs)
+
+
+def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
+    """Read a campaign file with a table `[sweep]` of lists.
+
+    A key is the name of an input of `[impact]`, `[plate]` or `[interaction]`, or a dotted place such as
+    "plate.pattern.width". A whole core, plate or pattern is swept by a list of tables, each with a `name`.
+
+    Args:
+        path: the TOML file.
+        count: number of hits of every point, instead of the file's.
+
+    Raises:
+        CampaignError: the file is missing, is not TOML, has no sweep, or one of its combinations is not valid.
+    """
+    path = Path(path)
+    text = read_text(path)
+    shared = parsed(text, str(path))
+    swept = shared.pop("sweep", None)
+    if not isinstance(swept, dict) or not swept:
+        raise CampaignError(f'{path}: sweep: needs a table [sweep] of lists, as obliquity = ["0 deg", "15 deg"]')
+    inputs = tuple(_input(key, values, str(path)) for key, values in swept.items())
+    if len({one.name for one in inputs}) < len(inputs):
+        raise CampaignError(f"{path}: sweep: got two lists for one input")
+    points = math.prod(len(one.values) for one in inputs)
+    if points > _MOST:
+        raise CampaignError(f"{path}: sweep: got {points} combinations, but at most {_MOST} are computed")
+    campaigns = {}
+    every = itertools.product(*(zip(one.labels, one.values, strict=True) for one in inputs))
+    for number, combination in enumerate(every):
+        data, labels = json.loads(json.dumps(shared, default=str)), [label for label, _ in combination]
+        for one, (_, value) in zip(inputs, combination, strict=True):
+            _place(data, one.key, value, str(path))
+        told = ", ".join(f"{one.name} = {label}" for one, label in zip(inputs, labels, strict=True))
+        if isinstance(data.get("title"), str):
+            data["title"] = f"{data['title']}: {told}"[:200]
+        content = json.dumps(data, indent=1, ensure_ascii=False)
+        name = f"{number:04d}_{'_'.join(re.findall(r'[A-Za-z0-9.+-]+', told))}"[:100]
+        campaigns[name] = Campaign.from_text(content, name=f"{path}, {told}", folder=path.parent, count=count)
+    return Sweep(str(shared.get("title", "")), text, inputs, campaigns)
+
+
+def _input(key: str, values: Any, path: str) -> Input:
+    place = _resolved(key, path)
+    if not isinstance(values, list) or not values:
+        raise CampaignError(f"{path}: sweep.{key}: got {quoted(values)}, but it must be a list of values")
+    if place not in _WHOLE:
+        labels = tuple(value if isinstance(value, str) else json.dumps(value, default=str) for value in values)
+        given = tuple(values)
+    else:
+        if not all(isinstance(value, dict) and isinstance(value.get("name"), str) for value in values):
+            raise CampaignError(f"{path}: sweep.{key}: must be a list of tables, each with a name")
+        labels = tuple(value["name"] for value in values)
+        given = tuple({name: one for name, one in value.items() if name != "name"} for value in values)
+    if len(set(labels)) < len(labels):
+        raise CampaignError(f"{path}: sweep.{key}: got a value twice, but each must differ")
+    return Input(place, labels, given)
+
+
+def _resolved(key: str, path: str) -> str:
+    """The dotted place of a key."""
+    if "." in key or key in _WHOLE:
+        return key
+    for table, model in _TABLES.items():
+        if key in model.model_fields:
+            return f"{table}.{key}"
+    known = ", ".join(name for model in _TABLES.values() for name in model.model_fields)
+    raise CampaignError(
+        f"{path}: sweep: got the unknown input {quoted(key)}; give one of {', '.join(_WHOLE)}, {known}, or a dotted "
+        'place such as "core.mass"'
+    )
+
+
+def _place(data: dict[str, Any], key: str, value: Any, path: str) -> None:
+    """Put a value at its place in a campaign."""
+    *tables, last = key.split(".")
+    for table in tables:
+        inner = data.setdefault(table, {})
+        if not isinstance(inner, dict):
+            raise CampaignError(f"{path}: sweep: {key} leads through {table}, which is no table")
+        data = inner
+    data[last] = value
+
+
+def folder_of(output: Path) -> Path:
+    """Where the results of the points of a sweep are, each of them a result of its own."""
+    return output.with_name(f"{output.stem}_points")
+
+
+def run_sweep(
+    sweep: Sweep,
+    output: Path,
+    *,
+    device: str = "auto",
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Callable[[str], Any] | None = None,
+    tell: Callable[[str], object] = warnings.warn,
+) -> None:
+    """Compute every point of a sweep into a file of its own, and join them into one.
+
+    Args:
+        output: the file of the sweep; the results of the points go to the folder `folder_of(output)` and stay there.
+        device, tell: as in `run_to_file`.
+        resume: keep the points that are complete, and continue one that is not.
+        overwrite: replace an existing file and its points.
+        progress: gives what follows a point of a name.
+
+    Raises:
+        OutputError, DeviceError, Interrupted: as in `run_to_file`.
+    """
+    folder = folder_of(output)
+    if not (resume or overwrite):
+        for existing in (output, folder):
+            if existing.exists():
+                raise files.OutputError(f"{existing}: exists already; give --resume or --overwrite, or another name")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise files.OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
+    paths = [folder / f"{name}.nc" for name in sweep.campaigns]
+    for (name, campaign), path in zip(sweep.campaigns.items(), paths, strict=True):
+        run_to_file(
+            campaign,
+            path,
+            device=device,
+            resume=resume,
+            overwrite=overwrite,
+            progress=progress(name) if progress else None,
+            tell=tell,
+        )
+    files.write(joined(sweep, [files.read(path) for path in paths]), output)
+
+
+def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
+    """Results of all points as one Dataset.
+
+    A variable has the dimensions of the swept inputs in front of its own if it differs from point to point. Outcomes
+    always have them. Hits that a point does not have are NaN.
+
+    Args:
+        points: results in the order of `sweep.campaigns`.
+    """
+    numbers = np.arange(max(point.sizes["hit"] for point in points), dtype=np.int32)
+    same = [point if point.sizes["hit"] == len(numbers) else point.reindex(hit=numbers) for point in points]
+    names = tuple(one.name for one in sweep.inputs)
+    first = same[0]
+    outcomes = {str(name) for name in v.outcome_variables(first)}
+    data: dict[str, Any] = {}
+    coordinates: dict[str, Any] = {one.name: _coordinate(one, sweep) for one in sweep.inputs}
+    for name, array in first.variables.items():
+        if str(name) in names or str(name) in _IN_GROUPS:
+            continue
+        columns = [point.variables[name] for point in same if name in point.variables]
+        if len(columns) < len(same) or len({column.shape for column in columns}) > 1:
+            continue
+        into = coordinates if name in first.coords else data
+        if str(name) not in outcomes and all(_equal(array, column) for column in columns):
+            into[str(name)] = array
+        else:
+            stacked = np.stack([column.values for column in columns]).reshape(sweep.shape + array.shape)
+            into[str(name)] = ((*names, *array.dims), stacked, array.attrs)
+    return xarray.Dataset(data, coordinates, _attributes(sweep, same))
+
+
+def _equal(one: xarray.Variable, other: xarray.Variable) -> bool:
+    return np.array_equal(one.values, other.values, equal_nan=one.dtype.kind == "f")
+
+
+def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
+    """Values of an input: a number with its unit where it is a quantity, else its label."""
+    found = _field(one.key, next(iter(sweep.campaigns.values())))
+    stride = math.prod(sweep.shape[sweep.inputs.index(one) + 1 :])
+    campaigns = list(sweep.campaigns.values())[:: max(1, stride)][: len(one.values)]
+    numbers = [_value(one.key, campaign) for campaign in campaigns]
+    if found is None or not all(isinstance(number, int | float) for number in numbers):
+        return one.name, np.array(one.labels), {"long_name": one.key}
+    unit = next((_unit(mark) for mark in _marks(found) if _unit(mark) is not None), "") or "1"
+    if unit == "rad":
+        return one.name, np.degrees(np.array(numbers, dtype=float)), {"units": "degree", "long_name": one.key}
+    return one.name, np.array(numbers, dtype=float), {"units": unit.replace("/s", " s-1"), "long_name": one.key}
+
+
+def _marks(field: FieldInfo) -> Iterator[Any]:
+    yield from field.metadata
+    for part in get_args(field.annotation):  # as of Annotated[float, …] | None
+        yield from getattr(part, "__metadata__", ())
+
+
+def _unit(mark: Any) -> str | None:
+    """SI unit of the quantity that a mark of a field reads; None of any other mark."""
+    return getattr(mark.func, "unit", None) if isinstance(mark, BeforeValidator) else None
+
+
+def _field(key: str, campaign: Campaign) -> FieldInfo | None:
+    *tables, last = key.split(".")
+    model: Any = campaign
+    for table in tables:
+        model = getattr(model, table, None)
+    return getattr(type(model), "model_fields", {}).get(last)
+
+
+def _value(key: str, campaign: Campaign) -> Any:
+    value: Any = campaign
+    for part in key.split("."):
+        value = getattr(value, part, None)
+    return value
+
+
+def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any]:
+    first, *others = (point.attrs for point in points)
+    shared = {
+        name: value
+        for name, value in first.items()
+        if name.removesuffix("_units") not in _OF_A_POINT
+        and all(name in other and np.array_equal(other[name], value) for other in others)
+    }
+    return shared | {
+        attr.TITLE: sweep.title,
+        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact sweep",
+        attr.CAMPAIGN: sweep.text,
+        attr.SWEEP: json.dumps({one.name: list(one.labels) for one in sweep.inputs}),
+    }

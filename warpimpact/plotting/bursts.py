@@ -1,0 +1,81 @@
+"""Figure of bursts: what a plate lets through hit by hit, and how near an earlier hit must be to matter."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray
+from matplotlib.figure import Figure
+
+from warpimpact.analysis.bursts import Bursts, bursts, label_of
+from warpimpact.plotting.cell import shots_text
+from warpimpact.results import attributes as attr
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.axes import Axes
+
+    from warpimpact.analysis.bursts import Group
+    from warpimpact.results.measures import Measure
+
+_BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.55"  # the first two of Okabe and Ito
+_MM = 1e3
+
+
+def bursts_figure(dataset: xarray.Dataset) -> Figure:
+    """Mean of every measure by the order of the hit (left), and by the distance to the nearest earlier hit (right),
+    each with its 95 % interval. A measure that is the same for all groups has no panel.
+
+    Args:
+        dataset: a result of bursts.
+    """
+    result = bursts(dataset)
+    shown = [measure for measure in result.measures if _varies(result, measure)] or [result.measures[0]]
+    figure = Figure(figsize=(10.0, 1.3 + 2.9 * len(shown)), layout="constrained")
+    panels = figure.subplots(len(shown), 2, squeeze=False, sharex="col", sharey="row", width_ratios=[1.0, 1.9])
+    for (left, right), measure in zip(panels, shown, strict=True):
+        _draw(left, [float(group.name) for group in result.orders], result.orders, measure)
+        _draw_distances(right, result, measure)
+        left.set_ylabel(label_of(measure))
+    panels[0, 1].legend(loc="best", fontsize="small")
+    below_left, below_right = panels[-1]
+    below_left.set_xlabel("hit of the burst")
+    below_left.set_xticks(range(1, len(result.orders) + 1))
+    below_left.margins(x=0.1)
+    below_right.set_xlabel("distance to the nearest earlier hit [mm]")
+    figure.suptitle(dataset.attrs.get(attr.TITLE, ""))
+    figure.supxlabel(f"{shots_text(dataset)}; 95 % intervals", fontsize="small", color="0.3")
+    return figure
+
+
+def _varies(result: Bursts, measure: Measure) -> bool:
+    values = [group.estimates[measure].value for group in (*result.orders, *result.distances)]
+    return float(np.nanmax(values) - np.nanmin(values)) > 0.0 if np.isfinite(values).any() else False
+
+
+def _draw(axes: Axes, places: Sequence[float], groups: Sequence[Group], measure: Measure) -> None:
+    """Draw the estimates of some groups with their intervals."""
+    values, low, high = (np.array([getattr(g.estimates[measure], n) for g in groups]) for n in ("value", "low", "high"))
+    below, above = (np.nan_to_num(np.maximum(0.0, ends)) for ends in (values - low, high - values))
+    axes.errorbar(places, values, yerr=[below, above], fmt="o", color=_BLUE, markersize=4.5, capsize=2.5, zorder=3)
+    axes.grid(color="0.92")
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def _draw_distances(axes: Axes, result: Bursts, measure: Measure) -> None:
+    """Draw the bins of distance, the first hits as a band, and the distance beyond which no difference shows."""
+    low, middle, high = np.array([group.distance for group in result.distances]).T * _MM
+    _draw(axes, list(middle), result.distances, measure)
+    values = [group.estimates[measure].value for group in result.distances]
+    axes.hlines(values, low, high, color=_BLUE, lw=1.0, alpha=0.5)
+    first = result.orders[0].estimates[measure]
+    axes.axhspan(first.low, first.high, color=_VERMILION, alpha=0.25, lw=0.0)
+    axes.axhline(first.value, color=_VERMILION, lw=1.0, label="first hits")
+    within = result.noticed_within(measure) * _MM
+    if 0.0 < within < math.inf:
+        axes.axvline(within, color=_GREY, lw=1.0, ls="--", label="differs from first hits up to here")
+    axes.set_xlim(left=0.0)

@@ -1,0 +1,193 @@
+"""Burst: several shots at one and the same plate, and how their hits lie (docs/model.md §8)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Annotated, Any, Self
+
+import numpy as np
+from pydantic import Field, field_validator, model_validator
+
+from .distributions import EDGE, AnyDistribution, Distribution
+from .model import Array
+from .plate import Plate
+from .sampling import Sampler, stream
+from .scatter import QUANTITIES, Quantity, Scatter, Scattering
+from .shots import Hits, Impact, Shots
+from .units import Length
+
+_BURST = 2**20
+"""First part of the keys of all that is drawn for the later shots of bursts. The others have their columns there."""
+_DISTANCE, _DIRECTION, _ALONG_Y, _ALONG_Z = range(len(QUANTITIES), len(QUANTITIES) + 4)
+"""Columns of the draws that place the hits; those of QUANTITIES come before."""
+_NonNegativeLength = Annotated[Length, Field(ge=0)]
+
+
+def _or_one_length(schema: dict[str, Any]) -> None:
+    """A file may give one length, too."""
+    schema["anyOf"].append({"type": ["number", "string"]})
+
+
+class Burst(Scattering):
+    """Shots at one plate, one after another: how many, and how their hits lie. Every sample is a fresh plate.
+
+    Attributes:
+        count: shots at a plate; where there are offsets it follows from them.
+        spacing: distance of each hit from the one before [m], in a random direction: a distribution or a number. The
+            first hit is the aim.
+        offsets: place (y, z) of each hit from the aim [m].
+        scatter: standard deviations (y, z) of every hit about its place [m]; a number holds for both.
+    """
+
+    _quantities = {"spacing": Quantity("burst", _NonNegativeLength)}  # noqa: RUF012 (pydantic keeps it private)
+
+    count: Annotated[int, Field(strict=True, ge=2, le=100)]
+    spacing: Annotated[AnyDistribution | None, Field(json_schema_extra=_or_one_length)] = None
+    offsets: tuple[tuple[Length, Length], ...] | None = None
+    scatter: Annotated[
+        tuple[_NonNegativeLength, _NonNegativeLength] | None, Field(json_schema_extra=_or_one_length)
+    ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _counted(cls, values: Any) -> Any:
+        if isinstance(values, dict) and "count" not in values and isinstance(values.get("offsets"), list | tuple):
+            return values | {"count": len(values["offsets"])}
+        return values
+
+    @field_validator("spacing", mode="before")
+    @classmethod
+    def _of_a_number(cls, value: Any) -> Any:
+        if value is None or isinstance(value, dict | Distribution):
+            return value
+        return {"distribution": "discrete", "values": [value]}
+
+    @field_validator("scatter", mode="before")
+    @classmethod
+    def _along_both(cls, value: Any) -> Any:
+        return value if value is None or isinstance(value, list | tuple) else (value, value)
+
+    @model_validator(mode="after")
+    def _lie_somewhere(self) -> Self:
+        if self.spacing is None and self.offsets is None and self.scatter is None:
+            raise ValueError("got neither spacing, offsets nor scatter, but one of them must say how the hits lie")
+        if self.spacing is not None and (self.offsets is not None or self.scatter is not None):
+            other = "offsets" if self.offsets is not None else "scatter"
+            raise ValueError(f"got spacing beside {other}, but a burst takes one of them")
+        if self.offsets is not None and len(self.offsets) != self.count:
+            raise ValueError(f"got count = {self.count} and {len(self.offsets)} offsets, but each shot needs its own")
+        return self
+
+    @property
+    def reach(self) -> float:
+        """Largest distance of a hit from the aim, along y or z [m]."""
+        if self.spacing is not None:
+            return (self.count - 1) * float(self.spacing.quantile(np.array(1.0 - EDGE)))
+        placed = max((abs(at) for offset in self.offsets or () for at in offset), default=0.0)
+        return placed + float(_normal(np.array(1.0 - EDGE))) * max(self.scatter or (0.0,))
+
+    def places(self, seed: int, first: int, samples: int) -> tuple[Array, Array]:
+        """Places (y, z) of the hits of some samples from their aims [m], shape [samples, count] each.
+
+        Args:
+            seed: of all that is drawn.
+            first: number of the first sample.
+        """
+        shape = samples, self.count
+
+        def drawn(column: int) -> Array:
+            return draws(seed, column, first * self.count, samples * self.count).reshape(shape)
+
+        if self.spacing is not None:
+            distance, angle = self.spacing.quantile(drawn(_DISTANCE)), 2.0 * np.pi * drawn(_DIRECTION)
+            distance[:, 0] = 0.0
+            return (distance * np.cos(angle)).cumsum(axis=1), (distance * np.sin(angle)).cumsum(axis=1)
+        places = np.zeros((self.count, 2)) if self.offsets is None else np.array(self.offsets)
+        std_y, std_z = self.scatter or (0.0, 0.0)
+        y, z = np.broadcast_to(places[:, 0], shape), np.broadcast_to(places[:, 1], shape)
+        return y + std_y * _normal(drawn(_ALONG_Y)), z + std_z * _normal(drawn(_ALONG_Z))
+
+
+class BurstSampler(Sampler):
+    """The shots of a campaign of bursts: shot k is number k mod n of the burst at plate k // n, n shots each.
+
+    `hits` give the aim of every burst, and what belongs to the plate. What belongs to a shot is drawn for each. It
+    follows from the seed and the number of the shot alone. The first shot of a burst has what the shot at its aim has
+    in a campaign without bursts.
+
+    Raises:
+        ValueError: images of shots (`hits.irreducible`), and as a `Sampler`.
+    """
+
+    def __init__(
+        self,
+        impact: Impact,
+        hits: Hits,
+        plate: Plate,
+        burst: Burst,
+        *,
+        scatter: Scatter | None = None,
+        replicates: int = 1,
+    ) -> None:
+        if hits.irreducible:
+            raise ValueError("got hits.irreducible = true beside burst, but the hits of a burst have no images")
+        super().__init__(impact, hits, plate, scatter, replicates)
+        self._burst = burst
+
+    def __len__(self) -> int:
+        """Number of shots."""
+        return self._burst.count * super().__len__()
+
+    def shots(self, first: int, count: int) -> Shots:
+        """`count` shots from number `first` on."""
+        each, count = self._burst.count, min(count, len(self) - first)
+        sample, skipped = divmod(first, each)
+        samples = -(-(skipped + count) // each)
+        aims = super().shots(sample, samples)
+        y, z = self._burst.places(self._hits.seed, sample, samples)
+        hits = np.stack([aims.hit_y[:, None] + y, aims.hit_z[:, None] + z], axis=-1)
+        every = aims[np.repeat(np.arange(samples), each)]
+        order = np.tile(np.arange(each), samples)
+        shots = replace(
+            every,
+            **self._of_later_shots(every, order, sample * each),
+            hit_y=hits[..., 0].ravel(),
+            hit_z=hits[..., 1].ravel(),
+            sample=sample + np.repeat(np.arange(samples), each),
+            burst_order=order,
+            nearest_earlier_hit=_nearest_earlier(hits).ravel(),
+        )
+        return shots[skipped : skipped + count]
+
+    def _of_later_shots(self, shots: Shots, order: Any, first: int) -> dict[str, Array]:
+        """What differs from shot to shot, with draws of their own for all but the first shots of bursts."""
+        listed = self._hits.listed or {}
+        return {
+            name: np.where(
+                order == 0,
+                shots.columns[name],
+                distribution.quantile(draws(self._hits.seed, list(QUANTITIES).index(name), first, len(shots))),
+            )
+            for name, distribution in self._scatter.items()
+            if QUANTITIES[name].table != "plate" and name not in listed
+        }
+
+
+def draws(seed: int, column: int, first: int, count: int) -> Array:
+    """Independent numbers between 0 and 1 of a column, shape [count]: shot k has draw k."""
+    return np.clip(stream(seed, (_BURST, column), first, count), EDGE, 1.0 - EDGE)
+
+
+def _normal(share: Array) -> Array:
+    from scipy.special import ndtri
+
+    return np.asarray(ndtri(share))
+
+
+def _nearest_earlier(hits: Array) -> Array:
+    """Distance of every hit from the nearest earlier one of its burst [m], NaN for the first; shapes [bursts, n, 2] and
+    [bursts, n]."""
+    nearest = np.full(hits.shape[:2], np.nan)
+    for order in range(1, hits.shape[1]):
+        nearest[:, order] = np.linalg.norm(hits[:, :order] - hits[:, order, None], axis=-1).min(axis=1)
+    return nearest

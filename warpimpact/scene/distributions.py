@@ -1,0 +1,211 @@
+"""Distributions of one quantity, from scipy.stats."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from .model import Array, Model
+
+EDGE = 2.0**-31
+"""Uniform numbers lie between EDGE and 1 − EDGE. EDGE is half a step of the Sobol sequence. So a normal distribution
+ends at 6.2 standard deviations, and its range is known in advance."""
+
+
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Distribution(Model, ABC):
+    """A distribution of one quantity; its fields hold SI and radians.
+
+    Attributes:
+        distribution: its name.
+    """
+
+    distribution: str
+
+    @abstractmethod
+    def quantile(self, share: Array) -> Array:
+        """Values below which these shares lie, of the same shape."""
+
+
+class Continuous(Distribution, ABC):
+    """A distribution from scipy.stats."""
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`."""
+        values: Array = self._frozen().ppf(share)
+        return values
+
+    @abstractmethod
+    def _frozen(self) -> Any:
+        """The distribution of scipy.stats."""
+
+
+class Bounded(Continuous, ABC):
+    """A distribution that ends at low and high.
+
+    Attributes:
+        low: smallest value.
+        high: largest value.
+    """
+
+    low: _Finite
+    high: _Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if not self.low < self.high:
+            raise ValueError(f"got low = {self.low:g} and high = {self.high:g}, but high must be above low")
+        return self
+
+
+class Normal(Continuous):
+    """Mean and standard deviation.
+
+    Attributes:
+        mean: of the quantity.
+        std: standard deviation.
+    """
+
+    distribution: Literal["normal"] = "normal"
+    mean: _Finite
+    std: _Positive
+
+    def _frozen(self) -> Any:
+        from scipy import stats  # a second to import
+
+        return stats.norm(self.mean, self.std)
+
+
+class TruncatedNormal(Bounded):
+    """The part of a normal distribution between low and high; `mean` and `std` are those of the whole.
+
+    Attributes:
+        mean: of the whole distribution.
+        std: standard deviation of the whole distribution.
+    """
+
+    distribution: Literal["truncated_normal"] = "truncated_normal"
+    mean: _Finite
+    std: _Positive
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        ends = ((end - self.mean) / self.std for end in (self.low, self.high))
+        return stats.truncnorm(*ends, loc=self.mean, scale=self.std)
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`; clipped, because rounding may exceed the ends."""
+        return np.clip(super().quantile(share), self.low, self.high)
+
+
+class Uniform(Bounded):
+    """Evenly between low and high."""
+
+    distribution: Literal["uniform"] = "uniform"
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        return stats.uniform(self.low, self.high - self.low)
+
+
+class Triangular(Bounded):
+    """From low to high with its peak at mode.
+
+    Attributes:
+        mode: where the peak is.
+    """
+
+    distribution: Literal["triangular"] = "triangular"
+    mode: _Finite
+
+    @model_validator(mode="after")
+    def _peaks_within(self) -> Self:
+        if not self.low <= self.mode <= self.high:
+            raise ValueError(f"got mode = {self.mode:g}, but it must lie between low and high")
+        return self
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        width = self.high - self.low
+        return stats.triang((self.mode - self.low) / width, loc=self.low, scale=width)
+
+
+class Lognormal(Continuous):
+    """The logarithm is normal.
+
+    Attributes:
+        median: half of the values lie below it.
+        sigma: standard deviation of the logarithm.
+    """
+
+    distribution: Literal["lognormal"] = "lognormal"
+    median: _Positive
+    sigma: _Positive
+
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        return stats.lognorm(self.sigma, scale=self.median)
+
+
+class Weibull(Distribution):
+    """The strength of the weakest link.
+
+    Attributes:
+        shape: a large one has little spread.
+        scale: 63 % of the values lie below it.
+    """
+
+    distribution: Literal["weibull"] = "weibull"
+    shape: _Positive
+    scale: _Positive
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`."""
+        return np.asarray(self.scale * (-np.log1p(-share)) ** (1.0 / self.shape))
+
+
+class Discrete(Distribution):
+    """One of several values.
+
+    Attributes:
+        values: those that there are.
+        weights: proportional to the probabilities; without weights all values are equally probable.
+    """
+
+    distribution: Literal["discrete"] = "discrete"
+    values: Annotated[tuple[_Finite, ...], Field(min_length=1)]
+    weights: tuple[_Positive, ...] | None = None
+
+    @model_validator(mode="after")
+    def _paired(self) -> Self:
+        if self.weights is not None and len(self.weights) != len(self.values):
+            raise ValueError(
+                f"got {len(self.values)} values and {len(self.weights)} weights, but each value needs one weight"
+            )
+        return self
+
+    def quantile(self, share: Array) -> Array:
+        """As in `Distribution`."""
+        weights = np.ones(len(self.values)) if self.weights is None else np.array(self.weights)
+        order = np.argsort(self.values)
+        ends = np.cumsum(weights[order])
+        which = np.searchsorted(ends[:-1] / ends[-1], share, side="right")
+        values: Array = np.array(self.values)[order][which]
+        return values
+
+
+AnyDistribution = Annotated[
+    Normal | TruncatedNormal | Uniform | Triangular | Lognormal | Weibull | Discrete,
+    Field(discriminator="distribution"),
+]
+PURE_NUMBERS = {"distribution", "sigma", "shape", "weights"}
