@@ -272,17 +272,13 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     if not {attr.CORE, attr.IMPACT} <= told.keys():
         raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
-    burst = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
-    limit = {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
-    return (
-        burst
-        | limit
-        | {
-            "core": json.loads(told[attr.CORE]),
-            "impact": _in_degrees(json.loads(told[attr.IMPACT])),
-            "output": output,
-        }
-    )
+    told_of = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
+    told_of |= {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
+    return told_of | {
+        "core": json.loads(told[attr.CORE]),
+        "impact": _in_degrees(json.loads(told[attr.IMPACT])),
+        "output": output,
+    }
 
 
 def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:

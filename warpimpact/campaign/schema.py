@@ -159,9 +159,14 @@ def _take_plates(schema: Schema) -> None:
     """Several plates, each with a name, in a file for ``warpimpact compare``."""
     one = schema["$defs"]["Plate"]
     name = {"type": "string", "description": "Name of the plate and of its result; only where there are several."}
+    layers = {
+        "type": "array",
+        "items": {"$ref": "#/$defs/Layer"},
+        "description": "What stands behind this plate, in order.",
+    }
     schema["$defs"]["NamedPlate"] = one | {
         "description": "One of several plates that are compared.",
-        "properties": {"name": name} | one["properties"],
+        "properties": {"name": name, "layer": layers} | one["properties"],
         "required": ["name", *one["required"]],
     }
     several = {"type": "array", "items": {"$ref": "#/$defs/NamedPlate"}, "minItems": 2}
