@@ -170,7 +170,7 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
     passage = _least(resolution.passage(one.thickness) for one in materials)
     times = (
-        resolution.longest_time(material.degradation, layer, shots.velocity)
+        resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
         for material, layer in zip(materials, target.plates, strict=True)
     )
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too

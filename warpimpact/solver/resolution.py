@@ -45,6 +45,11 @@ WEAKENING = 2.7
 """ln of what a step may take off the resistance where it acts all the time, per unit of `travel`: exposure counts as
 it is in mid-step, and a longer step leaves too little of a plate that weakens at once."""
 
+SLOWING = 0.25
+"""Share of the core's energy that a step may take if the plate acts on the whole cross section of the core, per unit of
+`travel`: near the limit velocity a core would else lose most of its energy in one step. No step of the paper's shots is
+shortened by it."""
+
 FIDELITIES = {
     "draft": Fidelity(14, 16, 1.0, 0.5),
     "standard": Fidelity(23, 32, 1.5, 0.37),
@@ -98,6 +103,12 @@ class Resolution:
     """The most of a step's way that may lie in the plane of the plate [m], if a quarter of it is enough for that."""
     weakening: float
     """The most that contact may take off ln of the resistance in a step, likewise."""
+    slowing: float
+    """The most that contact may take off the energy in a step, likewise, over twice the cross section [1/m²]."""
+    mass: float
+    """Of the core, where no other is given [kg]."""
+    static: float
+    """Static stress over the resistance."""
     patches_axial: int
     patches_around: int
     grid_spacing: float
@@ -110,11 +121,15 @@ class Resolution:
         """Way [m] on which the plate acts on a core, for some thicknesses [m], of their shape."""
         return np.minimum(thickness, self.slender)
 
-    def longest_time(self, degradation: Array, plate: Plate, velocity: ArrayLike) -> Array:
-        """Time [s] in which contact weakens a plate by as much as a step may, for some β and impact velocities [m/s],
-        of their shape."""
+    def longest_time(
+        self, degradation: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
+    ) -> Array:
+        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some β, impact
+        velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
         longest = self.weakening / np.maximum(-decay_rate(degradation, plate.degradation_unit), SLOWEST_DECAY)
-        return np.asarray(longest if plate.degradation_distance is None else longest / np.asarray(velocity))
+        weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
+        slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / np.maximum(static_stress, SMALLEST_STRESS)
+        return np.asarray(np.minimum(weakened, slowed))
 
     def step_at(
         self, velocity: ArrayLike, obliquity: ArrayLike, thickness: ArrayLike, longest_time: ArrayLike
@@ -131,7 +146,8 @@ class Resolution:
 
     def step_of(self, impact: Impact, plate: Plate) -> float:
         """Time step [s] of a plate that stands alone, or where it scatters, of its means."""
-        longest_time = self.longest_time(np.array(plate.degradation), plate, impact.velocity)
+        stress = self.static * plate.resistance
+        longest_time = self.longest_time(np.array(plate.degradation), plate, impact.velocity, self.mass, stress)
         return float(self.step_at(impact.velocity, impact.obliquity, plate.thickness, longest_time))
 
     def step_in(self, impact: Impact, target: Target) -> float:
@@ -179,6 +195,9 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
         slender=SLENDER * core.length,
         way_along=ALONG * fidelity.travel * finest,
         weakening=WEAKENING * fidelity.travel,
+        slowing=SLOWING * fidelity.travel * 0.5 / (math.pi * core.max_radius**2),
+        mass=core.mass_properties.mass,
+        static=scene.interaction.static,
         patch_width=math.inf if numerics.scheme == "nodal" else width,
         **(defaults | given),
     )
@@ -207,6 +226,8 @@ FASTEST_DECAY = 1.0e30
 is 0)."""
 SLOWEST_DECAY = 1.0e-30
 """Below which nothing weakens [1/s]."""
+SMALLEST_STRESS = 1.0
+"""Below which nothing slows down [Pa]."""
 
 
 def decay_rate(degradation: Array, unit: float) -> Array:

@@ -63,7 +63,8 @@ def patch_steps(shots: Shots, numerics: Any, outcomes: Outcomes) -> float:
     resolution = resolve(numerics, SCENE)
     around = resolution.patches_around
     rings = rings_of(CORE, resolution.patches_axial, around, resolution.patch_width)
-    longest_time = resolution.longest_time(np.array(PLATE.degradation), PLATE, shots.velocity)
+    law = (CORE.mass_properties.mass, PLATE.resistance)
+    longest_time = resolution.longest_time(np.array(PLATE.degradation), PLATE, shots.velocity, *law)
     step = resolution.step_at(shots.velocity, shots.obliquity, PLATE.thickness, longest_time)
     steps = outcomes.contact_duration / step
     return float(len(rings.station) * around * steps.sum())
