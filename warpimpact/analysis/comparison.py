@@ -27,6 +27,7 @@ from warpimpact.analysis.base import base_thickness, has_base
 from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.summary import sampling_note
+from warpimpact.analysis.survival import Survival, survival_of, why_not_by_draws
 from warpimpact.campaign.parts import first_difference
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -62,7 +63,10 @@ class Contestant:
 
 @dataclass(frozen=True)
 class Difference:
-    """By how much a measure of one plate exceeds that of another, with its interval; NaN where there is none."""
+    """By how much a measure of one plate exceeds that of another, with its interval; NaN where there is none.
+
+    `survival` tells whether its sign holds for the true parameters, too; None without a posterior.
+    """
 
     measure: str
     one: str
@@ -70,6 +74,7 @@ class Difference:
     value: float
     low: float
     high: float
+    survival: Survival | None = None
 
     @property
     def told_apart(self) -> bool:
@@ -168,7 +173,10 @@ def compare(
             dealt = [dealing(datasets[k]) | {"confidence": each} for k in (i, j)]
             sides = [_side(evidences[k], of, by_ratio=name in by_ratio) for k, of in zip((i, j), dealt, strict=True)]
             interval = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
-            differences.append(Difference(name, names[i], names[j], *interval))
+            numbers = sides[0].numbers, sides[1].numbers
+            why = why_not_by_draws(name, numbers, independent=pair.independent, by_ratio=name in by_ratio)
+            survival = survival_of((datasets[i], datasets[j]), numbers, interval[0], reason=why, confidence=confidence)
+            differences.append(Difference(name, names[i], names[j], *interval, survival))
     plates = tuple(
         Contestant(
             name, dataset.sizes["hit"], dataset.attrs[attr.AREAL_DENSITY], dataset.attrs[attr.OPEN_AREA], tuple(told)

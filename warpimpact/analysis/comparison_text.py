@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
 from warpimpact.analysis.numbers import interval_text, of_each
 from warpimpact.analysis.numbers import number_text as number
+from warpimpact.analysis.survival import survival_text
 
 if TYPE_CHECKING:
     from warpimpact.analysis.comparison import Comparison, Contestant, Difference
@@ -48,7 +49,17 @@ def conditions(comparison: Comparison) -> list[str]:
     """What was compared and how, a sentence each."""
     together = f"Differences of a measure hold together at {comparison.confidence:.0%} (Bonferroni over the pairs)."
     chance = "The intervals describe the hits that were drawn, not what the model leaves out."
-    return [*hits_used(comparison), together, chance, *comparison.notes]
+    return [*hits_used(comparison), together, chance, *_drawn(comparison), *comparison.notes]
+
+
+def _drawn(comparison: Comparison) -> list[str]:
+    """How verdicts are weighed against the uncertainty of the parameters, where that is known."""
+    if all(pair.survival is None for pair in comparison.differences):
+        return []
+    return [
+        "The parameters are drawn from a posterior. P is the share of its draws for which a verdict holds; the verdict "
+        f"survives the uncertainty of the parameters if P is {comparison.confidence:.0%} or more, and the hits tell so."
+    ]
 
 
 def hits_used(comparison: Comparison) -> list[str]:
@@ -83,8 +94,15 @@ def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
-        rows.append((measure.label, _listed(first) if told_apart else neither))
+        rows.append((measure.label, _listed(first) + _doubt(comparison, measure.name) if told_apart else neither))
     return rows
+
+
+def _doubt(comparison: Comparison, measure: str) -> str:
+    """What to say of plates that are best: whether a verdict about the measure does not survive; mostly empty."""
+    told = [pair.survival for pair in comparison.differences if pair.measure == measure and pair.told_apart]
+    failing = any(survival is not None and not survival.survives for survival in told)
+    return " (not certain under the uncertainty of the parameters)" if failing else ""
 
 
 def is_ranked(comparison: Comparison, measure: str) -> bool:
@@ -151,4 +169,5 @@ def _in_words(pair: Difference, measure: Measure, what: str) -> str:
         return f"{pair.one} and {pair.other} cannot be told apart: difference{what} {number(pair.value)} {interval}"
     names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
     low, high = sorted((abs(pair.low), abs(pair.high)))
-    return f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval_text(low, high)})"
+    verdict = f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval_text(low, high)})"
+    return verdict + survival_text(pair.survival)
