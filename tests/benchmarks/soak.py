@@ -1,13 +1,15 @@
-"""Random campaigns that are signalled, killed, starved of disk and damaged, until each result is there: are its bits
-those of an undisturbed run?
+"""Random campaigns that are signalled, killed, starved of disk, bereft of workers or scheduler and damaged, until each
+result is there: are its bits those of an undisturbed run?
 
 A round draws a campaign, computes it undisturbed, and then disturbs and resumes it until it is complete. Half of the
-rounds compute on Dask workers of this machine. The figures add up: a run goes on where the file of figures ended.
-python tests/benchmarks/soak.py --minutes 60
+rounds compute on Dask workers: of the run itself, or of a scheduler of their own. A fault is counted if it befell a run
+that was going on, a flipped bit if it is in a shard that a run left behind. The figures add up: a run goes on where the
+file of figures ended. python tests/benchmarks/soak.py --minutes 60
 """
 
 import argparse
 import json
+import os
 import platform
 import random
 import signal
@@ -16,8 +18,10 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import netCDF4
 import psutil
@@ -38,11 +42,38 @@ sys.argv[1:] = sys.argv[2:]
 command()
 """
 """The command with small shards and, if the first argument is not 0, with a limit of the size of files."""
-FAULTS = ("sigint", "sigterm", "sigkill", "disk", "bit flips", "worker")
+SIGNALS = ("SIGINT", "SIGTERM", "SIGKILL")
+FAULTS = {
+    "threads": (*SIGNALS, "disk limit"),
+    "workers": (*SIGNALS, "worker killed", "worker killed", "disk limit"),
+    "scheduler": ("scheduler killed", "scheduler killed", "worker killed", "SIGTERM"),
+}
+"""What befalls the runs of a round, by who computes."""
+MOST_FAULTS = 8
+"""Per round; the runs after that are left alone."""
 LONGEST = 300.0
-"""Seconds after which a run counts as hanging."""
-ALLOWED = {0, 2, 130, -signal.SIGTERM, -signal.SIGINT, -signal.SIGKILL}
-"""How a disturbed run may end; before it listens to signals, the system ends it."""
+"""Seconds after which a run counts as hanging; those in which it waits for a core of the machine do not count."""
+ENDS = {
+    "none": {0},
+    "SIGINT": {0, 130, -signal.SIGINT},
+    "SIGTERM": {0, 130, -signal.SIGTERM},
+    "SIGKILL": {0, -signal.SIGKILL},
+    "disk limit": {0, 2},
+    "worker killed": {0},
+    "scheduler killed": {0, 2},
+}
+"""Exit codes that a run may end with; before it listens to signals, the system ends it, and it may be done already."""
+
+
+class Run(NamedTuple):
+    """A run under way, and the file that takes what it says."""
+
+    process: subprocess.Popen[bytes]
+    folder: Path
+
+    @property
+    def said(self) -> str:
+        return (self.folder / "said.txt").read_text(errors="replace")
 
 
 def campaign(draw: random.Random) -> str:
@@ -55,33 +86,98 @@ def campaign(draw: random.Random) -> str:
     )
 
 
-def start(folder: Path, output: str, *options: str, limit: int = 0) -> subprocess.Popen[str]:
+def start(folder: Path, output: str, *options: str, limit: int = 0) -> Run:
     """A run of the campaign in a folder."""
     command = [sys.executable, "-c", COMMAND, str(limit), "run", "campaign.toml", "-o", output, "--device", "cpu"]
-    return subprocess.Popen(
-        [*command, *options], cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
+    with (folder / "said.txt").open("wb") as said:
+        return Run(subprocess.Popen([*command, *options], cwd=folder, stdout=subprocess.DEVNULL, stderr=said), folder)
 
 
-def disturb(process: subprocess.Popen[str], fault: str, draw: random.Random) -> None:
-    """Let a fault befall a run at a random moment."""
+@contextmanager
+def cluster(folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """A scheduler with two workers, in processes of their own."""
+    file, module = folder / "scheduler.json", [sys.executable, "-m", "distributed.cli"]
+    file.unlink(missing_ok=True)
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": folder}
+    place = ["--host", "127.0.0.1", "--no-dashboard", "--scheduler-file", str(file)]
+    module[-1] += ".dask_scheduler"
+    scheduler = subprocess.Popen([*module, *place, "--port", "0"], **quiet)
+    module[-1] = "distributed.cli.dask_worker"
+    work = ["--nworkers", "2", "--nthreads", "1", "--death-timeout", "20"]
+    workers = None
     try:
-        process.wait(draw.uniform(0.1, 1.0) if draw.random() < 0.3 else draw.uniform(1.0, 12.0))
-        return
-    except subprocess.TimeoutExpired:
-        pass
-    if fault.startswith("sig"):
-        process.send_signal(getattr(signal, fault.upper()))
-    if fault == "worker":
-        children = psutil.Process(process.pid).children(recursive=True)
-        workers = [child for child in children if "spawn_main" in str(child.cmdline())]
-        if workers:
-            draw.choice(workers).kill()
+        wait_for(file.exists)
+        workers = subprocess.Popen([*module, *place, *work], **quiet)
+        yield scheduler
+    finally:
+        for process in filter(None, (workers, scheduler)):
+            end(process)
+
+
+def wait_for(happened: Any, longest: float = 60.0) -> bool:
+    """Wait until something has happened; returns whether it has."""
+    until = time.monotonic() + longest
+    while not happened() and time.monotonic() < until:
+        time.sleep(0.02)
+    return bool(happened())
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """End a process and those that it started."""
+    children = offspring(process.pid)
+    for one in (*children, process):
+        with suppress(psutil.NoSuchProcess):
+            one.kill()
+    process.wait()
+    psutil.wait_procs(children)
+
+
+def offspring(pid: int) -> list[psutil.Process]:
+    try:
+        return psutil.Process(pid).children(recursive=True)
+    except psutil.NoSuchProcess:
+        return []
+
+
+def shards(folder: Path) -> list[Path]:
+    """What a run has saved so far."""
+    return sorted((folder / "a.nc.parts").glob("hits_*.nc"))
+
+
+def strike(run: Run, fault: str, scheduler: subprocess.Popen[bytes] | None, draw: random.Random) -> bool:
+    """Let a fault befall a run: early, or after it has saved some more shards; returns whether the run was still on."""
+    before, more, pause = len(shards(run.folder)), draw.randint(1, 6), draw.uniform(0.0, 0.5)
+    if draw.random() < 0.25:
+        time.sleep(draw.uniform(0.1, 4.0))
+    else:
+        wait_for(lambda: run.process.poll() is not None or len(shards(run.folder)) >= before + more, LONGEST)
+        time.sleep(pause)
+    if run.process.poll() is not None:
+        return False
+    if fault in SIGNALS:
+        run.process.send_signal(getattr(signal, fault))
+    elif fault == "scheduler killed":
+        assert scheduler is not None
+        scheduler.kill()
+    elif fault == "worker killed":
+        workers = [child for child in offspring(os.getpid()) if is_worker(child)]
+        if not workers:
+            return False
+        draw.choice(workers).kill()
+    return True
+
+
+def is_worker(process: psutil.Process) -> bool:
+    """Whether it computes for a nanny of Dask."""
+    try:
+        return "spawn_main" in str(process.cmdline())
+    except psutil.Error:
+        return False
 
 
 def flip(folder: Path, draw: random.Random) -> int:
-    """Flip a bit of some files that an interrupted run has left; returns of how many."""
-    files = [path for path in sorted((folder / "a.nc.parts").glob("*")) if path.is_file() and path.stat().st_size]
+    """Flip a bit of some shards that an interrupted run has left; returns of how many."""
+    files = shards(folder)
     chosen = draw.sample(files, min(len(files), draw.randint(1, 3)))
     for path in chosen:
         data = bytearray(path.read_bytes())
@@ -100,55 +196,94 @@ def same_bits(one: Path, other: Path) -> bool:
         )
 
 
-def ended(process: subprocess.Popen[str]) -> tuple[int | str, str]:
-    """Exit code and last words of a run; "hang" if it does not end."""
-    try:
-        said = process.communicate(timeout=LONGEST)[1]
-    except subprocess.TimeoutExpired:
-        process.kill()
-        return "hang", process.communicate()[1]
-    return process.returncode, said
+def ended(run: Run) -> int | str:
+    """Exit code of a run; "hang" if it does not end, or leaves processes behind that do not."""
+    begin, children = time.monotonic(), offspring(run.process.pid)
+    while run.process.poll() is None:
+        if time.monotonic() - begin > LONGEST + starved(run.process.pid):
+            end(run.process)
+            return "hang"
+        time.sleep(0.02)
+    left = psutil.wait_procs(children, timeout=LONGEST)[1]
+    for child in left:
+        child.kill()
+    return "processes left behind" if left else run.process.returncode
+
+
+def starved(pid: int) -> float:
+    """Seconds that a thread of a process, or of those that it started, has waited for a core at most."""
+    waits = [0.0]
+    for process in (pid, *(child.pid for child in offspring(pid))):
+        for thread in Path(f"/proc/{process}/task").glob("*/schedstat"):
+            with suppress(OSError):
+                waits.append(1e-9 * int(thread.read_text().split()[1]))
+    return max(waits)
 
 
 def one_round(folder: Path, draw: random.Random, counts: Counter[str]) -> list[str]:
     """Disturb a campaign until its result is there; returns what went wrong."""
     (folder / "campaign.toml").write_text(campaign(draw), encoding="utf-8")
-    code, said = ended(start(folder, "straight.nc"))
-    if code != 0:
-        return [f"undisturbed run: {code}, {said[-500:]}"]
-    wrong, size = [], (folder / "straight.nc").stat().st_size
-    spread = ["--workers", "2"] if draw.random() < 0.3 else []
-    for attempt in range(40):
-        fault = draw.choice(FAULTS if spread else FAULTS[:5]) if attempt < 8 else "none"
-        limit = draw.randint(100, size) if fault == "disk" else 0
-        process = start(folder, "a.nc", "--resume", *spread, limit=limit)
-        if fault != "none":
-            disturb(process, fault, draw)
-        code, said = ended(process)
-        counts[fault] += 1
-        counts[f"exit {code}"] += 1
-        if code not in ALLOWED or "Traceback" in said:
-            wrong.append(f"{fault}: {code}, {said[-500:]}")
-        if (folder / "a.nc").exists() and code == 0:
+    straight = start(folder, "straight.nc")
+    if (code := ended(straight)) != 0:
+        return [f"undisturbed run: {code}, {straight.said[-500:]}"]
+    who = draw.choice(["threads", "threads", "workers", "scheduler"])
+    counts[f"rounds on {who}"] += 1
+    wrong, flipped, told = [], 0, False
+    for attempt in range(MOST_FAULTS + 2):
+        fault = draw.choice(FAULTS[who]) if attempt < MOST_FAULTS else "none"
+        code, said = one_run(folder, who, fault, draw, counts)
+        told = told or "computed again" in said
+        if code not in ENDS[fault] or "Traceback" in said or (code == 2 and not promises(folder, said)):
+            wrong.append(f"{who}, {fault}: {code}, {said[-500:]}")
+        if code == 0:
             break
-        if fault == "bit flips":
-            counts["flipped bits"] += flip(folder, draw)
+        if draw.random() < 0.5:
+            flipped += (number := flip(folder, draw))
+            counts["flipped bits in shards"] += number
+    if flipped:
+        counts["rounds with flipped bits"] += 1
+        counts["of which told of damage"] += told
     if not (folder / "a.nc").exists():
-        wrong.append("no result after 40 runs")
+        wrong.append(f"no result after {MOST_FAULTS + 2} runs")
     elif not same_bits(folder / "a.nc", folder / "straight.nc"):
         counts["wrong bits"] += 1
         wrong.append("wrong bits")
     return wrong
 
 
+def promises(folder: Path, said: str) -> bool:
+    """Whether a run that broke off tells how to go on, if there is anything to go on with."""
+    return "--resume" in said or not shards(folder)
+
+
+def one_run(folder: Path, who: str, fault: str, draw: random.Random, counts: Counter[str]) -> tuple[int | str, str]:
+    """Resume the campaign and let a fault befall it; returns exit code and words."""
+    limit = draw.randint(100, (folder / "straight.nc").stat().st_size) if fault == "disk limit" else 0
+    if who == "scheduler":
+        with cluster(folder) as scheduler:
+            address = json.loads((folder / "scheduler.json").read_text())["address"]
+            run = start(folder, "a.nc", "--resume", "--scheduler", address)
+            struck = fault != "none" and strike(run, fault, scheduler, draw)
+            code = ended(run)
+    else:
+        run = start(folder, "a.nc", "--resume", *(["--workers", "2"] if who == "workers" else []), limit=limit)
+        struck = fault not in ("none", "disk limit") and strike(run, fault, None, draw)
+        code = ended(run)
+        struck = struck or (fault == "disk limit" and code == 2)
+    counts[fault] += fault != "none" and struck
+    counts[f"exit {code}"] += 1
+    counts["runs"] += 1
+    return code, run.said
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--minutes", type=float, default=60.0, help="how long to go on")
+    parser.add_argument("--seed", type=int, default=1, help="of new figures")
     parser.add_argument("--figures", type=Path, default=FIGURES, help="file that is read and written")
     arguments = parser.parse_args()
-    figures: dict[str, Any] = {"seed": 1, "rounds": 0, "seconds": 0.0, "counts": {"wrong bits": 0}, "wrong": []}
-    if arguments.figures.exists():
-        figures = json.loads(arguments.figures.read_text())
+    zero = {"seed": arguments.seed, "rounds": 0, "seconds": 0.0, "counts": {"wrong bits": 0}, "wrong": []}
+    figures: dict[str, Any] = json.loads(arguments.figures.read_text()) if arguments.figures.exists() else zero
     begin, before = time.monotonic(), figures["seconds"]
     while time.monotonic() - begin < 60.0 * arguments.minutes:
         counts = Counter(figures["counts"])
@@ -158,7 +293,8 @@ def main() -> None:
         figures["rounds"] += 1
         figures["counts"] = dict(sorted(counts.items()))
         figures["seconds"] = round(before + time.monotonic() - begin, 1)
-        arguments.figures.write_text(json.dumps(figures | {"machine": platform.machine()}, indent=1) + "\n")
+        machine = f"{platform.machine()}, {os.cpu_count()} cores, shared"
+        arguments.figures.write_text(json.dumps(figures | {"machine": machine}, indent=1) + "\n")
         print(figures["rounds"], figures["seconds"], figures["counts"], figures["wrong"][-1:], flush=True)
     sys.exit(1 if figures["wrong"] else 0)
 

@@ -2,19 +2,23 @@
 
 import math
 import struct
+import time
 import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from matplotlib.path import Path as Polygon
 from PIL import Image
 from pydantic import ValidationError
 
 from warpimpact.scene import CirclePattern, MaskPattern, SlotPattern
+from warpimpact.scene.patterns.roundings import smallest_gap
 
 MM = 1e-3
 
+ANGLES = np.linspace(0.0, 2.0 * np.pi, 201)
 # An L of material, 2 cells along y and 3 along z; as an image the top row is the last along z.
 CELLS = np.array([[1, 1, 1], [1, 0, 0]], dtype=np.uint8)
 HEAD = '<svg xmlns="http://www.w3.org/2000/svg" width="{}" height="{}" viewBox="0 0 {} {}">'
@@ -160,3 +164,28 @@ def test_a_mask_of_one_hole_on_a_small_plate_has_the_rim_alone(tmp_path: Path) -
     assert mask.ligament() == pytest.approx(8 * MM)
     with pytest.raises(ValueError, match="got a mask beside margin, but a mask has no single holes to leave out"):
         mask.bounded((6 * MM, 8 * MM), 1 * MM)
+
+
+def test_the_smallest_gap_is_the_least_distance_of_any_two_shapes() -> None:
+    rng = np.random.default_rng(3)
+    places = np.stack(np.meshgrid(np.arange(5.0), np.arange(7.0)), axis=-1).reshape(-1, 1, 2)
+    angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, (35, 40)), axis=1)
+    turned = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    shapes = places + rng.uniform(0.1, 0.48, (35, 1, 1)) * np.concatenate([turned, turned[:, :1]], axis=1)
+    polygons = shapely.polygons(shapes)
+    apart = shapely.distance(polygons[:, None], polygons)[~np.eye(35, dtype=bool)]
+    assert smallest_gap([[shape] for shape in shapes]) == pytest.approx(apart.min(), rel=1e-12)
+    circle = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=-1)
+    assert smallest_gap([[2.0 * circle, circle], [0.4 * circle]]) == pytest.approx(
+        0.6, rel=1e-3
+    )  # an island with a hole
+    assert smallest_gap([[shapes[0]]]) == smallest_gap([]) == math.inf
+
+
+def test_the_ligament_of_noise_takes_no_longer_than_its_outline_is_long(tmp_path: Path) -> None:
+    # One hole winds through the whole mask and holds hundreds of others.
+    np.save(tmp_path / "a.npy", np.random.default_rng(1).random((300, 300)) > 0.7)
+    mask = MaskPattern(file=tmp_path / "a.npy", cell_size="0.05 mm")
+    begin = time.process_time()
+    assert mask.ligament() == pytest.approx(math.sqrt(0.5) * 0.05 * MM)  # from corner to corner
+    assert time.process_time() - begin < 5.0

@@ -13,7 +13,7 @@ from ..model import Array
 from ..units import PositiveLength
 from .mask_files import read_mask
 from .pattern import BoolArray, Pattern, Range, half_sides
-from .roundings import neighbours
+from .roundings import smallest_gap
 
 
 class MaskPattern(Pattern):
@@ -85,22 +85,17 @@ class MaskPattern(Pattern):
         return {}
 
     def _ligament(self, size: tuple[float, float] | None) -> float:
-        import shapely
-
         period = np.array(self.period)
         half = period if size is None else half_sides(size, self.period, period)
         # Outer and inner rings of each hole, one after the other, with their offsets.
         rings, starts = self._contours(*((-end, end) for end in half)).filled(0.5, math.inf)
-        holes = [
-            shapely.Polygon(points[at[0] : at[1]], [points[a:b] for a, b in pairwise(at[1:])])
-            for points, at in zip(rings, starts, strict=True)
-        ]
-        between = neighbours(np.array(holes), len(holes))[0]
+        between = smallest_gap(
+            [[points[a:b] for a, b in pairwise(at)] for points, at in zip(rings, starts, strict=True)]
+        )
         if size is None:
             return between
-        low_y, low_z, high_y, high_z = shapely.bounds(holes).reshape(-1, 4).T
-        to_rim = half[:, None] - np.maximum(np.abs([low_y, low_z]), np.abs([high_y, high_z]))
-        whole = to_rim.min(axis=0)
+        furthest = np.array([np.abs(points).max(axis=0) for points in rings]).reshape(-1, 2)
+        whole = (half - furthest).min(axis=1)
         return min(between, float(whole[whole > 0].min(initial=np.inf)))
 
     @property

@@ -2,12 +2,15 @@
 convex polygon, a line or a point. Areas, distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ..model import Array
 
+_PIECE = 16
+"""Chords in a piece of an outline."""
 _QUARTER = 16
 """Chords per quarter of a turn in an outline; a circle loses 1.6e-3 of its area."""
 
@@ -69,6 +72,37 @@ def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
     (one, other), gaps = tree.query_nearest(geometries[:first], exclusive=True, return_distance=True)
     least = gaps.argmin()
     return float(gaps[least]), int(one[least]), int(other[least])
+
+
+def smallest_gap(shapes: Sequence[Sequence[Array]]) -> float:
+    """Smallest distance [m] between two shapes that do not overlap; inf if there are fewer than two.
+
+    Args:
+        shapes: the closed outlines of each, each of shape [points, 2] [m].
+
+    Outlines are cut into short pieces, of which a tree finds the nearest. Two different numbers differ in some binary
+    digit: for every digit the pieces of the shapes that have it are held against those of the others.
+    """
+    import shapely
+
+    pieces: list[Array] = []
+    owners: list[int] = []
+    for number, rings in enumerate(shapes):
+        for ring in rings:
+            pieces += [ring[at : at + _PIECE + 1] for at in range(0, len(ring) - 1, _PIECE)]
+        owners += [number] * (len(pieces) - len(owners))
+    lines: Any = shapely.linestrings(
+        np.concatenate([*pieces, np.empty((0, 2))]), indices=np.repeat(np.arange(len(pieces)), list(map(len, pieces)))
+    )
+    owner, least = np.array(owners, dtype=int), np.inf
+    for digit in range((len(shapes) - 1).bit_length() if shapes else 0):
+        has = (owner >> digit & 1).astype(bool)
+        limit = least if np.isfinite(least) and least > 0.0 else None
+        gaps = shapely.STRtree(lines[~has]).query_nearest(
+            lines[has], max_distance=limit, return_distance=True, all_matches=False
+        )[1]
+        least = min(least, float(gaps.min(initial=np.inf)))
+    return least
 
 
 def geometries(spines: Array) -> Any:
