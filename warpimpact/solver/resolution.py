@@ -124,8 +124,8 @@ class Resolution:
     def longest_time(
         self, degradation: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
     ) -> Array:
-        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some β, impact
-        velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
+        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some β,
+        impact velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
         longest = self.weakening / np.maximum(-decay_rate(degradation, plate.degradation_unit), SLOWEST_DECAY)
         weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
         slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / np.maximum(static_stress, SMALLEST_STRESS)
