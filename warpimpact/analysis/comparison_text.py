@@ -58,7 +58,8 @@ def _drawn(comparison: Comparison) -> list[str]:
         return []
     return [
         "The parameters are drawn from a posterior. P is the share of its draws for which a verdict holds; the verdict "
-        f"survives the uncertainty of the parameters if P is {comparison.confidence:.0%} or more, and the hits tell so."
+        f"survives the uncertainty of the parameters if P is at least {comparison.confidence:.0%} even at the lower "
+        "end of its interval, and does not if P itself is less."
     ]
 
 

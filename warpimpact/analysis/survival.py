@@ -97,15 +97,13 @@ def survival_text(survival: Survival | None) -> str:
         return ""
     if survival.reason:
         return f"; whether this survives the uncertainty of the parameters is not known: {survival.reason}"
+    verdict = {
+        True: "survives",
+        False: "does not survive",
+        None: "these hits do not tell whether it survives",
+    }[survival.survives]
     probability, at_least = _floored(survival.probability), _floored(survival.at_least)
-    if survival.survives is None:
-        return (
-            "; these hits do not tell whether it survives the uncertainty of the parameters "
-            f"(P = {probability}, at least {at_least})"
-        )
-    if survival.survives:
-        return f"; survives the uncertainty of the parameters (P = {probability}, at least {at_least})"
-    return f"; does not survive the uncertainty of the parameters (P = {probability})"
+    return f"; {verdict} the uncertainty of the parameters (P = {probability}, at least {at_least})"
 
 
 def _floored(probability: float) -> str:

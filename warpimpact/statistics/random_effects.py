@@ -44,8 +44,8 @@ def positive_share(
 
     Every true mean has a normal distribution about the mean of its group, shrunk towards the mean over all (empirical
     Bayes). The lower end takes the true means as normally distributed, with a mean and a variance at the
-    unfavourable ends of their intervals, which hold together (Bonferroni). Means with long tails widen the
-    interval of the variance.
+    unfavourable ends of their intervals, which hold together (Bonferroni). Few groups do not show that a rare one is
+    far off on the other side.
 
     Args:
         numbers: shape [shots]; NaN where a shot does not count.
@@ -63,9 +63,6 @@ def positive_share(
         return None
     whole, noise = float(found.means.var(ddof=1)), float(found.noises.mean())
     free = count - 1.0
-    if whole > 0.0:
-        kurtosis = float((np.square(found.means - found.means.mean()) ** 2).mean() / found.means.var() ** 2) - 3.0
-        free = 2.0 / (2.0 / free + max(0.0, kurtosis) / count)
     largest = max(0.0, whole * free / float(chdtri(free, 1.0 - tail)) - noise)
     error = math.sqrt(largest * found.of_between + found.of_noise)
     lowest = found.centre + float(stdtrit(free, tail)) * error

@@ -55,7 +55,7 @@ def test_a_sign_that_depends_on_the_draw_does_not_survive(make_plate_result: Any
     assert pair.survival is not None
     assert pair.survival.survives is False
     assert pair.survival.probability == pytest.approx(0.6, abs=0.01)
-    assert sentence(drawn).endswith("; does not survive the uncertainty of the parameters (P = 0.60)")
+    assert "; does not survive the uncertainty of the parameters (P = 0.6" in sentence(drawn)
     best = next(line for line in comparison_text(drawn).splitlines() if line.startswith("residual energy fraction, m"))
     assert best.endswith("b (not certain under the uncertainty of the parameters)")
 
@@ -69,7 +69,7 @@ def test_a_sign_that_is_that_of_all_draws_survives(make_plate_result: Any, first
     assert survival.survives is True
     assert "b better than a" in sentence(comparison)
     assert "; survives the uncertainty of the parameters (P = 1.00, at least 0.9" in sentence(comparison)
-    assert "uncertainty of the parameters if P is 95% or more" in comparison_text(comparison)
+    assert "parameters if P is at least 95% even at the lower end" in comparison_text(comparison)
 
 
 def test_hits_that_do_not_tell(make_plate_result: Any) -> None:
