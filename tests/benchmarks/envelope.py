@@ -21,7 +21,7 @@ from warpimpact.kernels.status import Status
 TOP = Path(__file__).parents[2]
 sys.path.insert(0, str(TOP))  # for the tests' own modules
 
-from tests.verification.extremes import MOST_STRETCH, Found, drawn, found  # noqa: E402
+from tests.verification.extremes import MOST_RISE, MOST_STRETCH, Found, drawn, found  # noqa: E402
 
 FIGURES = Path(__file__).parent / "results" / "envelope.json"
 HITS = 3
@@ -49,7 +49,7 @@ def added(figures: dict[str, Any], index: int, outcome: Found) -> dict[str, Any]
     fault = (
         outcome.undefined > 0
         or any(status in NAMED for status in outcome.statuses)
-        or outcome.rise > outcome.allowed
+        or outcome.steep_rise > MOST_RISE
         or outcome.stretch > MOST_STRETCH
     )
     largest = {

@@ -47,8 +47,11 @@ class History:
 
         time, position, attitude, velocity, momentum, force, moment = (trace[:, part] for part in COLUMNS.values())
         axis = Rotation.from_quat(attitude).apply([1.0, 0.0, 0.0])
-        along = np.sum(momentum * axis, axis=1, keepdims=True) * axis
+        spin = np.sum(momentum * axis, axis=1, keepdims=True)
+        along = spin * axis
         omega = along / body.inertia_axial + (momentum - along) / body.inertia_transverse
+        # L × a is 0 where L − (L·a) a is what rounding leaves; ½ L·ω of a spinning disc would take it for a rotation.
+        across = np.cross(momentum, axis)
         return cls(
             time=time[:, 0],
             position=position,
@@ -59,5 +62,6 @@ class History:
             force=force,
             moment=moment,
             translational_energy=0.5 * body.mass * np.sum(velocity**2, axis=1),
-            rotational_energy=0.5 * np.sum(momentum * omega, axis=1),
+            rotational_energy=0.5
+            * (spin[:, 0] ** 2 / body.inertia_axial + np.sum(across**2, axis=1) / body.inertia_transverse),
         )
