@@ -104,7 +104,7 @@ def test_the_pilot_takes_whole_bursts(monkeypatch: pytest.MonkeyPatch) -> None:
         promise_of(campaign_of(60, ('sampling = "sobol"', f'sampling = "{sampling}"')), "cpu")
     for pilot in seen:
         assert pilot.at_a_plate == 5
-        assert len(pilot) == 40
+        assert len(pilot) == 65  # of at least 64
 
 
 def test_what_a_burst_does_not_take_is_refused_in_one_sentence() -> None:
