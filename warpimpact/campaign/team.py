@@ -160,6 +160,7 @@ def cluster_team(
     """
     try:
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
+        from distributed.client import ClosedClientError
         from distributed.comm import CommClosedError
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
@@ -179,26 +180,39 @@ def cluster_team(
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
-        kind = client.submit(made_by, device, pure=False).result()
         executor = client.get_executor(pure=False)
+
+        def asked(request: Callable[..., Any], *arguments: Any) -> Any:
+            try:
+                return request(*arguments)
+            except (OSError, ClosedClientError) as error:  # of the client: here no file is written
+                raise _lost(address, error) from None
+
         try:
+            kind = asked(executor.submit, made_by, device).result()
             yield Team(
                 job=job,
-                pilot=lambda: executor.submit(job.promise_of, campaign, device),
-                submit=lambda *shots: executor.submit(_compute_alike, job, campaign, *shots, device, threads, kind),
-                width=lambda: 2 * max(1, sum(client.nthreads().values())),
+                pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
+                submit=lambda *shots: asked(
+                    executor.submit, _compute_alike, job, campaign, *shots, device, threads, kind
+                ),
+                width=lambda: 2 * max(1, sum(asked(client.nthreads).values())),
                 task=_task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
                 refining=lambda: None,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
-            raise ClusterError(
-                f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
-                "continue with --resume"
-            ) from None
+            raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+def _lost(address: str, error: BaseException) -> ClusterError:
+    return ClusterError(
+        f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
+        "continue with --resume"
+    )
 
 
 def _ignoring_interrupts(plugin: Any) -> Any:

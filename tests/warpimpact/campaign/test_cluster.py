@@ -113,6 +113,28 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
         run_to_file(campaign, output, team=team, progress=lose_it)
 
 
+@pytest.mark.parametrize("lost", ["unreachable", "closed"])
+@pytest.mark.parametrize("request_", ["nthreads", "submit"])
+def test_a_scheduler_that_is_lost_between_tasks_is_told(
+    lost: str, request_: str, campaign: Campaign, cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client that has lost its scheduler raises one of these where it asks for anything."""
+    error = {
+        "unreachable": OSError("Timed out trying to connect to tcp://127.0.0.1:1 after 20 s"),
+        "closed": distributed.client.ClosedClientError("Client is closed"),
+    }[lost]
+
+    def lose_it(*_: object, **__: object) -> None:
+        raise error
+
+    def lose_all(_: Standing) -> None:
+        monkeypatch.setattr(distributed.Client, request_, lose_it)
+
+    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
+    with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
+        run_to_file(campaign, tmp_path / "a.nc", team=team, progress=lose_all)
+
+
 def test_workers_of_this_machine_listen_on_the_loopback(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
 
