@@ -162,9 +162,11 @@ def cluster_team(
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
         from distributed.client import ClosedClientError
         from distributed.comm import CommClosedError
+        from distributed.utils import silence_logging_cmgr
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
     with ExitStack() as stack:
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler gets our sentence, no traceback
         threads = None
         if address is None:
             assert workers is not None

@@ -1,5 +1,7 @@
 """Runs on a cluster of worker processes: the bits of a local run, even if a worker is killed during the run."""
 
+import io
+import logging
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -133,6 +135,19 @@ def test_a_scheduler_that_is_lost_between_tasks_is_told(
     team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
     with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
         run_to_file(campaign, tmp_path / "a.nc", team=team, progress=lose_all)
+
+
+def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(campaign: Campaign, cluster: object) -> None:
+    said = io.StringIO()
+    handler = logging.StreamHandler(said)
+    logging.getLogger("distributed").addHandler(handler)
+    try:
+        with cluster_team(campaign, address=cluster.scheduler_address, device="cpu"):
+            logging.getLogger("distributed.client").error("Traceback (most recent call last)")
+        logging.getLogger("distributed.client").error("printed again")
+    finally:
+        logging.getLogger("distributed").removeHandler(handler)
+    assert said.getvalue() == "printed again\n"
 
 
 def test_workers_of_this_machine_listen_on_the_loopback(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
