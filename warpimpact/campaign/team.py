@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any
 
-import xarray
-
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import HitMap, made_by
 from warpimpact.results import attributes as attr
 from warpimpact.results.interrupts import stop_if_asked
+from warpimpact.results.table import Table
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
 from warpimpact.solver.refinement import Refining
@@ -43,7 +42,7 @@ class Team:
     Attributes:
         job: what is computed of every hit.
         pilot: finds the promise of the campaign in the background, None if it fixes the resolution itself.
-        submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Dataset
+        submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Table
             comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
@@ -54,7 +53,7 @@ class Team:
 
     job: HitMap
     pilot: Callable[[], Future[Any]]
-    submit: Callable[[Any, Shots, Shots | None], Future[xarray.Dataset]]
+    submit: Callable[[Any, Shots, Shots | None], Future[Table]]
     width: Callable[[], int]
     task: int
     made_by: dict[str, str]
@@ -92,7 +91,7 @@ def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Itera
             raise InterruptedError
         done[threading.get_ident()] = finished
 
-    def work(promise: Any, shots: Shots, solid: Shots | None) -> xarray.Dataset:
+    def work(promise: Any, shots: Shots, solid: Shots | None) -> Table:
         name = idle.get()
         try:
             return job.compute(
@@ -236,7 +235,7 @@ def _compute_alike(
     device: str,
     threads: int | None,
     kind: dict[str, str],
-) -> xarray.Dataset:
+) -> Table:
     """Compute shots on a worker that gives the same bits as the others."""
     own = made_by(device)
     if own != kind:

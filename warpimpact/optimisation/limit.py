@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -20,6 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, with_limits
 from warpimpact.results.measures import dealing
+from warpimpact.results.table import Table
 from warpimpact.scene import Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
@@ -38,6 +39,9 @@ from warpimpact.solver.limit_promise import PILOT, LimitPromise, keep_limits
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import Fidelity
 from warpimpact.statistics.intervals import Estimate, estimate_of
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
@@ -100,7 +104,7 @@ class LimitMap(HitMap):
         """The running estimates: the mean limit."""
         return (f"mean({v.LIMITS[self.quantity].value})",)
 
-    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> xarray.Dataset:
+    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> Table:
         """Search the limits of some shots. The Dataset is that of the shots as they just perforate, with their limits.
 
         Args:
@@ -152,7 +156,7 @@ class LimitMap(HitMap):
 
         return keep_limits(search, campaign.numerics, squared=self.quantity == "thickness")
 
-    def promise_in(self, dataset: xarray.Dataset) -> LimitPromise | None:
+    def promise_in(self, dataset: Result) -> LimitPromise | None:
         """The promise with which a result was computed."""
         told = dataset.attrs
         if attr.LIMIT_RESOLUTION not in told:

@@ -12,13 +12,16 @@ best                      the set of smallest misfit
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import netCDF4
-import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results.files import ResultError, aside
 from warpimpact.results.interrupts import uninterrupted
+
+if TYPE_CHECKING:
+    import xarray
 
 GROUPS = (
     "posterior",
@@ -86,6 +89,8 @@ def _loaded(path: Path) -> xarray.DataTree:
     Each is closed before the next one opens. A tree that stays open is closed when Python collects it, in the middle of
     another access, which crashes netCDF.
     """
+    import xarray
+
     with netCDF4.Dataset(path) as file:
         names = list(file.groups)
     groups = {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}
