@@ -191,6 +191,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     state,
                     pose,
                     reached,
+                    last,
                     (real(step) + half) * dt + skipped,
                     flight,
                     dt,
