@@ -2,6 +2,8 @@
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. So the load of one
 layer is the load of one plate (contact.load_on), and loads of layers add.
+
+Long because all of them read the same layers of the same slot.
 """
 
 from functools import cache
@@ -317,6 +319,23 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.max(zero, time - half * dt)
 
     @wp.func
+    def is_behind(passage: Passage, shot: wp.int32):
+        """Whether the core has left the plate through its rear face."""
+        return passages.has_left(passage, shot, 0)
+
+    @wp.func
+    def is_between(layers: Layers, shot: wp.int32, reached: Reached, x: real):
+        """Whether the whole core is in the target, and its centre of mass, at x [m], in none of the layers."""
+        between = reached.rearmost > zero
+        for k in range(layers.count):
+            front = own_of(layers.front, k, shot)
+            rear = front + own_of(layers.thickness, k, shot)
+            between = between and (x < front or x > rear)
+            if k == layers.count - 1:
+                between = between and reached.foremost < rear
+        return between
+
+    @wp.func
     def conclude(layers: Layers, passage: Passage, shot: wp.int32, status: wp.int32, reached: Reached):
         """Say how the core ended in the layers that it did not leave through their rear faces."""
         for k in range(layers.count):
@@ -343,6 +362,8 @@ def build(variant: Variant) -> SimpleNamespace:
         jump_of=jump_of,
         load_on=load_on,
         free_time=free_time,
+        is_behind=is_behind,
+        is_between=is_between,
         conclude=conclude,
         keep=keep,
     )

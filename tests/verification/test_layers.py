@@ -10,7 +10,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from warpimpact.kernels.status import LayerStatus, Status
-from warpimpact.scene import Layer, NoPattern, Plate, Target
+from warpimpact.scene import CirclePattern, Layer, NoPattern, Plate, Target
+from warpimpact.solver import arrays
 from warpimpact.solver.simulate import LayeredOutcomes, Outcomes
 
 from . import references
@@ -259,6 +260,31 @@ def test_ricochet_from_a_layer_is_that_of_the_target(device: str) -> None:
     assert (outcomes.layer_status[:, 1] == LayerStatus.RICOCHETED).all()
     assert (outcomes.stopped_in == -1).all()
     assert np.isnan(outcomes.depth).all()
+
+
+def test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there(device: str) -> None:
+    # What is left of its tumbling pushes it out. It would cross the gap, and rest behind the plate, after 2 to 20 ms.
+    base = layer(solid_plate(degradation=1.0, resistance=5e9), thickness=3e-3, gap=0.1)
+    shots = shots_at([2.276e-3, 5.628e-3], [4.13e-3, 6.856e-3])
+    outcomes = layered(paper_plate(), base, shots=shots, device=device, fidelity="standard")
+    assert (outcomes.status == Status.ARRESTED).all()
+    assert (outcomes.stopped_in == 1).all()
+    assert (outcomes.exit_position[:, 0] > 0.1).all()
+    assert (outcomes.contact_duration < 0.5e-3).all()
+
+
+def test_a_core_that_slides_between_two_layers_stays_in_the_target(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Through a wide hole, off the base at a small angle, and along the rear face of the plate, beside any hole.
+    monkeypatch.setattr(arrays, "STEP_ALLOWANCE", 3)
+    hole = CirclePattern(diameter=0.3, spacing=(1.0, 1.0))
+    front = paper_plate(thickness=10e-3, degradation=1.0, shear_coefficient=0.0, pattern=hole, degradation_length=5e-3)
+    base = Layer(thickness=40e-3, resistance=2e9, gap=0.2)
+    shots = shots_at([-0.1, 0.05], [0.0, 2e-3], obliquity=75.0)
+    outcomes = layered(front, base, shots=shots, device=device, fidelity="draft")
+    assert (outcomes.status == Status.ARRESTED).all()
+    assert (outcomes.stopped_in == -1).all()
+    assert (outcomes.layer_status == [LayerStatus.MISSED, LayerStatus.RICOCHETED]).all()
+    assert np.abs(outcomes.exit_position[:, 1]).min() > 1.0
 
 
 def test_a_layer_tells_how_the_computation_failed_in_it(device: str) -> None:
