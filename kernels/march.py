@@ -92,6 +92,7 @@ def build(variant: Variant) -> SimpleNamespace:
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, pose.axis))
         leaving = wp.abs(state.velocity[0])
         beyond = wp.max(state.position[0] - thickness, -state.position[0])
+        rest = wp.where(behind and state.velocity[0] < zero, spent, still)
         gone = leaving > turning or beyond > surface.bounding_radius
         if not wp.isfinite(energy):
             status = NOT_FINITE
@@ -101,9 +102,7 @@ def build(variant: Variant) -> SimpleNamespace:
             status = wp.where(touched, PERFORATED, MISSED)
         elif found.back and state.velocity[0] < zero and gone:
             status = wp.where(touched, RICOCHETED, MISSED)
-        elif touched and energy - about_axis < still * initial_energy:
-            status = ARRESTED
-        elif behind and state.velocity[0] < zero and energy - about_axis < spent * initial_energy:
+        elif touched and energy - about_axis < rest * initial_energy:
             status = ARRESTED
         elif not found.inside:
             status = LEFT_WINDOW

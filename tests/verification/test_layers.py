@@ -273,7 +273,7 @@ def test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there(devi
     assert (outcomes.contact_duration < 0.5e-3).all()
 
 
-def test_a_core_that_slides_between_two_layers_stays_in_the_target(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_core_that_slides_between_layers_stays_there(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Through a wide hole, off the base at a small angle, and along the rear face of the plate, beside any hole.
     monkeypatch.setattr(arrays, "STEP_ALLOWANCE", 3)
     hole = CirclePattern(diameter=0.3, spacing=(1.0, 1.0))
