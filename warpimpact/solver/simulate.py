@@ -99,7 +99,8 @@ class LayeredOutcomes(Outcomes):
         layer_residual_velocity: speed at that instant [m/s], shape [shots, layers].
         layer_tilt: angle between core axis and line of fire at that instant [rad], shape [shots, layers].
         layer_time: that instant, from the first touch of the front face on [s], shape [shots, layers].
-        stopped_in: the deepest layer that the core rests in, −1 for a core that does not rest in one, shape [shots].
+        stopped_in: the deepest layer that the core rests in, shape [shots]; −1 for a core that does not rest in one,
+            such as one that stays between two of them.
         depth: how far behind the front face of this layer any point of the core came [m], shape [shots]; else NaN.
     """
 
