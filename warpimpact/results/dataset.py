@@ -77,7 +77,13 @@ def to_dataset(
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
     values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
-    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *v.LAYER_VARIABLES)
+    of_layers: tuple[v.Variable, ...] = v.LAYER_VARIABLES
+    along: tuple[v.Variable, ...] = (*v.COORDINATES, *v.OUTLINE_VARIABLES)
+    if scene.target.layers and scene.record.layer_standoffs:
+        of_layers = (*of_layers, *v.LAYER_STANDOFF_VARIABLES)
+        along = (*along, *v.LAYER_COORDINATES)
+        coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
+    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *of_layers)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
     values |= _of_layers(scene, shots)
     if v.EXIT_POSITION in values:
@@ -85,7 +91,7 @@ def to_dataset(
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
     told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
-    optional = (*told, *v.LAYER_VARIABLES, *v.LAYER_FACES)
+    optional = (*told, *of_layers, *v.LAYER_FACES)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES
@@ -96,7 +102,7 @@ def to_dataset(
         described |= _in_single(described, (*ended, *v.ESTIMATE_VARIABLES))
     return xarray.Dataset(
         described,
-        _described((*v.COORDINATES, *v.OUTLINE_VARIABLES), coordinates),
+        _described(along, coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
