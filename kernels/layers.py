@@ -38,7 +38,8 @@ def build(variant: Variant) -> SimpleNamespace:
         origin in the plane of the plate [m]. These, `thickness` [m] and the members of Law have one value for all shots
         or one per shot: shape [layers, 1] or [layers, shots]. Those layers that a step can touch add their
         `onset_jump`, up to `most_jump`, as if they were one plate. `weakens` says whether the layer keeps a field, in a
-        window of cells_y × cells_z nodes from number `first` of its slot's `nodes` on.
+        window of cells_y × cells_z nodes from number `first` of its slot's `nodes` on. `standoffs` are distances behind
+        the rear face of every layer [m], which the point `ahead` of the centre of mass passes [m].
         """
 
         count: wp.int32
@@ -50,6 +51,8 @@ def build(variant: Variant) -> SimpleNamespace:
         cells_y: wp.array(dtype=wp.int32)
         cells_z: wp.array(dtype=wp.int32)
         nodes: wp.int32
+        standoffs: wp.array(dtype=real)
+        ahead: real
         front: wp.array2d(dtype=wp.float64)
         thickness: wp.array2d(dtype=wp.float64)
         offset_y: wp.array2d(dtype=wp.float64)
@@ -235,6 +238,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 if before.first != k or before.last != k:  # other layers slow the core down while it leaves this one
                     speed = wp.length(pose.velocity - (since / dt) * last.velocity)
                 passages.leave(passage, body, shot, k, state, speed, since, time, flight)
+                passages.fly_on(passage, body, layers.standoffs, layers.ahead, shot, k, state, rear, flight)
             stack.near[here] = near
         return found, reached
 

@@ -340,7 +340,11 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _standoffs_clear_of_plate(self) -> Self:
-        self.output.check_standoffs(self.core)
+        if self.output.layer_standoffs and not self.layer:
+            raise ValueError(
+                "got output.layer_standoffs without [[layer]], but behind a plate alone output.standoffs count"
+            )
+        self.output.check_standoffs(self.core, self.target)
         return self
 
     @model_validator(mode="after")

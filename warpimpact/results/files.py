@@ -239,6 +239,7 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 *v.BURST_VARIABLES,
                 *v.ESTIMATE_VARIABLES,
                 *v.LAYER_VARIABLES,
+                *v.LAYER_STANDOFF_VARIABLES,
                 *v.LAYER_FACES,
             )
             _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))

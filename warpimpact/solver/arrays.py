@@ -65,6 +65,8 @@ class Arrays:
         onset: κ of the law.
         shots: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         rows: of the trace of each shot; 0 for none.
+        layer_standoffs: distances behind the rear face of every layer [m].
+        ahead: of the centre of mass, the point that passes stand-offs [m].
     """
 
     resolution: Resolution
@@ -78,6 +80,8 @@ class Arrays:
     onset: float
     shots: dict[str, Array]
     rows: int
+    layer_standoffs: Array
+    ahead: float
 
     @property
     def grid(self) -> Grid:
@@ -113,8 +117,8 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         ValueError: the numerics have no bending moment, which the scene records.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
-    core, target = scene.core, scene.target
-    check_bending(scene.record, numerics)
+    core, target, record = scene.core, scene.target, scene.record
+    check_bending(record, numerics)
     resolution = resolve(numerics, scene, shots.columns)
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
@@ -126,7 +130,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         core=core,
         rings=rings,
         azimuths=azimuths_of(around),
-        sections=sections_of(core, rings) if scene.record.bending else None,
+        sections=sections_of(core, rings) if record.bending else None,
         grids=[
             _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length)
             for plate in target.plates
@@ -135,6 +139,8 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         onset=scene.interaction.onset,
         shots=conditions,
         rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
+        layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
+        ahead=record.ahead(core),
     )
 
 

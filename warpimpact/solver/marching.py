@@ -83,7 +83,8 @@ class March:
         self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
-        self.passages = Passages(self.stage, len(shots), len(self.inputs.plates), self.variant, device)
+        free = scene.record.flies_free(scene.core, scene.target)
+        self.passages = Passages(self.stage, len(shots), free, self.variant, device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -155,11 +156,10 @@ class March:
         count, record = len(self.shots), self.scene.record
         flight, standoffs = free_flight.build(self.variant), np.array(record.standoffs, dtype=np.float64)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
-        ahead = self.scene.core.mass_properties.centre_of_mass if record.standoff_point == "nose" else 0.0
         wp.launch(
             flight.kernel,
             count,
-            inputs=[self.inputs.shots, contact, self.inputs.put(standoffs, wp.float64), ahead],
+            inputs=[self.inputs.shots, contact, self.inputs.put(standoffs, wp.float64), self.arrays.ahead],
             outputs=[report],
             device=self.device,
         )

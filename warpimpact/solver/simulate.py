@@ -99,6 +99,11 @@ class LayeredOutcomes(Outcomes):
         layer_residual_velocity: speed at that instant [m/s], shape [shots, layers].
         layer_tilt: angle between core axis and line of fire at that instant [rad], shape [shots, layers].
         layer_time: that instant, from the first touch of the front face on [s], shape [shots, layers].
+        layer_deflection: angle between the velocity at that instant and the line of fire [rad], shape [shots, layers].
+        layer_standoff_tilt: angle between core axis and line of fire at the stand-offs behind each layer [rad], shape
+            [shots, layers, stand-offs]. NaN where the core does not get there, or where free flight ends at the next
+            layer (`Record.flies_free`).
+        layer_standoff_pitch, layer_standoff_yaw: projected angles of the axis there [rad], of that shape.
         stopped_in: the deepest layer that the core rests in, shape [shots]; −1 for a core that does not rest in one,
             such as one that stays between two of them.
         depth: how far behind the front face of this layer any point of the core came [m], shape [shots]; else NaN.
@@ -108,6 +113,10 @@ class LayeredOutcomes(Outcomes):
     layer_residual_velocity: Array
     layer_tilt: Array
     layer_time: Array
+    layer_deflection: Array
+    layer_standoff_tilt: Array
+    layer_standoff_pitch: Array
+    layer_standoff_yaw: Array
     stopped_in: NDArray[np.int8]
     depth: Array
 
