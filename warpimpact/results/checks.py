@@ -58,7 +58,7 @@ _WHOLE = (
 _OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)
 """Attributes of a study."""
 _DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
-_OF_A_POSTERIOR = {
+_OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "posterior": {"hit_y": _DRAWS + _SHOTS, "hit_z": _DRAWS + _SHOTS},
     "best": {"misfit": _SHOTS, "hit_y": _SHOTS, "hit_z": _SHOTS},
     "observed_data": {"measured": _OBSERVED, "std": _OBSERVED},
