@@ -14,6 +14,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the passage through the layers for one variant."""
     real, vec3 = variant.real, variant.vec3
+    one = real(1.0)
     motion = rigid_body.build(variant)
     Body, State = motion.Body, motion.State
     ARRESTED, RICOCHETED, UNFINISHED = (
