@@ -5,10 +5,23 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import bending, contact, core_surface, damping, footprint, interaction, layers, nodal, plate_grid, rigid_body
+from . import (
+    bending,
+    block,
+    contact,
+    core_surface,
+    damping,
+    footprint,
+    interaction,
+    layers,
+    nodal,
+    plate_grid,
+    rigid_body,
+)
 from . import earlier as earlier_hits
 from . import shots as conditions
 from . import trace as tracing
+from .lanes import BLOCKS, LANES
 from .status import Status
 from .variant import Variant
 
@@ -25,7 +38,7 @@ def build(variant: Variant) -> SimpleNamespace:
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
     stacked, hits = layers.build(variant), earlier_hits.build(variant)
-    scheme = (nodal if variant.nodal else contact).build(variant)
+    scheme = (nodal if variant.nodal else block if variant.window else contact).build(variant)
     Surface, Pose, Plate, Law = surfaces.Surface, surfaces.Pose, grid.Plate, laws.Law
     Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Fields, Footprint, Touches = scheme.Fields, prints.Footprint, contact.build(variant).Touches
@@ -131,7 +144,8 @@ def build(variant: Variant) -> SimpleNamespace:
         bending: wp.array(dtype=Bending),
         trace: wp.array2d(dtype=real),
     ):
-        """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots.
+        """March one shot per thread, or per block of threads: number k computes shot order[first + k] in slot k mod
+        slots.
 
         Shots at one plate are numbered in a row, and are computed one after another in one slot.
         """
@@ -155,6 +169,8 @@ def build(variant: Variant) -> SimpleNamespace:
             farthest = real(pace.longest_way) + wp.length(vec3(zero, flight[1], flight[2])) / flight[0] * thickness
         else:
             hit_y, hit_z = own(shots.hit_y, shot), own(shots.hit_z, shot)
+            if wp.static(variant.window > 0):
+                fields = scheme.own_fields(fields, slot)
             window = scheme.open_window(plate, thickness, fields, slot, hit_y, hit_z)
             if wp.static(variant.burst):
                 hits.recall(earlier, fields, plate, window, slot, 0, shot, hit_y, hit_z)
@@ -265,6 +281,9 @@ def build(variant: Variant) -> SimpleNamespace:
             else:
                 hits.keep(earlier, fields, window, slot, shot)
         axis = motion.axis_of(state.attitude)
+        if wp.static(variant.window > 0):
+            if scheme.lane() > 0:  # all lanes know the outcome
+                return
         outcomes.status[shot] = status
         outcomes.steps[shot] = step
         outcomes.contact_duration[shot] = real(contact_steps) * dt
@@ -280,7 +299,7 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes.angular_momentum[shot] = state.angular_momentum
 
     return SimpleNamespace(
-        kernel=variant.kernel(march),
+        kernel=variant.kernel(march, (LANES, BLOCKS) if variant.window else None),
         Surface=Surface,
         Sections=Sections,
         Bending=Bending,

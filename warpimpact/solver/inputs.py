@@ -134,7 +134,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.period_y, plate.period_z = grid.period
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
-    plate.taps, plate.reach = put(grid.taps), max(1, len(grid.taps) - 2)
+    plate.taps, plate.reach = put(grid.taps), grid.reach
     return plate
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight
 from warpimpact.kernels import march as marching
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.arrays import variant_of
+from warpimpact.solver.arrays import arrays_of, variant_of
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import March, Progress
@@ -187,6 +187,8 @@ def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
     """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
     resolution = resolve(numerics or Numerics(), scene, shots.columns)
     variant = variant_of(resolution, scene, shots)
+    if resolution.block:  # the window is a part of this variant
+        variant = arrays_of(scene, numerics or Numerics(), shots).variant
     for stage in (marching, free_flight):
         load(stage.build(variant).kernel, find_device(device))
 
