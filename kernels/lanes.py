@@ -127,7 +127,9 @@ def build(variant: Variant) -> SimpleNamespace:
             return wp::array_t<{kind}>(field.data + slot * nodes, nodes);
         #endif
         """)
-        def place(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real): ...
+        def place(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real):
+            """A block's own nodes of one field."""
+            ...
 
         return place
 
