@@ -15,9 +15,10 @@ Where the barriers stand, and what would go wrong without each of them (E is the
 6. After `settle`: the next step adds to nodes of G that other lanes clear.
 7. After the window is cleared (`open_window`), as after 6.
 
-Touches need none: a patch belongs to one lane in both passes. `settle` needs none before it for G: it goes over the
-same nodes, in the same lanes, as the second direction of the filter. All conditions around barriers hold for all lanes
-alike, since they follow from sums over the lanes or from the state.
+Butterflies stand between the passes and 5, and between the steps. They make lanes wait, but order no memory: hence 5, 6
+and 7. Touches need no barrier: a patch belongs to one lane in both passes. Nor does `settle` need one before it for G:
+it goes over the same nodes, in the same lanes, as the second direction of the filter. All conditions around barriers
+hold for all lanes alike, since they follow from sums over the lanes or from the state.
 """
 
 from functools import cache
