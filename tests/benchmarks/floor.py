@@ -94,10 +94,10 @@ def contacts(
 _LOOP = """
     typedef float lanes __attribute__((vector_size(64)));  // as many registers as the processor needs for it
     lanes sums[12];
-    for (int k = 0; k < 12; ++k) sums[k] = (lanes){} + 1.0f * k;
-    const lanes factor = (lanes){} + 0.999f, more = (lanes){} + 0.001f;
+    for (int k = 0; k < 12; ++k) sums[k] = (lanes){} + 0.01f * k;
+    // The square keeps a compiler from joining two turns into one; the sums stay between -0.5 and 0.5.
     for (int turn = 0; turn < turns; ++turn)
-        for (int k = 0; k < 12; ++k) sums[k] = sums[k] * factor + more;
+        for (int k = 0; k < 12; ++k) sums[k] = sums[k] * sums[k] - 0.4f;
     float total = 0.0f;
     for (int k = 0; k < 12; ++k) for (int lane = 0; lane < 16; ++lane) total += sums[k][lane];
     return total;

@@ -212,8 +212,7 @@ class March:
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        areas = size * (LANES if self.variant.window else 1)
-        per_ring: int = areas + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings: int = self.inputs.surface.rings * per_ring
         nodes = self._nodes(cells_y, cells_z)
         earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
@@ -256,7 +255,7 @@ class March:
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         rings = slots * self.inputs.surface.rings
-        touches.ring_area = empty(rings * (LANES if self.variant.window else 1))
+        touches.ring_area = empty(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)
