@@ -4,7 +4,8 @@ energy that grows in no step, a unit quaternion, and an end.
 The envelope: speeds 1 to 5000 m/s, Y 0 to 1e12 Pa, β 0 and 1 included, Δt_β 1 ns to 1 s or Δs_β 1 nm to 10 m, η 0 to
 10, κ 0 to 10, thickness 0.1 to 200 mm, obliquity 0 to 89°, any attitude, spin ±1e5 rad/s, cores of 1 to 100 mm from
 needle to disc, of 1 to 1e5 kg/m³, with moments of inertia of a tenth to ten times those of their shape, holes from
-hairline to wider than the core, finite plates hit at the rim, hits 10 m away from the origin, both precisions.
+hairline to wider than the core, finite plates hit at the rim, hits 10 m away from the origin, both precisions; behind
+half of the plates up to three more, laminated or up to a metre behind.
 """
 
 import math
@@ -21,6 +22,7 @@ from warpimpact.scene import (
     CirclePattern,
     Core,
     Interaction,
+    Layer,
     NoPattern,
     Numerics,
     Plate,
@@ -29,6 +31,7 @@ from warpimpact.scene import (
     Scene,
     Shots,
     SlotPattern,
+    Target,
 )
 from warpimpact.scene.core import MassProperties
 from warpimpact.solver.device import find_device
@@ -93,16 +96,16 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
     swept = core.bounding_radius + core.max_radius / math.cos(steep) + thickness * math.tan(steep)
     interval, distance = draw.spread(1e-9, 1.0), draw.spread(1e-9, 10.0)
     by_time = {"degradation_interval": interval}
-    plate = Plate(
-        thickness=thickness,
-        resistance=draw.one_of(0.0, *[draw.spread(1e3, 1e12)] * 7),
-        shear_coefficient=draw.one_of(0.0, draw.spread(1e-3, 10.0)),
-        degradation=draw.one_of(0.0, 0.8, 1.0, 1.0, draw.between(0.0, 1.0), draw.spread(1e-30, 1.0)),
-        degradation_length=max(diameter * draw.spread(0.05, 1.0), swept / WIDEST),
-        pattern=_pattern(draw, diameter),
-        size=None if side is None else (side, side),
+    plate: dict[str, Any] = {
+        "thickness": thickness,
+        "resistance": draw.one_of(0.0, *[draw.spread(1e3, 1e12)] * 7),
+        "shear_coefficient": draw.one_of(0.0, draw.spread(1e-3, 10.0)),
+        "degradation": draw.one_of(0.0, 0.8, 1.0, 1.0, draw.between(0.0, 1.0), draw.spread(1e-30, 1.0)),
+        "degradation_length": max(diameter * draw.spread(0.05, 1.0), swept / WIDEST),
+        "pattern": _pattern(draw, diameter),
+        "size": None if side is None else (side, side),
         **draw.one_of(by_time, by_time, {"degradation_distance": distance}),
-    )
+    }
     interaction = Interaction(
         linear=draw.one_of(0.0, 0.0, 1.0),
         quadratic=draw.one_of(0.0, 0.0, 1.0),
@@ -121,8 +124,12 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
         yaw=[draw.between(-89.9, 89.9) - flight[1] for _ in range(hits)],
         spin=draw.one_of(0.0, -1e5, 1e5, draw.between(-1e5, 1e5)),
     )
-    scene = Scene(core=core, target=plate, interaction=interaction, record=Record(standoffs=(1.0,)))
-    return Extreme(scene, shots, draw.one_of("single", "single", "single", "double"))
+    precision = draw.one_of("single", "single", "single", "double")
+    layers = tuple(_layer(draw, plate) for _ in range(draw.one_of(0, 0, 0, 1, 2, 3)))
+    target = Target(plate=Plate(**plate), layers=layers)
+    return Extreme(
+        Scene(core=core, target=target, interaction=interaction, record=Record(standoffs=(1.0,))), shots, precision
+    )
 
 
 def found(extreme: Extreme) -> Found:
@@ -236,3 +243,18 @@ def _pattern(draw: _Draw, diameter: float) -> AnyPattern:
 def _sine(angle: float) -> float:
     """Of an angle in degrees."""
     return math.sin(math.radians(angle))
+
+
+def _layer(draw: _Draw, plate: dict[str, Any]) -> Layer:
+    """A plate behind one with these values, weaker or stronger; another pattern of holes may be in it, or none."""
+    return Layer(
+        **plate
+        | {
+            "gap": draw.one_of(0.0, draw.spread(1e-6, 1.0)),
+            "thickness": min(0.2, plate["thickness"] * draw.spread(0.1, 10.0)),
+            "resistance": plate["resistance"] * draw.spread(0.1, 10.0),
+            "degradation": draw.one_of(plate["degradation"], 1.0),
+            "pattern": draw.one_of(plate["pattern"], NoPattern()),
+            "offset": (draw.spread(1e-4, 0.1), 0.0),
+        }
+    )

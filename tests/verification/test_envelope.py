@@ -9,7 +9,7 @@ from warpimpact.kernels.status import Status
 
 from .extremes import MOST_RISE, MOST_STRETCH, drawn, found
 
-SHARES = st.lists(st.floats(0.0, 1.0), min_size=60, max_size=60)  # more than a scene of two hits takes
+SHARES = st.lists(st.floats(0.0, 1.0), min_size=90, max_size=90)  # more than a scene of two hits takes
 
 
 @settings(max_examples=40, deadline=None, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
