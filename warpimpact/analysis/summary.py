@@ -76,7 +76,7 @@ def promise_text(dataset: Result) -> str | None:
     found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg{depth}"
     if told[attr.PROMISE_KEPT]:
         return f"{given['fidelity']} keeps its promise ({stated}); {found}"
-    return f"{given['fidelity']} does not keep its promise ({stated}) at the finest level it may use; {found}"
+    return f"{given['fidelity']} does not keep its promise ({stated}) at the level that it may use; {found}"
 
 
 def summary(dataset: Result) -> Summary:

@@ -31,11 +31,12 @@ are enough shots for that."""
 MARGIN = {1: 2.0, 2: 1.4}
 """Factor of an estimate by the number of levels to the finer one. In 40 random scenes, 83 to 98 % of the
 estimates are then at least the 90th percentile that other hits show (tests/benchmarks/random_scenes.py)."""
-
-
 SLOW = 0.25
-"""Share of the impact velocity below which an error counts less, in proportion to the speed. The energy is computed to
-some accuracy, E = m v²/2, so the error of a speed near 0 has no bound. As it counts, it is that of the energy."""
+"""Share of the impact velocity below which the error of a speed is weighed as that of the energy, E = m v²/2: in
+proportion to the speed. The energy is computed to some accuracy, so the error of a speed near 0 has no bound."""
+BEYOND = 1
+"""Levels behind the first one whose weighed errors are within a promise, on which the plain ones are looked for: each
+costs about twice the one before."""
 
 
 class Named(NamedTuple):
@@ -63,8 +64,7 @@ class Promise:
         fidelity: the numerics to compute all shots with.
         kept: whether the errors are within what the name promises.
         residual_velocity_error, tilt_error: upper estimates of the errors of 90 % of the shots [m/s] and [rad];
-            infinite where the pilot could not tell. Those of slow cores count less (SLOW). The residual velocities
-            behind all layers count.
+            infinite where the pilot could not tell. The residual velocities behind all layers count.
         depth_error: likewise, of the depth of the shots that stop in a layer [m]; NaN where none does.
     """
 
@@ -95,7 +95,8 @@ def keep(
         progress: called with (0, shots) while a level is computed; an exception that it raises ends the search.
 
     Returns:
-        The promise, kept; or if no level keeps it, the finest level that has a finer one to compare with.
+        The promise, kept. If no level keeps it: the coarsest level that keeps it with errors weighed by the energy of
+        slow cores, where finer ones would be of little use. Else the finest level that has a finer one to compare with.
 
     Raises:
         DeviceError: the device is absent.
@@ -104,7 +105,11 @@ def keep(
     known: dict[int, Outcomes] = {}
     follow = progress and (lambda _, total: progress(0, total))
     found = Promise(level(first, numerics), False, math.inf, math.inf)
+    enough: Promise | None = None
+    last = len(LADDER) - 2
     for index in range(first, len(LADDER) - 1):
+        if index > last:
+            break
         finer = min(index + 2, len(LADDER) - 1)
         try:
             for needed in (index, finer):
@@ -114,51 +119,61 @@ def keep(
                     )
         except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
             break
-        errors = MARGIN[finer - index] * _errors(known[index], known[finer], pilot.velocity)
-        kept = errors[0] <= tolerance.residual_velocity and errors[1] <= tolerance.tilt
-        found = Promise(level(index, numerics), bool(kept), *(float(error) for error in errors))
-        told = (index, float(errors[0]), math.degrees(errors[1]), "kept" if kept else "not kept")
+        pair, margin = (known[index], known[finer]), MARGIN[finer - index]
+        plain, weighed = (margin * _errors(*pair, pilot.at_a_plate, impact) for impact in (None, pilot.velocity))
+        kept = _within(tolerance, plain)
+        found = Promise(level(index, numerics), kept, *(float(error) for error in plain))
+        told = (index, float(plain[0]), math.degrees(plain[1]), "kept" if kept else "not kept")
         _logger.info("pilot at level %d: errors of %.2g m/s and %.2g deg, the promise is %s", *told)
         if kept:
-            break
-    return found
+            return found
+        if enough is None and _within(tolerance, weighed):
+            enough, last = found, min(last, index + BEYOND)
+    return enough or found
 
 
-def _errors(coarse: Outcomes, fine: Outcomes, impact: Array) -> Array:
+def _within(tolerance: Tolerance, errors: Array) -> bool:
+    return bool(errors[0] <= tolerance.residual_velocity and errors[1] <= tolerance.tilt)
+
+
+def _errors(coarse: Outcomes, fine: Outcomes, at_a_plate: int, impact: Array | None) -> Array:
     """Changes of residual velocity [m/s], last tilt [rad] and depth [m] that 90 % of all shots stay within, but for
     RISK. NaN if there is no depth."""
     velocity, tilt, depth = changes(coarse, fine, impact)
     depth = depth[np.isfinite(depth)]
-    return np.array([_upper(errors) if len(errors) else math.nan for errors in (velocity, tilt, depth)])
+    return np.array([_upper(errors, at_a_plate) if len(errors) else math.nan for errors in (velocity, tilt, depth)])
 
 
-def _upper(errors: Array) -> float:
-    return float(np.sort(errors)[upper_place(len(errors)) - 1])
+def _upper(errors: Array, at_a_plate: int) -> float:
+    """Shots at one plate err alike, so they count as one in what is known of the 90th percentile."""
+    plates = max(1, len(errors) // at_a_plate)
+    place = math.ceil(len(errors) * upper_place(plates) / plates)
+    return float(np.sort(errors)[place - 1])
 
 
-def changes(coarse: Outcomes, fine: Outcomes, impact: Array) -> tuple[Array, Array, Array]:
-    """What changes between the outcomes of the same shots as it counts, each of shape [shots]: the residual velocity
-    [m/s], or that behind a layer if it changes by more; the tilt at the last stand-off [rad]; and the depth [m].
+def changes(coarse: Outcomes, fine: Outcomes, impact: Array | None = None) -> tuple[Array, Array, Array]:
+    """What changes between the outcomes of the same shots, each of shape [shots]: the residual velocity [m/s], or that
+    behind a layer if it changes by more; the tilt at the last stand-off [rad]; and the depth [m].
 
     A core that does not leave the target, or a layer, has the speed 0 there; one that comes back has a negative one. A
     tilt that only one of both has counts as half a turn. The first two are infinite where the computation of one alone
     failed. The depth is NaN where the core does not stop in the same layer.
 
     Args:
-        impact: velocities [m/s], shape [shots].
+        impact: velocities [m/s], shape [shots], to weigh the first two by the energy of slow cores (SLOW).
     """
     before, after = _speed(coarse), _speed(fine)
     weight = _weight(before, after, impact)
     failed = [one.status >= Status.UNFINISHED for one in (coarse, fine)]
-    velocity, tilt = weight * np.abs(after - before), np.zeros(len(impact))
+    velocity, tilt = weight * np.abs(after - before), np.zeros(len(before))
     if coarse.tilt.shape[1]:
         last = coarse.tilt[:, -1], fine.tilt[:, -1]
         neither = np.isnan(last[0]) & np.isnan(last[1])
         tilt = np.where(neither, 0.0, weight * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
-    depth = np.full(len(impact), math.nan)
+    depth = np.full(len(velocity), math.nan)
     if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
         before, after = (np.nan_to_num(one.layer_residual_velocity) for one in (coarse, fine))
-        apart = _weight(before, after, impact[:, None]) * np.abs(after - before)
+        apart = _weight(before, after, None if impact is None else impact[:, None]) * np.abs(after - before)
         velocity = np.maximum(velocity, apart.max(axis=1))
         depth = np.where(coarse.stopped_in == fine.stopped_in, np.abs(fine.depth - coarse.depth), math.nan)
     one_failed = failed[0] != failed[1]
@@ -170,8 +185,10 @@ def _speed(outcomes: Outcomes) -> Array:
     return np.nan_to_num(np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity))
 
 
-def _weight(one: Array, other: Array, impact: Array) -> Array:
+def _weight(one: Array, other: Array, impact: Array | None) -> Array:
     """What an error between two speeds counts."""
+    if impact is None:
+        return np.ones_like(one)
     return np.asarray(np.minimum(1.0, 0.5 * (np.abs(one) + np.abs(other)) / (SLOW * impact)))
 
 
