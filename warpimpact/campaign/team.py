@@ -219,11 +219,10 @@ def _lost(address: str, error: BaseException) -> ClusterError:
 def _ignoring_interrupts(plugin: Any) -> Any:
     """Plugin of workers on this machine, which Ctrl-C reaches, too: this process is the one that ends them."""
 
-    class Ignoring(plugin):  # type: ignore[misc]  # imported with Dask only
-        def setup(self, worker: Any) -> None:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
+    def setup(self: Any, worker: Any) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    return Ignoring()
+    return type("Ignoring", (plugin,), {"setup": setup})()
 
 
 def _compute_alike(
