@@ -130,7 +130,8 @@ def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
 @pytest.mark.parametrize("axial", [64, 512, 4096])
 def test_rings_take_work_in_proportion(axial: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """No signal is served while a core is divided, so this must stay short: some points of the profile per ring, and
-    those of the search for the widest station and of the mass. Measured: 0.1 s for 6241 rings of a profile with 20,000 points."""
+    those of the search for the widest station and of the mass. Measured: 0.1 s for 6241 rings of a profile with 20,000
+    points."""
     station = np.linspace(0.0, 27e-3, 20_000)
     radius = 3e-3 * np.minimum(1.0, station / 10e-3) + 1e-5 * (np.arange(20_000) % 2)
     core = ProfileCore(s=tuple(station), r=tuple(radius), density=7850.0)
