@@ -3,7 +3,7 @@ PYTHON ?= python3
 INSTALLED := $(VENV)/.installed
 PARALLEL := --numprocesses auto --dist worksteal
 
-.PHONY: demo gallery docs test clean
+.PHONY: demo gallery docs test benchmark clean
 
 demo: $(INSTALLED)
 	$(VENV)/bin/warpimpact run campaigns/slotted_plate.toml -o slotted.nc --overwrite
@@ -11,6 +11,11 @@ demo: $(INSTALLED)
 
 gallery: $(INSTALLED)
 	$(VENV)/bin/python campaigns/gallery.py
+
+# Figures of docs/benchmarks.md; on a quiet machine, some 10 minutes on two cores.
+benchmark: $(INSTALLED)
+	$(VENV)/bin/pip install --quiet --editable '.[bench]'
+	$(VENV)/bin/python tests/benchmarks/page.py all
 
 # Pages in build/docs/index.html; tutorials are executed, examples in pages checked. A warning is an error.
 docs: $(INSTALLED)

@@ -24,6 +24,7 @@ extensions = [
     "sphinx.ext.doctest",
     "sphinx.ext.mathjax",
     "from_the_code",
+    "from_the_benchmarks",
 ]
 exclude_patterns = ["_build", "_ext"]
 nitpicky = False

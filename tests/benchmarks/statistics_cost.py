@@ -9,13 +9,13 @@ python tests/benchmarks/statistics_cost.py [CAMPAIGN.toml ...] [--seeds N] [--hi
 
 import argparse
 import json
-import platform
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bench import CHECKOUT, machine
 from numpy.typing import NDArray
 
 from warpimpact import Campaign, make_shots
@@ -28,7 +28,7 @@ from warpimpact.statistics.worst_tenth import worst_tenth
 
 Array = NDArray[np.float64]
 
-CAMPAIGNS = [f"campaigns/{name}.toml" for name in ("slotted_plate", "round_holes", "oblique_shot")]
+CAMPAIGNS = [CHECKOUT / "campaigns" / f"{name}.toml" for name in ("slotted_plate", "round_holes", "oblique_shot")]
 REPLICATES = 16
 FEWEST = 8
 """Fewest hits of a replicate at which a half width is looked at."""
@@ -178,8 +178,10 @@ def main() -> None:
                 unit = "" if "per" in way else " ms of processor time"
                 print(f"    {way:45} {cost if not unit else 1e3 * cost:9.4g}{unit}")
     if asked.output:
-        about = {"machine": platform.processor() or platform.machine(), "seeds": asked.seeds, "hits": asked.hits}
-        asked.output.write_text(json.dumps(about | {"cost": tables}, indent=1))
+        about = {"machine": machine(), "seeds": asked.seeds, "hits": asked.hits}
+        asked.output.write_text(
+            json.dumps(about | {"cost": tables}, indent=1, ensure_ascii=False) + "\n", encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from warpimpact.cli import parser
 from warpimpact.results import variables
 
 DOCS = Path(__file__).parents[2] / "docs"
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
 
 def build(builder: str, folder: Path, *options: str) -> None:
@@ -94,3 +95,15 @@ def test_examples_in_pages_are_right(tmp_path: Path) -> None:
     found = re.search(r"(\d+) tests?\n *0 failures in tests", (tmp_path / "output.txt").read_text(encoding="utf-8"))
     assert found
     assert int(found[1]) >= 5
+
+
+def test_the_benchmark_page_says_what_the_results_say(pages: Path) -> None:
+    import page
+
+    shown = re.sub(r"\s+", " ", text(pages / "benchmarks.html"))
+    told = list(page.rows(page.results()))
+    assert len(told) > 20
+    for cell in {cell for row in told for cell in row}:
+        assert cell.replace("`", "") in shown
+    for sentence in page.machines(page.results()):
+        assert sentence.replace("`", "") in shown

@@ -17,6 +17,7 @@ from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.reading import fit_from
 from warpimpact.results import posterior as files
+from warpimpact.scene.distributions import Continuous
 
 ROUNDS, SETS, HITS, KEPT = 10, 24, 2048, 6
 
@@ -59,7 +60,8 @@ def main() -> None:
     shares = []
     for one in fit.parameters:
         values = sets[one.name].values
-        shares.append(one.prior._frozen().cdf(np.radians(values) if one.unit == "rad" else values))  # type: ignore[attr-defined]
+        assert isinstance(one.prior, Continuous)
+        shares.append(one.prior._frozen().cdf(np.radians(values) if one.unit == "rad" else values))
     points = ndtri(np.clip(np.stack(shares, axis=-1), 1e-9, 1.0 - 1e-9))
     refined(fit, points, sets["misfit"].values.sum(axis=1))
 

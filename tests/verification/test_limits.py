@@ -56,7 +56,7 @@ def test_limit_thickness_and_limit_velocity_are_one_limit() -> None:
     assert (thick.value < thick.upper).all()
 
 
-# m v dv/dX = −(F0 + F2 v²): the impact velocity of which nothing is left. Measured: within 0.3 m/s.
+# m v dv/dX = −(F0 + F2 v²): the impact velocity of which nothing is left. Measured: off by 0.02 and 0.002 m/s.
 @pytest.mark.parametrize("shear_coefficient", [0.0, 0.05])
 def test_limit_velocity_of_poncelets_law(shear_coefficient: float) -> None:
     core = ConeCore(diameter=6e-3, length=25e-3, cone_length=10e-3, mass=4e-3)
@@ -74,7 +74,7 @@ def test_limit_velocity_of_poncelets_law(shear_coefficient: float) -> None:
     expected = brentq(left, 300.0, 800.0, xtol=0.01)
     plate = solid_plate(thickness=12e-3, resistance=1.2e9, shear_coefficient=shear_coefficient, degradation=1.0)
     law = Interaction(static=1.0, quadratic=1.0)
-    assert found(plate, shots_at(), core=core, law=law).value == pytest.approx(expected, abs=1.0)
+    assert found(plate, shots_at(), core=core, law=law).value == pytest.approx(expected, abs=0.2)
 
 
 def test_limit_velocity_grows_about_as_the_way_through_an_oblique_plate() -> None:

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -161,14 +160,20 @@ class HitMap:
     """What a run computes of every hit of a campaign: how it ends. Another kind of run derives from it.
 
     Attributes:
-        content: what decides the bits of a result, beside the campaign, the versions and the device.
-        measures: whose running estimates are told; those of a hit map where there are none.
         takes_solid: whether the solid plate of equal areal density is computed, too.
     """
 
-    content: Mapping[str, str] = MappingProxyType({})
-    measures: Sequence[str] = ()
     takes_solid = True
+
+    @property
+    def content(self) -> Mapping[str, str]:
+        """What decides the bits of a result, beside the campaign, the versions and the device."""
+        return {}
+
+    @property
+    def measures(self) -> Sequence[str]:
+        """Whose running estimates are told; those of a hit map where there are none."""
+        return ()
 
     def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> Table:
         """Compute some shots; the arguments are those of `compute`."""

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import logging
+import math
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
+from uuid import uuid4
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import HitMap, made_by
@@ -29,6 +32,10 @@ _HIT_MAP = HitMap()
 _PATIENCE = 1.0
 """Seconds for which a team waits for computations that nobody wants any more: what a thread of this machine computes
 can be broken off between two launches of a kernel only."""
+
+
+_LISTEN_EVERY, _TELL_EVERY = 0.2, 1.0
+"""Seconds between two looks for a signal while a worker prepares, and between two words of a task on its levels."""
 
 
 class ClusterError(RuntimeError):
@@ -59,6 +66,21 @@ class Team:
     made_by: dict[str, str]
     underway: Callable[[], int]
     refining: Callable[[], Refining | None]
+
+
+class _How(NamedTuple):
+    """How the workers of a cluster compute.
+
+    Attributes:
+        device, threads: as in `simulate`.
+        kind: what all of them must be, as `made_by` says.
+        topic: of what they tell of their levels; empty where hits have no tolerance.
+    """
+
+    device: str
+    threads: int | None
+    kind: dict[str, str]
+    topic: str = ""
 
 
 def awaited(future: Future[Any], every: float, tick: Callable[[], object]) -> Any:
@@ -123,7 +145,7 @@ def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Itera
             task=_task_size(kind),
             made_by=kind | dict(job.content),
             underway=lambda: sum(done.copy().values()),
-            refining=lambda: max(levels.copy().values(), key=lambda one: one.seconds_left or 0.0, default=None),
+            refining=lambda: _longest(levels),
         )
     finally:
         stopping.set()
@@ -181,7 +203,7 @@ def cluster_team(
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
-        executor = client.get_executor(pure=False)
+        executor, levels = client.get_executor(pure=False), dict[str, Refining]()
 
         def asked(request: Callable[..., Any], *arguments: Any) -> Any:
             try:
@@ -191,17 +213,19 @@ def cluster_team(
 
         try:
             kind = asked(executor.submit, made_by, device).result()
+            campaign = awaited(asked(executor.submit, _looked_at, campaign), _LISTEN_EVERY, lambda: None)
+            how = _How(device, threads, kind, f"warpimpact-{uuid4().hex}" if campaign.numerics.tolerance else "")
+            if how.topic:
+                asked(client.subscribe_topic, how.topic, lambda event: _hear(levels, event[1]))
             yield Team(
                 job=job,
                 pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
-                submit=lambda *shots: asked(
-                    executor.submit, _compute_alike, job, campaign, *shots, device, threads, kind
-                ),
+                submit=lambda *shots: asked(executor.submit, _compute_alike, job, campaign, *shots, how),
                 width=lambda: 2 * max(1, sum(asked(client.nthreads).values())),
                 task=_task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
-                refining=lambda: None,
+                refining=lambda: _longest(levels),
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
             raise _lost(address, error) from None
@@ -219,11 +243,10 @@ def _lost(address: str, error: BaseException) -> ClusterError:
 def _ignoring_interrupts(plugin: Any) -> Any:
     """Plugin of workers on this machine, which Ctrl-C reaches, too: this process is the one that ends them."""
 
-    class Ignoring(plugin):  # type: ignore[misc]  # imported with Dask only
-        def setup(self, worker: Any) -> None:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
+    def setup(self: Any, worker: Any) -> None:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
-    return Ignoring()
+    return type("Ignoring", (plugin,), {"setup": setup})()
 
 
 def _compute_alike(
@@ -232,18 +255,61 @@ def _compute_alike(
     promise: Any,
     shots: Shots,
     solid: Shots | None,
-    device: str,
-    threads: int | None,
-    kind: dict[str, str],
+    how: _How,
 ) -> Table:
     """Compute shots on a worker that gives the same bits as the others."""
-    own = made_by(device)
+    own, kind = made_by(how.device), how.kind
     if own != kind:
         name = next(name for name in kind if own[name] != kind[name])
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    return job.compute(campaign, shots, promise=promise, solid=solid, device=device, threads=threads)
+    with _telling(how.topic) as refining:
+        given: dict[str, Any] = {"promise": promise, "solid": solid, "device": how.device, "threads": how.threads}
+        return job.compute(campaign, shots, **given, refining=refining)
+
+
+def _looked_at(campaign: Campaign) -> Campaign:
+    """The campaign, which carries the ligament of its plate from then on: that of a mask takes seconds, and every shard
+    tells it."""
+    _ = campaign.plate.ligament
+    return campaign
+
+
+@contextmanager
+def _telling(topic: str) -> Iterator[Callable[[Refining], None]]:
+    """What tells those who listen to the topic how far the hits of a task of this worker are on their way to a
+    tolerance; no topic, no word."""
+    if not topic:
+        yield lambda found: None
+        return
+    from distributed import get_worker
+
+    worker, who, last = get_worker(), uuid4().hex, -math.inf
+
+    def tell(found: Refining) -> None:
+        nonlocal last
+        if (now := time.monotonic()) - last >= _TELL_EVERY:
+            last = now
+            worker.log_event(topic, {"who": who, "refining": asdict(found)})
+
+    try:
+        yield tell
+    finally:
+        worker.log_event(topic, {"who": who, "refining": None})
+
+
+def _hear(levels: dict[str, Refining], told: dict[str, Any]) -> None:
+    """Take in what a worker has told."""
+    if told["refining"] is None:
+        levels.pop(told["who"], None)
+    else:
+        levels[told["who"]] = Refining(**told["refining"])
+
+
+def _longest(levels: dict[Any, Refining]) -> Refining | None:
+    """The one that has the longest way to go."""
+    return max(levels.copy().values(), key=lambda one: one.seconds_left or 0.0, default=None)
 
 
 def _devices(names: str) -> list[Any]:

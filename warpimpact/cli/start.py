@@ -147,7 +147,7 @@ def _completion(arguments: argparse.Namespace) -> None:
     for command in _commands(program):
         for action in command._actions:
             if action.type is Path:
-                action.complete = shtab.FILE  # type: ignore[attr-defined]
+                vars(action)["complete"] = shtab.FILE
     print(shtab.complete(program, arguments.shell))
 
 

@@ -140,7 +140,7 @@ class _Work:
             scores = self._scores_of(some)
             self._parts.append(scores)
             self.done += len(some) // DISCREPANCIES
-            self._misfit = min(self._misfit, float(sum(one.misfit for one in scores).min()))  # type: ignore[union-attr]
+            self._misfit = min(self._misfit, float(np.sum([one.misfit for one in scores], axis=0).min()))
             found.append(np.sum([one.log_likelihood for one in scores], axis=0))
             self._say()
         return np.concatenate(found)

@@ -298,13 +298,13 @@ def learnt(tree: xarray.DataTree) -> dict[str, Learnt]:
         before, after = (np.sort(one[str(name)].values.ravel()) for one in (prior, posterior))
         grid = np.concatenate([before, after])
         shares = [np.searchsorted(of, grid, side="right") / len(of) for of in (before, after)]
-        low, middle, high = np.quantile(after, [0.05, 0.5, 0.95])
+        (low, middle, high), (first, half, last) = (np.quantile(of, [0.05, 0.5, 0.95]) for of in (after, before))
         kept = np.searchsorted(before, high, side="right") - np.searchsorted(before, low)
         found[name] = Learnt(
             float(np.abs(shares[0] - shares[1]).max()),
             float(kept / len(before)),
             (float(low), float(middle), float(high)),
-            tuple(float(one) for one in np.quantile(before, [0.05, 0.5, 0.95])),  # type: ignore[arg-type]
+            (float(first), float(half), float(last)),
         )
     return found
 

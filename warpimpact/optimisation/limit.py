@@ -94,13 +94,13 @@ class LimitMap(HitMap):
         return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * plates[layer].thickness, layer)
 
     @property
-    def content(self) -> Mapping[str, str]:  # type: ignore[override]
+    def content(self) -> Mapping[str, str]:
         """What decides the bits beside the campaign."""
         of_layer = f" of layer {self.layer}" if self.layer else ""
         return {"limit": f"{self.quantity}{of_layer} within {self.tolerance:g}, at most {self.highest:g}"}
 
     @property
-    def measures(self) -> tuple[str, ...]:  # type: ignore[override]
+    def measures(self) -> tuple[str, ...]:
         """The running estimates: the mean limit."""
         return (f"mean({v.LIMITS[self.quantity].value})",)
 

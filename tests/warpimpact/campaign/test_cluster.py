@@ -3,17 +3,19 @@
 import io
 import logging
 import os
+import pickle
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from warpimpact import Campaign
+from warpimpact import Campaign, Numerics
 from warpimpact.campaign.compute import HitMap
 from warpimpact.campaign.run import Standing, run_to_file
-from warpimpact.campaign.team import ClusterError, _compute_alike, cluster_team
+from warpimpact.campaign.team import ClusterError, _compute_alike, _How, _looked_at, cluster_team
 from warpimpact.cli import main
 from warpimpact.solver.device import DeviceError
 
@@ -126,7 +128,39 @@ def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
 def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -> None:
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
-        _compute_alike(HitMap(), campaign, None, campaign.sampler().shots(0, 1), None, "cpu", None, kind)
+        _compute_alike(HitMap(), campaign, None, campaign.sampler().shots(0, 1), None, _How("cpu", None, kind))
+
+
+def test_workers_tell_on_which_level_their_hits_are(campaign: Campaign, cluster: object, tmp_path: Path) -> None:
+    numerics = Numerics(tolerance={"residual_velocity": "2 m/s", "tilt": "2 deg"})
+    hits = campaign.hits.model_copy(update={"count": 256})
+    told: list[Standing] = []
+    exact = campaign.model_copy(update={"numerics": numerics, "hits": hits})
+    team = cluster_team(exact, address=cluster.scheduler_address, device="cpu")
+    run_to_file(exact, tmp_path / "a.nc", team=team, progress=told.append)
+    levels = [standing.refining for standing in told if standing.refining is not None]
+    assert levels
+    assert all(1 <= one.level <= one.levels for one in levels)
+    assert told[-1].refining is None
+
+
+def test_the_ligament_of_a_mask_is_found_once_for_all_workers(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mask = np.ones((16, 32), dtype=np.uint8)
+    mask[4:8, 4:8] = mask[10:14, 20:24] = 0
+    np.save(tmp_path / "mask.npy", mask)
+    pattern = {"shape": "mask", "file": tmp_path / "mask.npy", "cell_size": "0.5 mm"}
+    masked = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})
+    found = _looked_at(masked)
+
+    def again(_: object) -> float:
+        raise AssertionError("was computed again")
+
+    monkeypatch.setattr("warpimpact.scene.patterns.mask.smallest_gap", again)
+    with pytest.raises(AssertionError):
+        _ = masked.model_copy().plate.pattern.model_copy().ligament()
+    assert pickle.loads(pickle.dumps(found)).plate.ligament == found.plate.ligament > 0.0
 
 
 @pytest.mark.parametrize("lost", ["closed", "cancelled"])

@@ -125,3 +125,19 @@ def test_rings_are_shorter_behind_the_widest_station(core: Core) -> None:
     for part, longest in ((station < widest, 1.0), (station > widest, BEHIND)):
         if part.any():
             assert length[part].mean() == pytest.approx(longest * core.length / count, rel=0.15)
+
+
+@pytest.mark.parametrize("axial", [64, 512, 4096])
+def test_rings_take_work_in_proportion(axial: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No signal is served while a core is divided, so this must stay short: some points of the profile per ring, and
+    those of the search for the widest station and of the mass. Measured: 0.1 s for 6241 rings of a profile with 20,000
+    points."""
+    station = np.linspace(0.0, 27e-3, 20_000)
+    radius = 3e-3 * np.minimum(1.0, station / 10e-3) + 1e-5 * (np.arange(20_000) % 2)
+    core = ProfileCore(s=tuple(station), r=tuple(radius), density=7850.0)
+    asked: list[int] = []
+    of = ProfileCore.radius
+    monkeypatch.setattr(ProfileCore, "radius", lambda own, s: asked.append(np.size(s)) or of(own, s))
+    rings = rings_of(core, axial, 512, 1e-5)
+    assert len(asked) < 30
+    assert sum(asked) < 20 * len(rings.station) + 4 * 1001 + 80 * len(core.breaks)

@@ -1,0 +1,299 @@
+"""The table and the figure of the benchmark page (docs/benchmarks.md), from results/*.json.
+
+    make benchmark                                  # measures everything: some 10 minutes on two quiet cores
+    python tests/benchmarks/page.py                 # draws the figure from the results that are there
+
+The table is made from the results when the pages are built. A result that is missing leaves its rows out.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+HERE = Path(__file__).resolve().parent
+RESULTS = HERE / "results"
+RUNS: Mapping[str, Sequence[str]] = {
+    "peers": ("peers.py", "--hits", "256"),
+    "throughput": ("throughput.py",),
+    "overheads": ("overheads.py",),
+    "statistics_cost": (
+        "statistics_cost.py",
+        "--seeds",
+        "4",
+        "--hits",
+        "2048",
+        "--output",
+        "results/statistics_cost.json",
+    ),
+}
+"""The benchmarks behind the page, by the name of their result."""
+SHORT = {
+    "7.62 mm P80 core against a slotted plate": "slotted plate",
+    "7.62 mm P80 core against a plate with round holes (illustrative)": "round holes",
+    "7.62 mm P80 core against a slotted plate at 20° obliquity, yawed": "oblique shot",
+}
+"""Titles of campaigns as the table names them."""
+FIDELITIES = ("draft", "standard", "reference")
+COLOURS = {"warpimpact": "#0072B2", "Numba": "#D55E00"}
+
+
+class Row(NamedTuple):
+    """One figure: of what, on which scene, how much, beside what, from which sample."""
+
+    what: str
+    scene: str
+    figure: str
+    reference: str
+    sample: str
+
+
+def results(folder: Path = RESULTS) -> dict[str, Any]:
+    """The results that are there, by name."""
+    return {
+        name: json.loads(path.read_text(encoding="utf-8"))
+        for name in RUNS
+        if (path := folder / f"{name}.json").exists()
+    }
+
+
+def rows(found: Mapping[str, Any]) -> Iterator[Row]:
+    """Every row of the table."""
+    for name, of in (
+        ("throughput", _throughput),
+        ("peers", _peers),
+        ("throughput", _kinds),
+        ("overheads", _overheads),
+        ("statistics_cost", _statistics),
+    ):
+        if name in found:
+            yield from of(found[name])
+
+
+def machines(found: Mapping[str, Any]) -> Iterator[str]:
+    """Where and when each result was measured, a sentence each."""
+    for name, values in found.items():
+        told = values.get("machine", {})
+        if isinstance(told, dict):
+            where = f"{told['processor']}, {told['cores']} cores, Python {told['python']}"
+            yield f"`{RUNS[name][0]}`: {where}, {told['date']}."
+
+
+def _throughput(values: Mapping[str, Any]) -> Iterator[Row]:
+    sample = f"median of {values['rounds']} rounds, {values['hits']} Sobol hits"
+    for scene, fidelities in values["scenes"].items():
+        for name, rate in fidelities.items():
+            yield Row(
+                f"{name}, hits per second",
+                scene,
+                f"{_rounded(rate['one_core'])} on one core, {_rounded(rate['all_cores'])} on all",
+                "processor time of one core; wall time on all",
+                sample,
+            )
+
+
+def _peers(values: Mapping[str, Any]) -> Iterator[Row]:
+    sample = f"errors: 90th percentile of {values['hits']} Sobol hits; costs: median round"
+    for scene, bout in values.get("scenes", {}).items():
+        for one in bout["ratios"]:
+            outside = "" if one["enclosed"] else ", its nearest setting"
+            yield Row(
+                f"{one['warpimpact']}, times as fast as Numba",
+                scene,
+                f"{one['ratio']:.1f}",
+                f"Numba peer at {one['residual_velocity_error']:.2f} m/s and {one['tilt_error']:.2f}° "
+                f"({one['accuracy']}{outside})",
+                sample,
+            )
+        velocity, tilt = bout["converged_answer_uncertain_by"]
+        for one in bout["contenders"]:
+            if one["program"] == "NumPy" or any(name in one["setting"] for name in FIDELITIES):
+                other = " of this law, not of the literal one" if one["program"] == "NumPy" else ""
+                yield Row(
+                    f"{one['program']}, {one['setting']}",
+                    scene,
+                    f"{one['residual_velocity_error']:.2f} m/s, {one['tilt_error']:.2f}°, "
+                    f"{one['microseconds_per_hit']:.3g} µs per hit",
+                    f"converged answer{other}, uncertain by {velocity:.2g} m/s and {tilt:.2g}°; one core",
+                    sample,
+                )
+        yield Row(
+            "standard, times the arithmetic floor",
+            scene,
+            f"{bout['floor']['above_floor']:.1f}",
+            "measured peak of one core",
+            "operations counted over 8 hits",
+        )
+
+
+def _kinds(values: Mapping[str, Any]) -> Iterator[Row]:
+    rounds = f"median of {values['rounds']} rounds"
+    if of := values.get("layers"):
+        yield Row(
+            f"target of {of['layers']} layers, times the cost of its plate alone",
+            "slotted plate, 100 mm of air, 10 mm base",
+            f"{of['ratio']:.2f}",
+            f"standard, processor time; {of['microseconds_per_hit']:.3g} µs per hit",
+            f"{rounds}, {of['hits']} Sobol hits",
+        )
+    if of := values.get("bursts"):
+        yield Row(
+            f"bursts of {of['shots_at_a_plate']}, times the cost of single shots",
+            "slotted plate",
+            f"{of['ratio']:.2f}",
+            f"as many single shots at the same places; {of['microseconds_per_hit']:.3g} µs per hit",
+            f"{rounds}, {of['bursts']} bursts",
+        )
+
+
+def _overheads(values: Mapping[str, Any]) -> Iterator[Row]:
+    names = {
+        "help_seconds": "`warpimpact --help`",
+        "warm_run_seconds": "run of 100 hits, kernels compiled before",
+        "compilation_seconds": "compilation of the kernels, once",
+    }
+    for key, what in names.items():
+        if key in values:
+            yield Row(what, "slotted plate", f"{values[key]:.2f} s", "wall time of the command", "least of some runs")
+    for one in values.get("hits", ())[-1:]:
+        yield Row(
+            f"run of {one['count']} hits, wall time",
+            "slotted plate",
+            f"{one['seconds']:.1f} s, of it {one['compute_seconds']:.1f} s computing; "
+            f"{one['peak_memory'] / 2**20:.0f} MiB",
+            "wall time of the command",
+            "one run",
+        )
+
+
+def _statistics(values: Mapping[str, Any]) -> Iterator[Row]:
+    sample = f"root mean square over {values['seeds']} seeds, up to {values['hits']} hits"
+    for title, questions in values["cost"].items():
+        for question, costs in questions.items():
+            ways = {way: cost for way, cost in costs.items() if " per " not in way}
+            way = min(ways, key=lambda one: ways[one])
+            yield Row(
+                f"cost of {question}",
+                SHORT.get(title, title),
+                f"{_milliseconds(ways[way])} ({way})",
+                f"random points: {_milliseconds(ways['random'])}; 95 % interval",
+                sample,
+            )
+
+
+def _milliseconds(cost: float) -> str:
+    """A cost [s]; below some hits it is extrapolated and means nothing."""
+    return f"{1e3 * cost:.3g} ms" if cost >= 1e-3 else "below 1 ms"
+
+
+def _rounded(rate: float) -> str:
+    return f"{float(f'{rate:.3g}'):,.0f}"
+
+
+def draw(found: Mapping[str, Any]) -> Any:
+    """Error against cost beside the peer, hits per second of the fidelities, and what an answer costs."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12, 7.6), layout="constrained")
+    upper, lower = figure.subfigures(2, 1)
+    bouts = found.get("peers", {}).get("scenes", {})
+    for axes, (scene, bout) in zip(
+        upper.subplots(1, max(1, len(bouts)), squeeze=False)[0], bouts.items(), strict=False
+    ):
+        _draw_peers(axes, scene, bout)
+    rates, costs = lower.subplots(1, 2, width_ratios=(1, 1.3))
+    if "throughput" in found:
+        _draw_rates(rates, found["throughput"]["scenes"])
+    if "statistics_cost" in found:
+        _draw_costs(costs, found["statistics_cost"]["cost"])
+    told = found.get("throughput", found.get("peers", {})).get("machine", {})
+    figure.suptitle(f"{told.get('processor')}, {told.get('cores')} cores, {told.get('date')}")
+    return figure
+
+
+def _draw_peers(axes: Any, scene: str, bout: Mapping[str, Any]) -> None:
+    for program, colour in COLOURS.items():
+        some = [one for one in bout["contenders"] if one["program"] == program and one["setting"] != "coarsest"]
+        some.sort(key=lambda one: one["microseconds_per_hit"])
+        points = [(one["microseconds_per_hit"], one["tilt_error"]) for one in some]
+        best = [one for place, one in enumerate(points) if all(one[1] < other[1] for other in points[:place])]
+        axes.plot(*zip(*points, strict=True), "o", color=colour, markersize=4)
+        axes.plot(*zip(*best, strict=True), "-", color=colour, label=program)
+        for one in some:
+            for name in FIDELITIES:
+                if name in one["setting"]:
+                    place = (one["microseconds_per_hit"], one["tilt_error"])
+                    axes.annotate(
+                        name, place, xytext=(-5, -9), textcoords="offset points", fontsize="small", ha="right"
+                    )
+    axes.set(xscale="log", yscale="log", title=scene, xlabel="µs of one core per hit", ylabel="90 % error of tilt [°]")
+    axes.margins(x=0.15)
+    axes.yaxis.set_minor_formatter("{x:.1g}")
+    axes.tick_params(axis="y", which="both", labelsize="small")
+    axes.grid(which="major", color="0.9")
+    axes.legend(frameon=False, fontsize="small")
+
+
+def _draw_rates(axes: Any, scenes: Mapping[str, Any]) -> None:
+    for place, (scene, fidelities) in enumerate(scenes.items()):
+        for index, name in enumerate(fidelities):
+            at = index + 0.27 * (place - 1)
+            colour = ("#0072B2", "#56B4E9", "#009E73")[place % 3]
+            axes.bar(at, fidelities[name]["one_core"], 0.25, color=colour, label=scene if index == 0 else None)
+        axes.set_xticks(range(len(fidelities)), list(fidelities))
+    axes.set(yscale="log", ylabel="hits per second of one core")
+    axes.grid(axis="y", which="major", color="0.9")
+    axes.set_axisbelow(True)
+    axes.legend(frameon=False, fontsize="small")
+
+
+def _draw_costs(axes: Any, tables: Mapping[str, Any]) -> None:
+    """Costs of the first question on every scene, by the way to draw the hits."""
+    kinds = ("random", "sobol", "sobol, two levels", "irreducible", "irreducible, two levels")
+    question = next(iter(next(iter(tables.values()))))
+    for place, (title, questions) in enumerate(tables.items()):
+        costs = {_kind(way): cost for way, cost in questions[question].items() if " per " not in way}
+        for index, kind in enumerate(kinds):
+            if kind in costs:
+                colour = ("#0072B2", "#56B4E9", "#CC79A7")[place % 3]
+                axes.barh(
+                    index + 0.27 * (place - 1), 1e3 * costs[kind], 0.25, color=colour, label=SHORT.get(title, title)
+                )
+    axes.set_yticks(range(len(kinds)), kinds)
+    axes.invert_yaxis()
+    axes.set(xscale="log", xlabel=f"ms of processor time for the {question}")
+    axes.grid(axis="x", which="major", color="0.9")
+    axes.set_axisbelow(True)
+    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    axes.legend(handles.values(), handles.keys(), frameon=False, fontsize="small")
+
+
+def _kind(way: str) -> str:
+    """A way without the share of the cell that is computed."""
+    name, bracket, rest = way.partition(" (")
+    return name + rest.partition(")")[2] if bracket else way
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Draw the figure; with "all", measure first. Returns 1 if a benchmark failed."""
+    failed = []
+    for name, (script, *arguments) in RUNS.items() if "all" in (sys.argv[1:] if argv is None else argv) else ():
+        begin = time.monotonic()
+        done = subprocess.run([sys.executable, script, *arguments], cwd=HERE, check=False)
+        print(f"{name}: {time.monotonic() - begin:.0f} s", flush=True)
+        failed += [name] if done.returncode else []
+    path = RESULTS / "benchmarks.png"
+    draw(results()).savefig(path, dpi=110)
+    print(path)
+    if failed:
+        print(f"failed, or disagree: {', '.join(failed)}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,129 @@
+"""Hits per second of the named fidelities on three scenes, and what a layer and a burst cost.
+
+    python tests/benchmarks/throughput.py          # writes results/throughput.json
+
+The contenders of a scene run in turn, round after round, and the median round counts. Rates are of processor time of
+one core, and of wall time on all cores; those of wall time mean something on a quiet machine only. A burst is compared
+with as many single shots at the same places, a layered target with its plate alone; both are ratios of processor time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from bench import CHECKOUT, copied, cores, machine, shots_of, store
+
+from warpimpact import Campaign, Scene, Shots
+from warpimpact.solver.resolution import FIDELITIES, Fidelity
+from warpimpact.solver.simulate import simulate
+
+SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
+"""Campaigns by the name of their scene."""
+TIMED = 0.4
+"""Processor time of one timed run [s]."""
+ROUNDS = 5
+"""Runs of each contender, in turn with the others."""
+FEWEST = 64
+"""Hits of a timed run at least; the scenes are drawn over the unit cell."""
+
+Work = Callable[[Shots], Any]
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Measure, print, store."""
+    parser = argparse.ArgumentParser(description="hits per second of the fidelities; cost of layers and bursts")
+    parser.add_argument("--hits", type=int, default=1024, help="Sobol hits over the unit cell (default: 1024)")
+    hits = parser.parse_args(argv).hits
+    values: dict[str, Any] = {"machine": machine(), "hits": hits, "rounds": ROUNDS, "scenes": {}}
+    for name, file in SCENES.items():
+        values["scenes"][name] = rates(_campaign(file), hits)
+        print(name, values["scenes"][name])
+    values["layers"] = layers(_campaign("layered_target"), hits // 4)
+    values["bursts"] = bursts(_campaign("burst_of_five"), hits // 8)
+    print(values["layers"], values["bursts"])
+    store("throughput", values)
+
+
+def rates(campaign: Campaign, hits: int) -> dict[str, dict[str, float]]:
+    """Hits per second of every fidelity: of one core, and on all cores."""
+    scene, shots = _scene(campaign), shots_of(campaign, hits)
+    found: dict[str, dict[str, float]] = {}
+    for name, fidelity in FIDELITIES.items():
+        alone, together = _march(scene, fidelity, 1), _march(scene, fidelity, None)
+        alone(shots[:FEWEST])  # builds what is to be built
+        begin = time.process_time()
+        alone(shots[:FEWEST])
+        count = max(FEWEST, int(FEWEST * TIMED / (time.process_time() - begin)))
+        some = copied(shots, -(-count // len(shots)))[:count]
+        many = copied(shots, -(-count * cores() // len(shots)))[: count * cores()]
+        one, wall = [], []
+        for _ in range(ROUNDS):
+            one.append(_seconds(alone, some, time.process_time) / len(some))
+            wall.append(_seconds(together, many, time.perf_counter) / len(many))
+        found[name] = {"one_core": 1.0 / float(np.median(one)), "all_cores": 1.0 / float(np.median(wall))}
+    return found
+
+
+def layers(campaign: Campaign, hits: int) -> dict[str, float]:
+    """Cost of a target of two layers over that of its plate alone, at standard."""
+    target, shots = campaign.target, shots_of(campaign, hits)
+    alone = campaign.scene.model_copy(update={"target": target.model_copy(update={"layers": ()})})
+    return {"hits": hits, "layers": len(target.plates)} | _compared(
+        {"layered": (_march(campaign.scene, _STANDARD, 1), shots), "single": (_march(alone, _STANDARD, 1), shots)}
+    )
+
+
+def bursts(campaign: Campaign, count: int) -> dict[str, float]:
+    """Cost of bursts over that of as many single shots at the same places, at standard."""
+    each = campaign.at_a_plate
+    shots = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})}).sampler()
+    together = shots.shots(0, count * each)
+    single = replace(together, sample=None, burst_order=None, nearest_earlier_hit=None)
+    march = _march(campaign.scene, _STANDARD, 1)
+    return {"bursts": count, "shots_at_a_plate": each} | _compared(
+        {"bursts": (march, together), "single": (march, single)}
+    )
+
+
+_STANDARD = FIDELITIES["standard"]
+
+
+def _compared(works: Mapping[str, tuple[Work, Shots]]) -> dict[str, float]:
+    """Median ratio of the processor times of two works, run in turn; and the microseconds per hit of the first."""
+    times = []
+    for _ in range(ROUNDS + 1):  # the first round builds the kernels
+        times.append([_seconds(work, shots, time.process_time) / len(shots) for work, shots in works.values()])
+    measured = np.array(times[1:])
+    return {
+        "ratio": float(np.median(measured[:, 0] / measured[:, 1])),
+        "microseconds_per_hit": 1e6 * float(np.median(measured[:, 0])),
+    }
+
+
+def _campaign(file: str) -> Campaign:
+    return Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml")
+
+
+def _scene(campaign: Campaign) -> Scene:
+    """The scene with its last stand-off alone, as the peers have it."""
+    record = campaign.scene.record.model_copy(update={"standoffs": campaign.output.standoffs[-1:]})
+    return campaign.scene.model_copy(update={"record": record})
+
+
+def _march(scene: Scene, fidelity: Fidelity, threads: int | None) -> Work:
+    return lambda shots: simulate(scene, shots, numerics=fidelity, device="cpu", threads=threads)
+
+
+def _seconds(work: Work, shots: Shots, clock: Callable[[], float]) -> float:
+    begin = clock()
+    work(shots)
+    return clock() - begin
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,73 @@
+"""The benchmark page says what the results say, and each of its figures has a reference and a sample."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
+sys.path.append(str(BENCHMARKS))
+
+import page  # noqa: E402
+
+Results = dict[str, Any]
+
+
+@pytest.fixture
+def found() -> Results:
+    return page.results()
+
+
+def test_every_benchmark_has_rows(found: Results) -> None:
+    assert set(found) == set(page.RUNS)
+    for name, values in found.items():
+        assert list(page.rows({name: values})), name
+
+
+def test_every_row_has_its_reference_and_sample(found: Results) -> None:
+    for row in page.rows(found):
+        assert all(row), row
+        assert re.search(r"\d", row.figure), row
+
+
+def test_rows_follow_from_the_results(found: Results) -> None:
+    """Every figure that users look for first, found again by another way than the one that makes the rows."""
+    text = "\n".join(" | ".join(row) for row in page.rows(found))
+    for scene, rates in found["throughput"]["scenes"].items():
+        for name, rate in rates.items():
+            shown = re.search(rf"{name}, hits per second \| {scene} \| ([\d,]+) on one core, ([\d,]+) on all", text)
+            assert shown is not None
+            for one, kind in zip(shown.groups(), ("one_core", "all_cores"), strict=True):
+                assert float(one.replace(",", "")) == pytest.approx(rate[kind], rel=6e-3)
+    for scene, bout in found["peers"]["scenes"].items():
+        ratios = re.findall(rf"times as fast as Numba \| {scene} \| ([\d.]+) \|", text)
+        assert [float(one) for one in ratios] == [round(one["ratio"], 1) for one in bout["ratios"]]
+    for kind in ("layers", "bursts"):
+        assert f"| {found['throughput'][kind]['ratio']:.2f} |" in text
+
+
+def test_results_that_change_change_the_table(found: Results) -> None:
+    found["throughput"]["layers"]["ratio"] = 123.456
+    assert any(row.figure == "123.46" for row in page.rows(found))
+
+
+def test_a_result_that_is_missing_leaves_its_rows_out(found: Results) -> None:
+    del found["peers"]
+    rows = list(page.rows(found))
+    assert rows
+    assert not any("Numba" in row.what for row in rows)
+
+
+def test_the_machine_and_the_date_are_told(found: Results) -> None:
+    told = list(page.machines(found))
+    assert len(told) == len(page.RUNS)
+    assert all(re.search(r"\d{4}-\d\d-\d\d", sentence) for sentence in told)
+
+
+def test_the_figure_is_drawn(found: Results) -> None:
+    figure = page.draw(found)
+    panels = [axes for part in figure.subfigs for axes in part.axes]
+    assert len(panels) == len(found["peers"]["scenes"]) + 2
+    assert all(axes.lines or axes.patches for axes in panels)
