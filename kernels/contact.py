@@ -11,7 +11,7 @@ from typing import Any
 
 import warp as wp
 
-from . import core_surface, damping, exposure, footprint, grip, interaction, memory, plate_grid, rigid_body
+from . import core_surface, damping, exposure, footprint, grip, interaction, lanes, memory, plate_grid, rigid_body
 from .variant import Variant
 
 
@@ -21,7 +21,7 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    grips, resistances, memories = grip.build(variant), damping.build(variant), exposure.build(variant)
+    grips, resistances, memories, block = (part.build(variant) for part in (grip, damping, exposure, lanes))
     Footprint, Sums, Slopes = footprint.build(variant).Footprint, resistances.Sums, resistances.Slopes
     Surface, Pose, Ring = surfaces.Surface, surfaces.Pose, surfaces.Ring
     Plate, Fields, Window = grid.Plate, memories.Fields, grid.Window
@@ -80,6 +80,8 @@ def build(variant: Variant) -> SimpleNamespace:
         [m²]."""
         per_node = laws.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
         j = int(0)
+        if wp.static(variant.window > 0):
+            j = block.lane()
         while j < surface.around:
             patch = patch_at(pose, ring, read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j))
             grip = grips.grip_of(law, pose, ring, patch)
@@ -98,7 +100,10 @@ def build(variant: Variant) -> SimpleNamespace:
             write_index(touches.cell, first + j, cell.index)
             write(touches.y, first + j, cell.y)
             write(touches.z, first + j, cell.z)
-            j += 1
+            if wp.static(variant.window > 0):
+                j += block.count()
+            else:
+                j += 1
         return grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, surface.around)
 
     @wp.func
@@ -127,6 +132,8 @@ def build(variant: Variant) -> SimpleNamespace:
             axial_c, axial_s = real(0.0), real(0.0)
             slopes, slopes_c, slopes_s, slopes_cc, slopes_cs = real(0.0), real(0.0), real(0.0), real(0.0), real(0.0)
             j = int(0)
+            if wp.static(variant.window > 0):
+                j = block.lane()
             while j < surface.around:
                 cosine, sine = read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j)
                 patch = patch_at(pose, ring, cosine, sine)
@@ -164,7 +171,10 @@ def build(variant: Variant) -> SimpleNamespace:
                 slopes_s += slope * sine
                 slopes_cc += slope * cosine * cosine
                 slopes_cs += slope * cosine * sine
-                j += 1
+                if wp.static(variant.window > 0):
+                    j += block.count()
+                else:
+                    j += 1
             sums = Sums()
             sums.force = vec3(axial, right, up)
             sums.moment = vec3(
@@ -273,5 +283,11 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     return SimpleNamespace(
-        Fields=Fields, Touches=Touches, open_window=open_window, clear_sums=clear_sums, load_on=load_on
+        Fields=Fields,
+        Touches=Touches,
+        open_window=open_window,
+        clear_sums=clear_sums,
+        find_touches=find_touches,
+        sum_ring=sum_ring,
+        load_on=load_on,
     )

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, plate_grid
+from . import core_surface, lanes, plate_grid
 from .variant import Variant
 
 
@@ -14,7 +14,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the footprint for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, grid = core_surface.build(variant), plate_grid.build(variant)
+    surfaces, grid, block = (part.build(variant) for part in (core_surface, plate_grid, lanes))
     Surface, Pose, ring_at = surfaces.Surface, surfaces.Pose, surfaces.ring_at
     Plate, Window, Box = grid.Plate, grid.Window, grid.Box
     far = wp.constant(2**20)  # nodes away: beyond any window
@@ -50,6 +50,8 @@ def build(variant: Variant) -> SimpleNamespace:
         first_ring, last_ring, not_through, not_back = int(surface.rings), int(-1), int(0), int(0)
         y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
         index = int(0)
+        if wp.static(variant.window > 0):
+            index = block.lane()
         while index < surface.rings:
             ring = ring_at(surface, pose, index)
             reach = surfaces.reach_along_x(ring, pose, broadside, advance, turning)
@@ -64,7 +66,15 @@ def build(variant: Variant) -> SimpleNamespace:
             z_low = wp.min(z_low, wp.where(within, node_below(window, ring.centre[2] - wide_z), far))
             y_high = wp.max(y_high, wp.where(within, node_below(window, ring.centre[1] + wide_y), -far))
             z_high = wp.max(z_high, wp.where(within, node_below(window, ring.centre[2] + wide_z), -far))
-            index += 1
+            if wp.static(variant.window > 0):
+                index += block.count()
+            else:
+                index += 1
+        if wp.static(variant.window > 0):
+            first_ring, last_ring = block.least(first_ring), block.most(last_ring)
+            not_through, not_back = block.most(not_through), block.most(not_back)
+            y_low, y_high = block.least(y_low), block.most(y_high)
+            z_low, z_high = block.least(z_low), block.most(z_high)
         found = Footprint()
         found.first_ring = first_ring
         found.last_ring = last_ring

@@ -18,12 +18,11 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, undefined = real(0.0), real(wp.nan)
     motion = rigid_body.build(variant)
     launch = conditions.build(variant)
-    Body, Shots, Contact = motion.Body, launch.Shots, march.build(variant).Outcomes
+    Shots, Contact = launch.Shots, march.build(variant).Outcomes
     angular_velocity = motion.angular_velocity
-    turned = motion.turned
+    axis_at = motion.axis_at
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
     MISSED, UNFINISHED = wp.constant(int(Status.MISSED)), wp.constant(int(Status.UNFINISHED))
-    iterations = wp.constant(64)
 
     @wp.struct
     class Report:
@@ -43,21 +42,6 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def angle_between(a: vec3, b: vec3):
         return wp.atan2(wp.length(wp.cross(a, b)), wp.dot(a, b))
-
-    @wp.func
-    def axis_at(body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real):
-        """The axis at the moment when the point `ahead` of the centre of mass has moved by `distance` along x.
-
-        The swing of the point changes the time of flight, which a fixed-point iteration finds. It converges while the
-        swing is slower than the flight. If `ahead` is 0, the first iteration is exact.
-        """
-        then = axis
-        for _ in range(iterations):
-            time = (distance - ahead * then[0]) / velocity
-            then = turned(body, axis, momentum, time)
-            if ahead == zero:
-                break
-        return then
 
     @wp.func
     def report_standoff(report: Report, shot: wp.int32, standoff: wp.int32, axis: vec3, flight: vec3, velocity: vec3):

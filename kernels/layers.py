@@ -2,6 +2,8 @@
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. So the load of one
 layer is the load of one plate (contact.load_on), and loads of layers add.
+
+Long because all of them read the same layers of the same slot.
 """
 
 from functools import cache
@@ -23,7 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, memories, contacts, launch = (part.build(variant) for part in (footprint, exposure, contact, conditions))
     Surface, Pose, Plate, Window, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window, laws.Law
-    Body, State, Load = motion.Body, motion.State, motion.Load
+    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Fields, Footprint, Touches, Shots = contacts.Fields, prints.Footprint, contacts.Touches, launch.Shots
     passages, hits, own = passage.build(variant), earlier.build(variant), launch.own
     Passage, Earlier = passages.Passage, hits.Earlier
@@ -36,7 +38,8 @@ def build(variant: Variant) -> SimpleNamespace:
         origin in the plane of the plate [m]. These, `thickness` [m] and the members of Law have one value for all shots
         or one per shot: shape [layers, 1] or [layers, shots]. Those layers that a step can touch add their
         `onset_jump`, up to `most_jump`, as if they were one plate. `weakens` says whether the layer keeps a field, in a
-        window of cells_y × cells_z nodes from number `first` of its slot's `nodes` on.
+        window of cells_y × cells_z nodes from number `first` of its slot's `nodes` on. `standoffs` are distances behind
+        the rear face of every layer [m], which the point `ahead` of the centre of mass passes [m].
         """
 
         count: wp.int32
@@ -48,6 +51,8 @@ def build(variant: Variant) -> SimpleNamespace:
         cells_y: wp.array(dtype=wp.int32)
         cells_z: wp.array(dtype=wp.int32)
         nodes: wp.int32
+        standoffs: wp.array(dtype=real)
+        ahead: real
         front: wp.array2d(dtype=wp.float64)
         thickness: wp.array2d(dtype=wp.float64)
         offset_y: wp.array2d(dtype=wp.float64)
@@ -175,12 +180,13 @@ def build(variant: Variant) -> SimpleNamespace:
         state: State,
         pose: Pose,
         before: Reached,
+        last: Change,
         time: real,
         flight: vec3,
         dt: real,
     ):
         """Find what a step can touch of every layer; open the windows of layers that are reached for the first time,
-        and record the layers that the core has left."""
+        and record the layers that the core has left. `last` is the change of its velocities in the last step."""
         reached = Reached()
         rearmost, foremost = surfaces.ends_of(surface, pose)
         reached.rearmost = rearmost
@@ -227,7 +233,12 @@ def build(variant: Variant) -> SimpleNamespace:
                 stack.found[here] = touch
                 near = True
             elif low > rear and not passages.has_left(passage, shot, k):
-                passages.leave(passage, body, shot, k, state, rearmost - rear, time, flight)
+                since = (rearmost - rear) / wp.max(state.velocity[0], one)
+                speed = wp.length(state.velocity)
+                if before.first != k or before.last != k:  # other layers slow the core down while it leaves this one
+                    speed = wp.length(pose.velocity - (since / dt) * last.velocity)
+                passages.leave(passage, body, shot, k, state, speed, since, time, flight)
+                passages.fly_on(passage, body, layers.standoffs, layers.ahead, shot, k, state, rear, flight)
             stack.near[here] = near
         return found, reached
 
@@ -304,13 +315,29 @@ def build(variant: Variant) -> SimpleNamespace:
         forwards, backwards = turning + state.velocity[0], turning - state.velocity[0]
         across = turning + wp.length(vec3(zero, state.velocity[1], state.velocity[2]))
         time = surface.bounding_radius / wp.max(wp.length(state.velocity), one)
-        if across > zero:
-            time = wp.min(time, reached.clearance / across)
+        time = wp.min(time, reached.clearance / wp.max(across, tiny))
         if forwards > zero:
             time = wp.min(time, ahead / forwards)
         if backwards > zero:
             time = wp.min(time, behind / backwards)
         return wp.max(zero, time - half * dt)
+
+    @wp.func
+    def is_behind(passage: Passage, shot: wp.int32):
+        """Whether the core has left the plate through its rear face."""
+        return passages.has_left(passage, shot, 0)
+
+    @wp.func
+    def is_between(layers: Layers, shot: wp.int32, reached: Reached, x: real):
+        """Whether the whole core is in the target, and its centre of mass, at x [m], in none of the layers."""
+        between = reached.rearmost > zero
+        for k in range(layers.count):
+            front = own_of(layers.front, k, shot)
+            rear = front + own_of(layers.thickness, k, shot)
+            between = between and (x < front or x > rear)
+            if k == layers.count - 1:
+                between = between and reached.foremost < rear
+        return between
 
     @wp.func
     def conclude(layers: Layers, passage: Passage, shot: wp.int32, status: wp.int32, reached: Reached):
@@ -339,6 +366,8 @@ def build(variant: Variant) -> SimpleNamespace:
         jump_of=jump_of,
         load_on=load_on,
         free_time=free_time,
+        is_behind=is_behind,
+        is_between=is_between,
         conclude=conclude,
         keep=keep,
     )

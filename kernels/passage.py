@@ -32,12 +32,19 @@ def build(variant: Variant) -> SimpleNamespace:
         Velocity, tilt and time are those at the instant when the last point of the core leaves the layer through its
         rear face; NaN where that does not happen. Per shot: the layer that the core came to rest in, or −1, and how far
         behind this layer's front face any of its points came [m].
+
+        `deflection` is that of the velocity at that instant; `standoff_tilt`, `standoff_pitch` and `standoff_yaw`, of
+        shape [shots, layers, stand-offs], are those of a core that flies on free from there.
         """
 
         status: wp.array2d(dtype=wp.int32)
         velocity: wp.array2d(dtype=real)
         tilt: wp.array2d(dtype=real)
         time: wp.array2d(dtype=real)
+        deflection: wp.array2d(dtype=real)
+        standoff_tilt: wp.array3d(dtype=real)
+        standoff_pitch: wp.array3d(dtype=real)
+        standoff_yaw: wp.array3d(dtype=real)
         stopped_in: wp.array(dtype=wp.int32)
         depth: wp.array(dtype=real)
 
@@ -49,6 +56,11 @@ def build(variant: Variant) -> SimpleNamespace:
             passage.velocity[shot, k] = real(wp.nan)
             passage.tilt[shot, k] = real(wp.nan)
             passage.time[shot, k] = real(wp.nan)
+            passage.deflection[shot, k] = real(wp.nan)
+            for m in range(passage.standoff_tilt.shape[2]):
+                passage.standoff_tilt[shot, k, m] = real(wp.nan)
+                passage.standoff_pitch[shot, k, m] = real(wp.nan)
+                passage.standoff_yaw[shot, k, m] = real(wp.nan)
         passage.stopped_in[shot] = -1
         passage.depth[shot] = real(wp.nan)
 
@@ -64,23 +76,50 @@ def build(variant: Variant) -> SimpleNamespace:
         return passage.status[shot, layer] == PASSED or passage.status[shot, layer] == MISSED
 
     @wp.func
+    def angle_between(a: vec3, b: vec3):
+        return wp.atan2(wp.length(wp.cross(a, b)), wp.dot(a, b))
+
+    @wp.func
+    def fly_on(
+        passage: Passage,
+        body: Body,
+        standoffs: wp.array(dtype=real),
+        ahead: real,
+        shot: wp.int32,
+        layer: wp.int32,
+        state: State,
+        rear: real,
+        flight: vec3,
+    ):
+        """Record the attitude at distances behind a layer's rear face [m], of a core that touches nothing on its way.
+        The point of the axis that passes them is `ahead` of the centre of mass, towards the nose [m]."""
+        axis = motion.axis_of(state.attitude)
+        for m in range(standoffs.shape[0]):
+            distance = standoffs[m] + (rear - state.position[0])
+            then = motion.axis_at(body, axis, state.angular_momentum, ahead, wp.max(state.velocity[0], one), distance)
+            passage.standoff_tilt[shot, layer, m] = angle_between(then, flight)
+            passage.standoff_pitch[shot, layer, m] = wp.atan2(then[2], then[0])
+            passage.standoff_yaw[shot, layer, m] = wp.atan2(then[1], then[0])
+
+    @wp.func
     def leave(
         passage: Passage,
         body: Body,
         shot: wp.int32,
         layer: wp.int32,
         state: State,
-        beyond: real,
+        speed: real,
+        since: real,
         time: real,
         flight: vec3,
     ):
-        """Record how a core whose last point is `beyond` a layer's rear face [m] left the layer."""
-        since = beyond / wp.max(state.velocity[0], one)
+        """Record how a core left a layer at a speed [m/s], `since` [s] before the time."""
         axis = motion.turned(body, motion.axis_of(state.attitude), state.angular_momentum, -since)
         passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, PASSED, MISSED)
-        passage.velocity[shot, layer] = wp.length(state.velocity)
-        passage.tilt[shot, layer] = wp.atan2(wp.length(wp.cross(axis, flight)), wp.dot(axis, flight))
+        passage.velocity[shot, layer] = speed
+        passage.tilt[shot, layer] = angle_between(axis, flight)
         passage.time[shot, layer] = time - since
+        passage.deflection[shot, layer] = angle_between(state.velocity, flight)
 
     @wp.func
     def conclude(passage: Passage, shot: wp.int32, layer: wp.int32, status: wp.int32, inside: wp.bool, depth: real):
@@ -94,4 +133,12 @@ def build(variant: Variant) -> SimpleNamespace:
                 passage.stopped_in[shot] = layer
                 passage.depth[shot] = depth
 
-    return SimpleNamespace(Passage=Passage, begin=begin, enter=enter, has_left=has_left, leave=leave, conclude=conclude)
+    return SimpleNamespace(
+        Passage=Passage,
+        begin=begin,
+        enter=enter,
+        has_left=has_left,
+        leave=leave,
+        fly_on=fly_on,
+        conclude=conclude,
+    )

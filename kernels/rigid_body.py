@@ -18,6 +18,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the motion for one variant."""
     real, vec3, mat33, quat = variant.real, variant.vec3, variant.mat33, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
+    iterations = wp.constant(64)
     quarter, six, twelve, twenty, thirty, forty_two = (real(value) for value in (0.25, 6.0, 12.0, 20.0, 30.0, 42.0))
     gamma, two_gamma = real(1.0 - math.sqrt(0.5)), real(2.0 - math.sqrt(2.0))
     small_square = real(0.02**2)  # of half an angle [rad²]
@@ -112,6 +113,21 @@ def build(variant: Variant) -> SimpleNamespace:
     def turned(body: Body, axis: vec3, momentum: vec3, time: real):
         """The axis after torque-free motion over a time: it precesses about L at |L|/I_t."""
         return wp.quat_rotate(rotation((time / body.inertia_transverse) * momentum), axis)
+
+    @wp.func
+    def axis_at(body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real):
+        """The axis at the moment when the point `ahead` of the centre of mass has moved by `distance` along x.
+
+        The swing of the point changes the time of flight, which a fixed-point iteration finds. It converges while the
+        swing is slower than the flight. If `ahead` is 0, the first iteration is exact.
+        """
+        then = axis
+        for _ in range(iterations):
+            time = (distance - ahead * then[0]) / velocity
+            then = turned(body, axis, momentum, time)
+            if ahead == zero:
+                break
+        return then
 
     @wp.func
     def drift(body: Body, state: State, dt: real):
@@ -235,6 +251,7 @@ def build(variant: Variant) -> SimpleNamespace:
         angular_momentum=angular_momentum,
         kinetic_energy=kinetic_energy,
         turned=turned,
+        axis_at=axis_at,
         drift=drift,
         velocity_change=velocity_change,
         restraint_of=restraint_of,

@@ -234,6 +234,10 @@ class VariableReference(FromTheCode):
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
             "How the shot ended": variables.OUTCOME_VARIABLES,
             "With `output.bending`": variables.BENDING_VARIABLES,
+            "With `core.strength`": variables.BROKEN_VARIABLES,
+            "With layers behind the plate": (*variables.LAYER_VARIABLES, *variables.LAYER_FACES),
+            "With `output.layer_standoffs`": (*variables.LAYER_COORDINATES, *variables.LAYER_STANDOFF_VARIABLES),
+            "With bursts": variables.BURST_VARIABLES,
             "With a tolerance": variables.ESTIMATE_VARIABLES,
         }
         for title, group in groups.items():

@@ -8,15 +8,18 @@ addresses and rings outside the slab. So a march can only be slower.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cache
 
 import numpy as np
+import warp as wp
 from scipy.spatial.transform import Rotation
 
 from warpimpact import Campaign, Numerics, Shots
+from warpimpact.kernels.variant import Variant
 from warpimpact.solver.history import History
-from warpimpact.solver.resolution import resolve
+from warpimpact.solver.resolution import Fidelity, resolve
 from warpimpact.solver.rings import rings_of
 from warpimpact.solver.simulate import trace
 
@@ -43,7 +46,7 @@ class Work:
     bytes: float
 
 
-def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
+def work_of(campaign: Campaign, shots: Shots, numerics: Numerics | Fidelity) -> Work:
     """Work of the law at one resolution, from the histories of the shots on the CPU."""
     core, plate = campaign.core, campaign.plate
     resolution = resolve(numerics, campaign.scene)
@@ -77,9 +80,37 @@ def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
     return Work(steps / hits, in_slab / hits, in_contact / hits, operations, moved)
 
 
-def cpu_peak(cores: int) -> float:
-    """float32 operations per second of some cores, if each has two 256-bit units for fused multiply-adds."""
-    path = Path("/proc/cpuinfo")
-    lines = path.read_text().splitlines() if path.exists() else []
-    clocks = [float(line.split(":")[1]) * 1e6 for line in lines if line.startswith("cpu MHz")]
-    return cores * 2 * 8 * 2 * max(clocks, default=float("nan"))
+_LOOP = """
+    typedef float lanes __attribute__((vector_size(64)));  // as many registers as the processor needs for it
+    lanes sums[12];
+    for (int k = 0; k < 12; ++k) sums[k] = (lanes){} + 1.0f * k;
+    const lanes factor = (lanes){} + 0.999f, more = (lanes){} + 0.001f;
+    for (int turn = 0; turn < turns; ++turn)
+        for (int k = 0; k < 12; ++k) sums[k] = sums[k] * factor + more;
+    float total = 0.0f;
+    for (int k = 0; k < 12; ++k) for (int lane = 0; lane < 16; ++lane) total += sums[k][lane];
+    return total;
+"""
+_TURNS, _PER_TURN, _RUNS = 4_000_000, 12 * 16 * 2, 5
+
+
+@cache
+def measured_peak() -> float:
+    """float32 operations per second of one core, measured: independent multiply-adds in registers, each of which
+    counts as two operations, by the compiler of the kernels. The best of some runs of processor time counts."""
+
+    @wp.func_native(_LOOP)
+    def chains(turns: wp.int32) -> wp.float32: ...
+
+    def loop(turns: wp.int32, total: wp.array(dtype=wp.float32)):
+        total[wp.tid()] = chains(turns)
+
+    kernel, total = Variant().kernel(loop), wp.empty(1, dtype=wp.float32, device="cpu")
+
+    def seconds(turns: int) -> float:
+        begin = time.process_time()
+        wp.launch(kernel, dim=1, inputs=[turns, total], device="cpu")
+        return time.process_time() - begin
+
+    seconds(1)  # compiles it
+    return _TURNS * _PER_TURN / min(seconds(_TURNS) for _ in range(_RUNS))

@@ -35,6 +35,7 @@ def hit_map(
     variable: str,
     *,
     standoff: float | None = None,
+    layer: int | None = None,
     method: Literal["nearest", "linear"] = "nearest",
     pixels: int | None = None,
 ) -> xarray.DataArray:
@@ -46,8 +47,9 @@ def hit_map(
 
     Args:
         result: the Dataset of a campaign, or hits chosen from it.
-        variable: name of a variable with one number per hit, or per hit and stand-off.
-        standoff: distance behind the plate [m] for a variable that has one; the largest if None.
+        variable: name of a variable with one number per hit, or one per hit for each stand-off and layer.
+        standoff: distance behind the plate, or the layer, [m] for a variable that has one; the largest if None.
+        layer: number of the layer for a variable that has layers, 0 the plate; the last one if None.
         method: "nearest" gives every place the value of the nearest hit. "linear" interpolates between three hits.
         pixels: places along the longer side, 1 or more; None gives the places of the hits themselves if they were
             sampled as a grid (mean of hits at the same place), else 200.
@@ -62,7 +64,7 @@ def hit_map(
         raise ValueError(f'method: got "{method}", but it must be "nearest" or "linear"')
     if pixels is not None and pixels < 1:
         raise ValueError(f"pixels: got {pixels}, but it must be at least 1")
-    array = at_standoff(result, variable, standoff)
+    array = chosen(result, variable, standoff, layer)
     if variable == v.STATUS and method == "linear":
         raise ValueError('got "status" with method = "linear", but codes cannot be interpolated; use "nearest"')
     values = array.values.astype(np.float64)
@@ -83,28 +85,45 @@ def hit_map(
     return xarray.DataArray(image, coordinates | known, (v.HIT_Z, v.HIT_Y), str(variable), array.attrs)
 
 
-def at_standoff(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> xarray.DataArray:
-    """A variable with one number per hit, shape [hits], at one stand-off [m] if it has stand-offs (None: the largest).
+_DIMENSIONS = {("hit",), ("hit", "standoff"), ("hit", "layer"), v.LAYER_STANDOFF_TILT.dims}
+"""Of variables with one number per hit, once a stand-off and a layer are chosen."""
+
+
+def chosen(
+    dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None
+) -> xarray.DataArray:
+    """A variable with one number per hit, shape [hits], at one stand-off [m] if it has stand-offs (None: the largest),
+    in or behind one layer if it has layers (None: the last one).
 
     Raises:
-        ValueError: the variable is none of these, or the Dataset has no such stand-off.
+        ValueError: the variable is none of these, or the Dataset has no such stand-off or layer.
     """
     array = dataset.get(variable)
-    if array is None or array.dims not in {("hit",), ("hit", "standoff")} or variable in (v.HIT, v.HIT_Y, v.HIT_Z):
+    if array is None or array.dims not in _DIMENSIONS or variable in (v.HIT, v.HIT_Y, v.HIT_Z):
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mappable(dataset))}')
-    if v.STANDOFF not in array.dims:
-        return array
-    distances = dataset[v.STANDOFF].values
+    if "layer" in array.dims:
+        layers = array.sizes["layer"]
+        if layer is not None and not 0 <= layer < layers:
+            raise ValueError(f"the result has no layer {layer}; it has layers 0 (the plate) to {layers - 1}")
+        array = array.isel(layer=-1 if layer is None else layer)
+    for name in (v.STANDOFF, v.LAYER_STANDOFF):
+        if name in array.dims:
+            array = array.isel({name: _index_of(dataset[name].values, standoff)})
+    return array
+
+
+def _index_of(distances: Array, standoff: float | None) -> int:
+    """Place of a stand-off [m] among those of a result; of the largest if None."""
     index = distances.size - 1 if standoff is None else int(np.argmin(np.abs(distances - standoff)))
     if standoff is not None and not np.isclose(distances[index], standoff):
         known = ", ".join(f"{distance:g}" for distance in distances)
         raise ValueError(f"the result has no stand-off of {standoff:g} m; it has {known} m")
-    return array.isel(standoff=index)
+    return index
 
 
 def mappable(dataset: xarray.Dataset) -> list[str]:
-    """Names of the variables with one number per hit, or per hit and stand-off."""
-    return [str(name) for name, array in dataset.data_vars.items() if array.dims in {("hit",), ("hit", "standoff")}]
+    """Names of the variables with one number per hit, per stand-off and per layer."""
+    return [str(name) for name, array in dataset.data_vars.items() if array.dims in _DIMENSIONS]
 
 
 def hit_points(dataset: xarray.Dataset) -> Array:

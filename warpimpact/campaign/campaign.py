@@ -63,7 +63,7 @@ class Output(Record):
         exit_state: store velocity, axis and position of every core at the end of contact.
     """
 
-    standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1, max_length=64)] = (0.05, 0.13)
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, min_length=1, max_length=64)] = (0.05, 0.13)
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
     exit_state: Annotated[bool, Field(strict=True)] = True
@@ -92,7 +92,7 @@ class Campaign(Model):
     title: Title
     core: AnyCore
     plate: Plate
-    layer: Annotated[tuple[Layer, ...], Field(max_length=MOST_LAYERS)] = ()
+    layer: Annotated[tuple[Layer, ...], Field(fail_fast=True, max_length=MOST_LAYERS)] = ()
     impact: Impact
     hits: Hits
     interaction: Interaction = Interaction()
@@ -340,7 +340,11 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _standoffs_clear_of_plate(self) -> Self:
-        self.output.check_standoffs(self.core)
+        if self.output.layer_standoffs and not self.layer:
+            raise ValueError(
+                "got output.layer_standoffs without [[layer]], but behind a plate alone output.standoffs count"
+            )
+        self.output.check_standoffs(self.core, self.target)
         return self
 
     @model_validator(mode="after")

@@ -257,7 +257,7 @@ def promise_in(dataset: Result) -> Promise | None:
 def _build(scene: Scene, shots: Shots, numerics: Numerics | Fidelity, device: str) -> None:
     """Build the kernels first, so that the measured time is that of computing alone."""
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
-        numerics = Numerics(precision=numerics.precision)
+        numerics = Numerics(precision=numerics.precision, layout=numerics.layout)
     build(scene, shots, numerics=numerics, device=device)
 
 

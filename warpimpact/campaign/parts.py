@@ -44,7 +44,8 @@ _GROWING = ".growing.part"
 FEWEST, MOST, SHARDS = 2**11, 2**16, 32
 """Shots per shard, and how many shards are aimed at between these. A shard costs some 10 ms beside its computing."""
 HELD = 1.0
-"""Seconds for which shards are held before they are on the disk: a run that is that short needs none there."""
+"""Seconds for which shards are held before they are on the disk, if they are few: a run that is that short needs none
+there."""
 
 
 def extent(count: int, at_a_plate: int = 1) -> int:
@@ -296,7 +297,7 @@ class Parts:
             except OutputError:  # as the disk is full, for instance: the shards are worth more
                 self._stop_growing()
                 self._grows = False
-        if time.monotonic() - self._written >= HELD:
+        if time.monotonic() - self._written >= HELD or len(self._held) * self.extent >= files.CHUNK:
             self.flush()
 
     def flush(self) -> None:

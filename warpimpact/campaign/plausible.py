@@ -55,8 +55,9 @@ def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:
         yield f"layer[{k}].gap", "layer.gap", layer.gap
     for name, value in campaign.impact:
         yield f"impact.{name}", f"impact.{name}", value
-    for standoff in campaign.output.standoffs:
-        yield "output.standoffs", "output.standoffs", standoff
+    for name in ("standoffs", "layer_standoffs"):
+        for standoff in getattr(campaign.output, name):
+            yield f"output.{name}", "output.standoffs", standoff
     for name, column in (campaign.hits.listed or {}).items():
         kind = f"{QUANTITIES[name].table}.{name}" if name in QUANTITIES else "hits"
         ends = [float(column[np.abs(column).argmax()])]

@@ -23,9 +23,9 @@ from warpimpact.solver.refinement import Refining
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill."""
-CPU_SECONDS = 0.5
-"""That a task takes on the CPU of this machine: its set-up, on one core, is lost in that. It is one shard at least, and
-one shard on the worker of a cluster."""
+CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
+"""Most shots of a task on the CPU of this machine, and the time that it is to take: its set-up, on one core, is lost in
+that. It is one shard at least, and one shard on the worker of a cluster."""
 _HIT_MAP = HitMap()
 
 
@@ -123,7 +123,7 @@ def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Itera
             pilot=lambda: begin(job.promise_of, campaign, str(devices[0]), progress),
             submit=lambda *shots: begin(work, *shots),
             width=lambda: 2 * len(devices),
-            task=lambda rate: _task_size(kind) or int(CPU_SECONDS * rate),
+            task=lambda rate: _task_size(kind) or min(CPU_SHOTS, int(CPU_SECONDS * rate)),
             made_by=kind | dict(job.content),
             underway=lambda: sum(done.copy().values()),
             refining=lambda: max(levels.copy().values(), key=lambda one: one.seconds_left or 0.0, default=None),
@@ -163,10 +163,13 @@ def cluster_team(
     """
     try:
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
+        from distributed.client import ClosedClientError
         from distributed.comm import CommClosedError
+        from distributed.utils import silence_logging_cmgr
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
     with ExitStack() as stack:
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler gets our sentence, no traceback
         threads = None
         if address is None:
             assert workers is not None
@@ -182,26 +185,39 @@ def cluster_team(
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
-        kind = client.submit(made_by, device, pure=False).result()
         executor = client.get_executor(pure=False)
+
+        def asked(request: Callable[..., Any], *arguments: Any) -> Any:
+            try:
+                return request(*arguments)
+            except (OSError, ClosedClientError) as error:  # of the client: here no file is written
+                raise _lost(address, error) from None
+
         try:
+            kind = asked(executor.submit, made_by, device).result()
             yield Team(
                 job=job,
-                pilot=lambda: executor.submit(job.promise_of, campaign, device),
-                submit=lambda *shots: executor.submit(_compute_alike, job, campaign, *shots, device, threads, kind),
-                width=lambda: 2 * max(1, sum(client.nthreads().values())),
+                pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
+                submit=lambda *shots: asked(
+                    executor.submit, _compute_alike, job, campaign, *shots, device, threads, kind
+                ),
+                width=lambda: 2 * max(1, sum(asked(client.nthreads).values())),
                 task=lambda rate: _task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
                 refining=lambda: None,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
-            raise ClusterError(
-                f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
-                "continue with --resume"
-            ) from None
+            raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+def _lost(address: str, error: BaseException) -> ClusterError:
+    return ClusterError(
+        f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
+        "continue with --resume"
+    )
 
 
 def _ignoring_interrupts(plugin: Any) -> Any:

@@ -19,7 +19,7 @@ def to_dataframe(dataset: xarray.Dataset) -> pd.DataFrame:
     """One row per hit, in the units of the Dataset.
 
     A variable with stand-offs, axes or layers gets one column for each: ``tilt_130mm``, ``angular_velocity_x``,
-    ``layer_tilt_0``. ``status`` is a word.
+    ``layer_tilt_0``, ``layer_standoff_tilt_0_50mm``. ``status`` is a word.
     """
     columns: dict[str, Any] = {name: array.values for name, array in _columns(dataset)}
     words = {code: word for word, code in status_codes(dataset).items()}
@@ -42,6 +42,10 @@ def _columns(dataset: xarray.Dataset) -> Iterator[tuple[str, xarray.DataArray]]:
         elif array.dims == ("hit", "layer"):
             for layer in range(array.sizes["layer"]):
                 yield f"{name}_{layer}", array[:, layer]
+        elif array.dims == v.LAYER_STANDOFF_TILT.dims:
+            for layer in range(array.sizes["layer"]):
+                for index, standoff in enumerate(dataset[v.LAYER_STANDOFF].values):
+                    yield f"{name}_{layer}_{standoff * 1e3:g}mm", array[:, layer, index]
 
 
 def _units(dataset: xarray.Dataset) -> dict[str, str]:

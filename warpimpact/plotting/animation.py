@@ -10,7 +10,8 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, FuncAnimatio
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Polygon
 
-from warpimpact.plotting.trajectory import Pose, pose_at_step, silhouette, two_views
+from warpimpact.plotting.poses import Pose, pose_at_step, silhouette
+from warpimpact.plotting.trajectory import two_views
 from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
 

@@ -20,10 +20,11 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
-from warpimpact.analysis.hit_map import at_standoff, hit_points
+from warpimpact.analysis.hit_map import chosen, hit_points
+from warpimpact.kernels.status import LayerStatus
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import outlines, passed, status_codes
+from warpimpact.results.dataset import outlines, passed
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -40,9 +41,10 @@ FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail tha
 WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2
 GREY = "0.62"  # for hits without a value
 # Colours of Okabe and Ito: they differ in every kind of colour blindness.
-STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00", "#0072B2")
+STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00", "#0072B2", "#FFFFFF")
+"""By the codes of `LayerStatus`: white where the core did not reach the layer."""
 
-_SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW}
+_SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW, v.LAYER_STANDOFF_PITCH, v.LAYER_STANDOFF_YAW}
 _BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them, too, but in front of the plate
 _MM = 1e3
 # Units as shown, and the factor from the units of the Dataset.
@@ -68,35 +70,47 @@ class Shown(NamedTuple):
     signed: bool
 
 
-def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Shown:
+def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None, layer: int | None = None) -> Shown:
     """One variable in shown units.
 
     Args:
         dataset: the result of a campaign.
-        variable: one of `variables.HIT_NUMBERS`. Residual velocity and deflection are those of cores that passed
-            the plate.
-        standoff: distance behind the plate [m] for a variable that has one; the largest if None.
+        variable: one of `variables.HIT_NUMBERS` or `variables.LAYER_NUMBERS`. Residual velocity and deflection are
+            those of cores that passed the plate.
+        standoff: distance behind the plate, or the layer, [m] for a variable that has one; the largest if None.
+        layer: number of the layer for a variable that has layers, 0 the plate; the last one if None.
 
     Raises:
-        ValueError: the variable cannot be mapped, or the Dataset has no such stand-off.
+        ValueError: the variable cannot be mapped, or the Dataset has no such stand-off or layer.
     """
-    array = _selected(dataset, variable, standoff)
+    array = _selected(dataset, variable, standoff, layer)
     unit, factor = _SHOWN_UNITS[array.attrs["units"]]
     exists = np.isfinite(array.values) & (passed(dataset) if variable in _BEHIND else True)
-    title = words(variable)
+    title = name = words(
+        variable.removeprefix("layer_").removeprefix("standoff_") if variable in v.LAYER_NUMBERS else variable
+    )
     if "standoff" in array.coords:
         title += f", {float(array[v.STANDOFF]) * _MM:g} mm behind the plate"
+    if v.LAYER_STANDOFF in array.coords:
+        title += f", {float(array[v.LAYER_STANDOFF]) * _MM:g} mm behind layer {_number(dataset, layer)}"
+    elif variable in v.LAYER_NUMBERS:
+        title += f", layer {_number(dataset, layer)}"
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
     values = np.where(exists, array.values.astype(np.float64) * factor, np.nan)
-    return Shown(values, f"{words(variable)} [{unit.strip()}]", title, variable in _SIGNED)
+    return Shown(values, f"{name} [{unit.strip()}]", title, variable in _SIGNED)
 
 
-def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None) -> xarray.DataArray:
-    mapped = [name for name in (*v.HIT_NUMBERS, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR) if name in dataset]
+def _number(dataset: xarray.Dataset, layer: int | None) -> int:
+    return int(dataset.sizes["layer"]) - 1 if layer is None else layer
+
+
+def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None, layer: int | None) -> xarray.DataArray:
+    numbers = (*v.HIT_NUMBERS, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR, *v.LAYER_NUMBERS)
+    mapped = [name for name in numbers if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
-    return at_standoff(dataset, variable, standoff)
+    return chosen(dataset, variable, standoff, layer)
 
 
 def words(name: str) -> str:
@@ -138,26 +152,30 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
     return colours, Normalize(lowest, highest)
 
 
-def draw_values(axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale) -> ScalarMappable:
-    """Draw values of the hits, shape [hits], with the holes and a legend; return the artist for a colour bar."""
+def draw_values(
+    axes: Axes, dataset: xarray.Dataset, values: Array, scale: Scale, layer: int | None = None
+) -> ScalarMappable:
+    """Draw values of the hits, shape [hits], with the holes and a legend; return the artist for a colour bar. A hit
+    without a value shows how it ended, or how it ended in one layer."""
     artist = _paint(axes, dataset, values, *scale)
     exists = np.isfinite(values)
-    _furnish(axes, dataset, [] if exists.all() else [Patch(facecolor=GREY, label=_without_value(dataset, exists))])
+    grey = [] if exists.all() else [Patch(facecolor=GREY, label=_without_value(dataset, exists, layer))]
+    _furnish(axes, dataset, grey)
     return artist
 
 
-def draw_status(axes: Axes, dataset: xarray.Dataset) -> None:
-    """Draw how the shots ended, with the share of each status in the legend."""
-    status = dataset[v.STATUS].values
+def draw_status(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -> None:
+    """Draw how the shots ended, with the share of each status in the legend; of one layer, with the shares in the
+    title, as layers share a legend."""
+    status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
     scale = Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
     _paint(axes, dataset, status.astype(float), ListedColormap(STATUS_COLOURS), scale)
-    entries: list[Artist] = [
-        Patch(facecolor=STATUS_COLOURS[code], label=f"{words(name)} {np.mean(status == code):.1%}")
-        for name, code in status_codes(dataset).items()
-        if np.any(status == code)
-    ]
-    _furnish(axes, dataset, entries)
-    axes.set_title("status", fontsize="medium")
+    found = [code for code in LayerStatus if np.any(status == code)]
+    names = {code: words(code.name.lower()) for code in found}
+    told = {code: f"{names[code]} {np.mean(status == code):.1%}" for code in found}
+    labels, shares = (told, "status") if layer is None else (names, f"layer {layer}\n{', '.join(told.values())}")
+    _furnish(axes, dataset, [Patch(facecolor=STATUS_COLOURS[code], label=labels[code]) for code in found])
+    axes.set_title(shares, fontsize="medium")
 
 
 def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
@@ -239,13 +257,14 @@ def _paint(axes: Axes, dataset: xarray.Dataset, values: Array, colours: Colormap
     )
 
 
-def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_]) -> str:
+def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_], layer: int | None) -> str:
     """Legend entry of the grey hits: their statuses."""
-    found = set(dataset[v.STATUS].values[~exists].tolist())
-    return fill(", ".join(words(name) for name, code in status_codes(dataset).items() if code in found), 30)
+    status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
+    found = set(status[~exists].tolist())
+    return fill(", ".join(words(code.name.lower()) for code in LayerStatus if code in found), 30)
 
 
-def _furnish(axes: Axes, dataset: xarray.Dataset, entries: list[Artist]) -> None:
+def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist]) -> None:
     """Add the holes, and a legend below the axes."""
     entries = [*entries, *draw_holes(axes, dataset)]
     if entries:

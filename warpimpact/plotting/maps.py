@@ -91,6 +91,33 @@ def overview(dataset: xarray.Dataset) -> Figure:
     return figure
 
 
+def layers_figure(dataset: xarray.Dataset) -> Figure:
+    """Of every layer, a row each: how the cores ended in it, their velocity behind it, and their tilt there: at the
+    farthest stand-off behind it that flight is free to, or as they leave it.
+
+    Args:
+        dataset: a result with layers behind the plate.
+    """
+    layers = dataset.sizes["layer"]
+    figure, panels = _sheet_of_one(dataset, maps=3 * layers, columns=3, note="; layer 0 is the plate")
+    for layer, (status, *others) in enumerate(zip(*[iter(panels)] * 3, strict=True)):
+        draw_status(status, dataset, layer)
+        columns = [shown(dataset, v.LAYER_RESIDUAL_VELOCITY, layer=layer), _tilt_behind(dataset, layer)]
+        for axes, column in zip(others, columns, strict=True):
+            _draw(axes, dataset, column, layer=layer)
+    _share_legend(figure, panels)
+    return figure
+
+
+def _tilt_behind(dataset: xarray.Dataset, layer: int) -> Shown:
+    standoffs = dataset[v.LAYER_STANDOFF].values.tolist() if v.LAYER_STANDOFF in dataset else []
+    for standoff in reversed(standoffs):
+        column = shown(dataset, v.LAYER_STANDOFF_TILT, standoff, layer)
+        if np.isfinite(column.values).any():
+            return column
+    return shown(dataset, v.LAYER_TILT, layer=layer)
+
+
 def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bool = False) -> list[Path]:
     """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths.
 
@@ -109,6 +136,8 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
     figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
     if is_uncertain(dataset, v.RESIDUAL_VELOCITY):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
+    if v.LAYER_STATUS in dataset:
+        figures["layers"] = layers_figure(dataset)
     if v.BURST_ORDER in dataset:
         figures["bursts"] = bursts_figure(dataset)
     return _saved(figures, folder, stem, overwrite=overwrite)
@@ -187,10 +216,18 @@ def _share_legend(figure: Figure, panels: Sequence[Axes]) -> None:
         )
 
 
-def _draw(axes: Axes, dataset: xarray.Dataset, column: Shown, scale: Scale | None = None, *, bar: bool = True) -> None:
+def _draw(
+    axes: Axes,
+    dataset: xarray.Dataset,
+    column: Shown,
+    scale: Scale | None = None,
+    *,
+    bar: bool = True,
+    layer: int | None = None,
+) -> None:
     """Draw one variable with its title, and with a colour bar beside the map and as high as it."""
     scale = scale or scale_of([column.values], signed=column.signed)
-    artist = draw_values(axes, dataset, column.values, scale)
+    artist = draw_values(axes, dataset, column.values, scale, layer)
     axes.set_title(column.title, fontsize="medium")
     if bar and np.isfinite(column.values).any():
         figure, place = axes.figure, axes.get_position()

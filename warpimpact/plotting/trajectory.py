@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -16,23 +16,20 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import Normal, Stroke
-from scipy.spatial import ConvexHull
 
 from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.analysis.surface import pressed
 from warpimpact.plotting.cell import words
+from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
 from warpimpact.plotting.pressure import pressure
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import passed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
-
-INSTANTS = 5  # poses of the core within the plate that are drawn
 
 _MM, _US = 1e3, 1e6
 _ANGLES = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
@@ -42,14 +39,6 @@ _LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
 _STEEL = "0.8"
 _ARROW = 12.0  # length of the arrow of a force that lies in the view [mm]
 _ARC, _ARC_RADIUS = 300.0, 4.5  # angle [degree] and radius [mm] of the arc of a moment across the view
-_AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
-
-
-class Pose(NamedTuple):
-    """Position of the centre of mass in the plate's frame [m], and unit vector towards the nose, both of shape [3]."""
-
-    position: Array
-    axis: Array
 
 
 def passage(dataset: xarray.Dataset) -> Figure:
@@ -210,47 +199,6 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
         paths.append(folder / f"{stem}_{draw.__name__}.png")
         draw(dataset).savefig(paths[-1], dpi=150)
     return paths
-
-
-def poses_in_plate(dataset: xarray.Dataset) -> dict[str, Pose]:
-    """Poses of the core at equal intervals of its passage through the plate, by time."""
-    steps = np.linspace(0, dataset.sizes["time"] - 1, INSTANTS).round().astype(int)
-    return {f"{float(dataset[v.TIME][step]) * _US:.0f} µs": pose_at_step(dataset, step) for step in steps}
-
-
-def poses_behind(dataset: xarray.Dataset) -> dict[str, Pose]:
-    """Poses of the core at the stand-offs, by distance; empty if the core does not pass the plate."""
-    standoffs = dataset[v.STANDOFF].values.tolist() if passed(dataset) else []
-    return {f"{standoff * _MM:g} mm": _pose_at(dataset, standoff) for standoff in standoffs}
-
-
-def silhouette(dataset: xarray.Dataset, pose: Pose, view: str) -> Array:
-    """Outline of the core [m], shape [points, 2]: x, and y or z as `view` says.
-
-    It is the convex hull of the rings; it does not show a groove.
-    """
-    _, _, (_, right, up) = np.linalg.svd(pose.axis[None, :])  # two directions at right angles to the axis
-    station, radius = (dataset[name].values[:, None, None] for name in (v.STATION, v.CORE_RADIUS))
-    ring = np.cos(_AROUND)[:, None] * right + np.sin(_AROUND)[:, None] * up
-    points = (pose.position + station * pose.axis + radius * ring)[..., [0, "xyz".index(view)]].reshape(-1, 2)
-    outline: Array = points[ConvexHull(points).vertices]
-    return outline
-
-
-def pose_at_step(dataset: xarray.Dataset, step: int) -> Pose:
-    return Pose(dataset[v.PLATE_POSITION].values[step], dataset[v.CORE_AXIS].values[step])
-
-
-def _pose_at(dataset: xarray.Dataset, standoff: float) -> Pose:
-    """The core when it passes a stand-off [m]: the axis from the projected angles, the position from free flight."""
-    there, end = dataset.sel(standoff=standoff), dataset.isel(time=-1)
-    yaw, pitch = (np.radians(float(there[name])) for name in (v.YAW, v.PITCH))
-    axis = np.sign(np.cos(yaw)) * np.array([1.0, np.tan(yaw), np.tan(pitch)])
-    axis /= np.linalg.norm(axis)
-    ahead = float(dataset[v.STATION].max()) * axis[0] if dataset.attrs[attr.STANDOFF_POINT] == "nose" else 0.0
-    position, velocity = end[v.PLATE_POSITION].values, end[v.VELOCITY].values
-    x = depth_of(dataset) + standoff - ahead
-    return Pose(position + velocity * ((x - position[0]) / velocity[0]), axis)
 
 
 def _title(dataset: xarray.Dataset, what: str) -> str:

@@ -14,7 +14,7 @@ from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.slabs import slabs
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits, shown, words
-from warpimpact.plotting.trajectory import Pose, poses_behind, poses_in_plate, silhouette
+from warpimpact.plotting.poses import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers, outlines
@@ -106,6 +106,14 @@ def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
             if variable not in v.SHOT_VARIABLES or np.ptp(column.values) > 0.0:
                 name = words(variable) + ("" if standoff is None else f" at {standoff * _MM:g} mm")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
+    for variable in (name for name in v.LAYER_NUMBERS if name in dataset):
+        at_standoff = v.LAYER_STANDOFF in variable.dims
+        for layer in range(dataset.sizes["layer"]):
+            for standoff in dataset[v.LAYER_STANDOFF].values.tolist() if at_standoff else [None]:
+                column = shown(dataset, variable, standoff, layer)
+                if np.isfinite(column.values).any():
+                    name, _, _ = column.title.partition("\n")
+                    columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
     return columns
 
 

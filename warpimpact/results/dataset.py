@@ -3,8 +3,6 @@ hold.
 
 Inside the package everything is in SI and radians; angles become degrees here. The Dataset follows the CF conventions
 and opens with plain ``xarray.open_dataset``.
-
-Long because all that build and read a Dataset stands together.
 """
 
 from __future__ import annotations
@@ -17,9 +15,9 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.layers import of_layers, sections
 from warpimpact.results.table import Table
 from warpimpact.scene import Plate
-from warpimpact.scene.target import value_in
 
 if TYPE_CHECKING:
     import xarray
@@ -81,15 +79,21 @@ def to_table(
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
     values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
-    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *v.LAYER_VARIABLES)
+    layered: tuple[v.Variable, ...] = v.LAYER_VARIABLES
+    along: tuple[v.Variable, ...] = (*v.COORDINATES, *v.OUTLINE_VARIABLES)
+    if scene.target.layers and scene.record.layer_standoffs:
+        layered = (*layered, *v.LAYER_STANDOFF_VARIABLES)
+        along = (*along, *v.LAYER_COORDINATES)
+        coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
+    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layered)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
-    values |= _of_layers(scene, shots)
+    values |= of_layers(scene, shots)
     if v.EXIT_POSITION in values:
         zero = np.zeros(len(shots))
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
     told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
-    optional = (*told, *v.LAYER_VARIABLES, *v.LAYER_FACES)
+    optional = (*told, *layered, *v.LAYER_FACES)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
     if estimates is not None:
         variables += v.ESTIMATE_VARIABLES
@@ -100,7 +104,7 @@ def to_table(
         described |= _in_single(described, (*ended, *v.ESTIMATE_VARIABLES))
     return Table.of(
         described,
-        _described((*v.COORDINATES, *v.OUTLINE_VARIABLES), coordinates),
+        _described(along, coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
@@ -231,7 +235,7 @@ def history_dataset(
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
     cells = (replay.cell_y, replay.cell_z)
-    values |= _sections(scene, hit, section)
+    values |= sections(scene, hit, section)
     values |= outlines_in(plate, *((float(some.min()), float(some.max())) for some in cells))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
@@ -252,47 +256,6 @@ def history_dataset(
     return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )
-
-
-def _of_layers(scene: Scene, shots: Shots) -> dict[str, NDArray[np.float64]]:
-    """Faces of the layers, and what differs in them from shot to shot; empty if the plate stands alone."""
-    target = scene.target
-    if not target.layers:
-        return {}
-    values = dict(zip(v.LAYER_FACES, target.faces.T, strict=True))
-    for variable in v.LAYER_SCATTER:
-        if variable in shots.columns:
-            name = variable.removeprefix("layer_")
-            own = [shots.own(name, value_in(target.plate, name))]
-            own += [shots.own_of_layer(name, k, value_in(layer, name)) for k, layer in enumerate(target.layers)]
-            values[variable] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
-    return values
-
-
-def _sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
-    """Faces of the layers for one hit, and where each is solid along y and z through the hit point; empty if the plate
-    stands alone."""
-    target, hit_y, hit_z = scene.target, float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
-    if not target.layers:
-        return {}
-
-    def own(name: str) -> list[float]:
-        means = [value_in(plate, name) for plate in target.plates]
-        return hit[f"layer_{name}"].values.tolist() if f"layer_{name}" in hit else means
-
-    thickness = own("thickness")
-    if v.THICKNESS in hit:
-        thickness[0] = float(hit[v.THICKNESS])
-    front = np.array(target.fronts([np.array(one) for one in thickness]))
-    places = list(zip(target.plates, own("offset_y"), own("offset_z"), strict=True))
-    along_y = [plate.is_solid(hit_y - y + section, np.array(hit_z - z)) for plate, y, z in places]
-    along_z = [plate.is_solid(np.array(hit_y - y), hit_z - z + section) for plate, y, z in places]
-    return {
-        v.LAYER_FRONT: front,
-        v.LAYER_REAR: front + np.array(thickness),
-        v.LAYER_SOLID_ALONG_Y: np.array(along_y).astype(np.int8),
-        v.LAYER_SOLID_ALONG_Z: np.array(along_z).astype(np.int8),
-    }
 
 
 def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:

@@ -14,7 +14,7 @@ import netCDF4
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.checks import fault, unusable
+from warpimpact.results.checks import fault, history_fault, packing_fault, study_fault, unusable
 from warpimpact.results.dataset import numbered
 from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import write_table
@@ -197,7 +197,10 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"; where it was chosen from '
                 "one, keep its attributes"
             )
-        if not is_history(dataset):
+        if is_history(dataset):
+            if found := history_fault(dataset):
+                raise ResultError(f"{path}: not the history of a hit, or damaged: {found}")
+        else:
             if found := unusable(dataset):
                 raise ResultError(f"{path}: {found}")
             optional = (
@@ -206,7 +209,9 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 *v.BURST_VARIABLES,
                 *v.ESTIMATE_VARIABLES,
                 *v.LAYER_VARIABLES,
+                *v.LAYER_STANDOFF_VARIABLES,
                 *v.LAYER_FACES,
+                *(name for names in v.GROUPS.values() for name in names),
             )
             _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
@@ -235,7 +240,8 @@ def read_study(path: Path) -> xarray.Dataset:
         missing = {*v.STUDY_COORDINATES, *v.STUDY_VARIABLES} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
-        _check(dataset, path, (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES))
+        if found := study_fault(dataset):
+            raise ResultError(f"{path}: not a study of warpimpact, or damaged: {found}")
         return dataset.load()
 
 
@@ -263,6 +269,8 @@ def _netcdf(path: Path) -> Iterator[xarray.Dataset]:
             needed, size = dataset.nbytes, path.stat().st_size
             if needed > 2**20 + _MOST_PACKED * size:
                 raise ResultError(f"{path}: damaged: it has {size} bytes, but declares {needed} of data")
+            if found := packing_fault(dataset):
+                raise ResultError(f"{path}: damaged: {found}")
             yield dataset
     except RuntimeError as error:
         if not str(error).startswith("NetCDF"):

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import netCDF4
 
 from warpimpact.results import attributes as attr
+from warpimpact.results.checks import draws_fault, posterior_fault
 from warpimpact.results.files import ResultError, aside
 from warpimpact.results.interrupts import uninterrupted
 
@@ -62,8 +63,11 @@ def write(tree: xarray.DataTree, path: Path) -> None:
         tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
 
 
-def read(path: Path) -> xarray.DataTree:
+def read(path: Path, *, draws_alone: bool = False) -> xarray.DataTree:
     """Read a posterior into memory.
+
+    Args:
+        draws_alone: whether its draws are all that is needed of it.
 
     Raises:
         ResultError: the file is missing, is not netCDF, or is no posterior.
@@ -80,6 +84,13 @@ def read(path: Path) -> xarray.DataTree:
     if missing or untold:
         what = f'group "{missing[0]}"' if missing else f'attribute "{untold[0]}"'
         raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
+    groups = {name: loaded[name].to_dataset() for name in GROUPS}
+    if draws_alone:
+        found = draws_fault(groups["posterior"].drop_vars(HITS, errors="ignore"), loaded.attrs)
+    else:
+        found = posterior_fault(groups, loaded.attrs)
+    if found:
+        raise ResultError(f"{path}: not a posterior of warpimpact identify, or damaged: {found}")
     return loaded
 
 

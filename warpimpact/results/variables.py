@@ -72,6 +72,7 @@ class Variable(str):
 
 
 _HIT, _AT_STANDOFF, _IN_LAYER = ("hit",), ("hit", "standoff"), ("hit", "layer")
+_BEHIND_LAYER = ("hit", "layer", "layer_standoff")
 _MAIN = ("run", "inspect", "plot", "report")
 
 # --- Coordinates of a hit map ---
@@ -213,6 +214,25 @@ DEPTH = Variable("depth", _HIT, "m", "how far behind the front face of that laye
 LAYER_VARIABLES = (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, STOPPED_IN, DEPTH)
 """Present only with layers behind the plate, which is layer 0."""
 
+LAYER_STANDOFF = Variable("layer_standoff", ("layer_standoff",), "m", "distance behind the rear face of a layer")
+LAYER_COORDINATES = (LAYER_STANDOFF,)
+LAYER_DEFLECTION = Variable(
+    "layer_deflection", _IN_LAYER, "degree", "angle between velocity and line of fire behind the layer"
+)
+LAYER_STANDOFF_TILT = Variable(
+    "layer_standoff_tilt", _BEHIND_LAYER, "degree", "angle between core axis and line of fire behind the layer"
+)
+LAYER_STANDOFF_PITCH = Variable(
+    "layer_standoff_pitch", _BEHIND_LAYER, "degree", "pitch of the core behind the layer, projected into the x-z plane"
+)
+LAYER_STANDOFF_YAW = Variable(
+    "layer_standoff_yaw", _BEHIND_LAYER, "degree", "yaw of the core behind the layer, projected into the x-y plane"
+)
+
+LAYER_STANDOFF_VARIABLES = (LAYER_DEFLECTION, LAYER_STANDOFF_TILT, LAYER_STANDOFF_PITCH, LAYER_STANDOFF_YAW)
+"""Present only with `output.layer_standoffs`, as LAYER_COORDINATES. No value where free flight ends at the next layer:
+a stand-off and the size of the core are more than the gap."""
+
 LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer, from that of the target")
 LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")
 
@@ -279,6 +299,9 @@ VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 _OF_HITS = (*LIMIT_VARIABLES, *SHOT_VARIABLES, *OUTCOME_VARIABLES, *BENDING_VARIABLES, *BROKEN_VARIABLES)
 HIT_NUMBERS = tuple(v for v in (*_OF_HITS, *LAYER_VARIABLES) if v.is_number_of_hit)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
+
+LAYER_NUMBERS = (LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, *LAYER_STANDOFF_VARIABLES)
+"""Variables with one number per hit and layer, or one for each stand-off behind the layer."""
 
 # --- History of one hit ---
 TIME = Variable("time", ("time",), "s", "time since the first touch of the front face")
@@ -432,5 +455,5 @@ def shot_variables(dataset: xarray.Dataset) -> list[Variable]:
 
 def outcome_variables(dataset: xarray.Dataset) -> list[Variable]:
     """Names of the variables that say how the shots ended."""
-    optional = (*EXIT_VARIABLES, *BENDING_VARIABLES, *BROKEN_VARIABLES, *LAYER_VARIABLES)
+    optional = (*EXIT_VARIABLES, *BENDING_VARIABLES, *BROKEN_VARIABLES, *LAYER_VARIABLES, *LAYER_STANDOFF_VARIABLES)
     return [*OUTCOME_VARIABLES, *(name for name in optional if name in dataset)]

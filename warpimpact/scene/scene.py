@@ -3,6 +3,8 @@
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from .core import AnyCore, Core
@@ -18,15 +20,18 @@ class Record(Model):
 
     Attributes:
         standoffs: distances behind the rear face of the target at which the attitude is reported [m], increasing.
+        layer_standoffs: distances behind the rear face of every layer at which the attitude is reported, too [m],
+            increasing; no value where the next layer is too near for free flight.
         standoff_point: the point of the core that passes them.
         bending: whether the largest bending moment and stress of each core are reported.
     """
 
-    standoffs: Annotated[tuple[PositiveLength, ...], Field(max_length=64)] = ()
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = ()
+    layer_standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = ()
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
     bending: Annotated[bool, Field(strict=True)] = False
 
-    @field_validator("standoffs")
+    @field_validator("standoffs", "layer_standoffs")
     @classmethod
     def _increase(cls, standoffs: tuple[float, ...]) -> tuple[float, ...]:
         for before, after in pairwise(standoffs):
@@ -52,20 +57,52 @@ class Record(Model):
                 "follows from the shape alone"
             )
 
-    def check_standoffs(self, core: Core) -> None:
-        """Refuse stand-offs at which a core may still be in the target.
+    def ahead(self, core: Core) -> float:
+        """How far ahead of the centre of mass the point is that passes the stand-offs [m]."""
+        return core.mass_properties.centre_of_mass if self.standoff_point == "nose" else 0.0
+
+    def _clearance(self, core: Core) -> float:
+        """How far behind a layer, and before the next one, a core is certain to touch neither, however it is turned
+        [m]."""
+        return core.bounding_radius + self.ahead(core)
+
+    def check_standoffs(self, core: Core, target: Target) -> None:
+        """Refuse stand-offs at which a core may still be in the target, and those behind layers that no gap is wide
+        enough for.
 
         Raises:
-            ValueError: names the first stand-off and the least that is allowed.
+            ValueError: names the stand-off and what is allowed.
         """
-        needed = core.bounding_radius
-        if self.standoff_point == "nose":
-            needed += core.mass_properties.centre_of_mass
-        if self.standoffs and self.standoffs[0] < needed:
+        needed = self._clearance(core)
+        for name in ("standoffs", "layer_standoffs"):
+            first = min(getattr(self, name), default=needed)
+            if first < needed:
+                raise ValueError(
+                    f"got {self._name}.{name} of {first:g} m, "
+                    f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
+                )
+        free = self.flies_free(core, target)[:-1]
+        if not target.layers or free.any(axis=0).all():
+            return
+        widest = max(layer.gap for layer in target.layers)
+        if widest < 2.0 * needed:
             raise ValueError(
-                f"got {self._name}.standoffs of {self.standoffs[0]:g} m, "
-                f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
+                f"got {self._name}.layer_standoffs beside gaps of at most {widest:g} m, but a core of this size flies "
+                f"free with certainty only in gaps of at least {2.0 * needed:.4g} m; layer_tilt tells the tilt as it "
+                "leaves each layer"
             )
+        farthest = max(self.layer_standoffs)
+        raise ValueError(
+            f"got {self._name}.layer_standoffs of {farthest:g} m, but the widest gap is {widest:g} m, and free flight "
+            f"is certain to last only to {widest - needed:.4g} m behind the layer in front of it"
+        )
+
+    def flies_free(self, core: Core, target: Target) -> NDArray[np.bool_]:
+        """Whether a core is certain to touch nothing at each of the stand-offs behind each layer, however it is turned:
+        shape [layers, stand-offs]. Behind the last layer it is."""
+        gaps = np.array([*(layer.gap for layer in target.layers), np.inf])
+        reach = np.array(self.layer_standoffs) + self._clearance(core)
+        return np.asarray(reach <= gaps[:, None] * (1.0 + 1e-12))
 
     @property
     def _name(self) -> str:
@@ -102,5 +139,5 @@ class Scene(Model):
     @model_validator(mode="after")
     def _record_is_possible(self) -> Self:
         self.record.check_bending(self.core)
-        self.record.check_standoffs(self.core)
+        self.record.check_standoffs(self.core, self.target)
         return self

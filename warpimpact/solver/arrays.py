@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.bending import Sections, check_bending, sections_of
+from warpimpact.solver.blocks import check_layout, in_blocks
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
@@ -49,6 +50,11 @@ class Grid:
     spacing: float
     taps: Array
 
+    @property
+    def reach(self) -> int:
+        """Reach of the filter [nodes], at least 1."""
+        return max(1, len(self.taps) - 2)
+
 
 @dataclass(frozen=True)
 class Arrays:
@@ -65,6 +71,8 @@ class Arrays:
         onset: κ of the law.
         shots: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         rows: of the trace of each shot; 0 for none.
+        layer_standoffs: distances behind the rear face of every layer [m].
+        ahead: of the centre of mass, the point that passes stand-offs [m].
     """
 
     resolution: Resolution
@@ -78,6 +86,8 @@ class Arrays:
     onset: float
     shots: dict[str, Array]
     rows: int
+    layer_standoffs: Array
+    ahead: float
 
     @property
     def grid(self) -> Grid:
@@ -110,23 +120,24 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         traced: leave room for the history of every shot.
 
     Raises:
-        ValueError: the numerics have no bending moment, which the scene records.
+        ValueError: the numerics have no bending moment, which the scene records, or the block layout does not compute
+            the scene.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
-    core, target = scene.core, scene.target
-    check_bending(scene.record, numerics)
+    core, target, record = scene.core, scene.target, scene.record
+    check_bending(record, numerics)
     resolution = resolve(numerics, scene, shots.columns)
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
     conditions = _conditions(scene, resolution, shots, materials)
-    return Arrays(
+    arrays = Arrays(
         resolution=resolution,
         variant=variant_of(resolution, scene, shots),
         core=core,
         rings=rings,
         azimuths=azimuths_of(around),
-        sections=sections_of(core, rings) if scene.record.bending else None,
+        sections=sections_of(core, rings) if record.bending else None,
         grids=[
             _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length)
             for plate in target.plates
@@ -135,7 +146,13 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         onset=scene.interaction.onset,
         shots=conditions,
         rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
+        layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
+        ahead=record.ahead(core),
     )
+    if resolution.block:
+        check_layout(arrays.variant)
+        return in_blocks(arrays, shots)
+    return arrays
 
 
 def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:

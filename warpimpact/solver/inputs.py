@@ -77,6 +77,7 @@ class Inputs:
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
         target.a2 = self.put(np.array([one.a2 for one in materials]))
+        target.standoffs, target.ahead = self.put(arrays.layer_standoffs), arrays.ahead
         for name, variable in self.stage.Layers.vars.items():
             if getattr(variable.type, "ndim", 1) == 2:
                 rows = np.broadcast_arrays(*(getattr(one, name) for one in materials))
@@ -133,7 +134,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.period_y, plate.period_z = grid.period
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
-    plate.taps, plate.reach = put(grid.taps), max(1, len(grid.taps) - 2)
+    plate.taps, plate.reach = put(grid.taps), grid.reach
     return plate
 
 

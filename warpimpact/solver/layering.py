@@ -31,14 +31,18 @@ def deep_cells(arrays: Arrays, layer: int, cells: int) -> tuple[int, int]:
 class Passages:
     """How the cores of some shots left each layer (kernels/layers.py), on the device.
 
+    Args:
+        free: whether a core flies free at each stand-off behind each layer, shape [layers, stand-offs].
+
     Attributes:
         filled: the struct that the march fills; empty if the plate stands alone.
     """
 
-    def __init__(self, stage: Any, shots: int, layers: int, variant: Variant, device: Any) -> None:
-        self._stage, self._layers, self._layered, self._device = stage, layers, variant.layered, device
+    def __init__(self, stage: Any, shots: int, free: NDArray[np.bool_], variant: Variant, device: Any) -> None:
+        self._stage, self._free, self._layered, self._device = stage, free, variant.layered, device
+        self._layers, standoffs = free.shape
         self.filled = stage.Passage()
-        shapes = (shots,), (shots, layers)
+        shapes = (shots,), (shots, self._layers), (shots, self._layers, standoffs)
         for name, variable in stage.Passage.vars.items() if self._layered else ():
             kind = variable.type
             setattr(self.filled, name, wp.empty(shapes[kind.ndim - 1], dtype=kind.dtype, device=device))
@@ -55,11 +59,16 @@ class Passages:
         if not self._layered:
             return {}
         values = {name: getattr(self.filled, name).numpy() for name in self._stage.Passage.vars}
-        return {
+        at_standoffs = {
+            f"layer_{name}": np.where(self._free, values[name].astype(np.float64), np.nan)
+            for name in ("standoff_tilt", "standoff_pitch", "standoff_yaw")
+        }
+        return at_standoffs | {
             "layer_status": values["status"].astype(np.int8),
             "layer_residual_velocity": values["velocity"].astype(np.float64),
             "layer_tilt": values["tilt"].astype(np.float64),
             "layer_time": values["time"].astype(np.float64),
+            "layer_deflection": values["deflection"].astype(np.float64),
             "stopped_in": values["stopped_in"].astype(np.int8),
             "depth": values["depth"].astype(np.float64),
         }

@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -18,11 +19,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels import free_flight
+from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of
 from warpimpact.solver.bending import bending_columns
+from warpimpact.solver.blocks import first_window
 from warpimpact.solver.bursts import (
     bytes_of,
     check_bursts,
@@ -50,9 +53,6 @@ SHARES = 3
 CPU_LAUNCH = 0.25
 """Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
 CUDA_CHUNK = 65536
-WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
-"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
-its fine grid, large windows cost more time than the repetition of some shots."""
 MAX_DOUBLINGS = 6
 """Largest number of times that the windows are doubled for the shots that left theirs."""
 MEMORY_SHARE = 0.5
@@ -77,7 +77,7 @@ class March:
         traced: bool = False,
     ) -> None:
         self.scene, self.shots, self.device = scene, shots, device
-        self.threads = threads or cores()
+        self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
         check_bursts(shots, numerics)
         self.arrays = arrays_of(scene, numerics, shots, traced=traced)
         self.inputs = Inputs(self.arrays, device)
@@ -85,7 +85,8 @@ class March:
         self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
-        self.passages = Passages(self.stage, len(shots), len(self.inputs.plates), self.variant, device)
+        free = scene.record.flies_free(scene.core, scene.target)
+        self.passages = Passages(self.stage, len(shots), free, self.variant, device)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None) -> Any:
@@ -99,10 +100,18 @@ class March:
             pending = whole_plates(outcomes.status.numpy() == Status.LEFT_WINDOW, self.at_a_plate)
             if not len(pending) or not self._fits(2 * self.cells[0], 2 * self.cells[1]):
                 break
-            self.cells = (2 * self.cells[0], 2 * self.cells[1])
+            self._widen()
         outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
         progress(count, count)
         return outcomes
+
+    def _widen(self) -> None:
+        """Double the windows; those that do not fit a block are for the simple layout."""
+        self.cells = (2 * self.cells[0], 2 * self.cells[1])
+        if 0 < self.variant.window < math.prod(self.cells):
+            self.arrays = replace(self.arrays, variant=replace(self.variant, window=0))
+            self.inputs = Inputs(self.arrays, self.device)
+            self.variant, self.stage = self.arrays.variant, self.inputs.stage
 
     def traces(self, contact: Any) -> list[Array]:
         """The trace of every shot of a traced march, with the state at its end."""
@@ -157,11 +166,10 @@ class March:
         count, record = len(self.shots), self.scene.record
         flight, standoffs = free_flight.build(self.variant), np.array(record.standoffs, dtype=np.float64)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
-        ahead = self.scene.core.mass_properties.centre_of_mass if record.standoff_point == "nose" else 0.0
         wp.launch(
             flight.kernel,
             count,
-            inputs=[self.inputs.shots, contact, self.inputs.put(standoffs, wp.float64), ahead],
+            inputs=[self.inputs.shots, contact, self.inputs.put(standoffs, wp.float64), self.arrays.ahead],
             outputs=[report],
             device=self.device,
         )
@@ -186,17 +194,8 @@ class March:
         return filled
 
     def _window_cells(self) -> tuple[int, int]:
-        """Cells of a window that holds the footprint of a core that keeps its attitude through the plate."""
-        shots, arrays = self.shots, self.arrays
-        slack = NODAL_SLACK if self.variant.nodal else WINDOW_SLACK
-        steepest = float(shots.obliquity.max())
-        turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
-        half = (
-            slack * arrays.core.max_radius / math.cos(steepest)
-            + float(arrays.shots["thickness"].max()) * math.tan(steepest)
-            + arrays.core.bounding_radius * turned
-        )
-        cells_y = cells_z = 2 * (math.ceil(half / arrays.grid.spacing) + 2 * self.inputs.plate.reach + 3)
+        """Cells of a first window, or what memory allows."""
+        cells_y = cells_z = first_window(self.arrays, self.shots)
         while not self._fits(cells_y, cells_z):  # a shot that leaves a smaller window ends as LEFT_WINDOW
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
@@ -213,7 +212,8 @@ class March:
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        areas = size * (LANES if self.variant.window else 1)
+        per_ring: int = areas + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings: int = self.inputs.surface.rings * per_ring
         nodes = self._nodes(cells_y, cells_z)
         earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
@@ -221,6 +221,8 @@ class March:
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
+        if self.variant.window and self.device.is_cuda:  # the others are in shared memory
+            return ["filtered"] if self._keeps_fields else []
         return [name for name in self.stage.Fields.vars if name not in ("cells_y", "cells_z") and self._keeps_fields]
 
     @property
@@ -254,7 +256,7 @@ class March:
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         rings = slots * self.inputs.surface.rings
-        touches.ring_area = empty(rings)
+        touches.ring_area = empty(rings * (LANES if self.variant.window else 1))
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)
@@ -272,9 +274,11 @@ class March:
     ) -> int:
         """March `count` shots from order[first] on; returns `count`."""
         inputs = self.inputs
-        wp.launch(
+        launch = partial(wp.launch, dim=count)
+        if self.variant.window:
+            launch = partial(wp.launch_tiled, dim=[count], block_dim=LANES)
+        launch(
             self.stage.kernel,
-            count,
             inputs=[
                 first,
                 slots,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight
 from warpimpact.kernels import march as marching
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.arrays import variant_of
+from warpimpact.solver.arrays import arrays_of, variant_of
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import March, Progress
@@ -99,7 +99,13 @@ class LayeredOutcomes(Outcomes):
         layer_residual_velocity: speed at that instant [m/s], shape [shots, layers].
         layer_tilt: angle between core axis and line of fire at that instant [rad], shape [shots, layers].
         layer_time: that instant, from the first touch of the front face on [s], shape [shots, layers].
-        stopped_in: the deepest layer that the core rests in, −1 for a core that does not rest in one, shape [shots].
+        layer_deflection: angle between the velocity at that instant and the line of fire [rad], shape [shots, layers].
+        layer_standoff_tilt: angle between core axis and line of fire at the stand-offs behind each layer [rad], shape
+            [shots, layers, stand-offs]. NaN where the core does not get there, or where free flight ends at the next
+            layer (`Record.flies_free`).
+        layer_standoff_pitch, layer_standoff_yaw: projected angles of the axis there [rad], of that shape.
+        stopped_in: the deepest layer that the core rests in, shape [shots]; −1 for a core that does not rest in one,
+            such as one that stays between two of them.
         depth: how far behind the front face of this layer any point of the core came [m], shape [shots]; else NaN.
     """
 
@@ -107,6 +113,10 @@ class LayeredOutcomes(Outcomes):
     layer_residual_velocity: Array
     layer_tilt: Array
     layer_time: Array
+    layer_deflection: Array
+    layer_standoff_tilt: Array
+    layer_standoff_pitch: Array
+    layer_standoff_yaw: Array
     stopped_in: NDArray[np.int8]
     depth: Array
 
@@ -177,6 +187,8 @@ def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
     """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
     resolution = resolve(numerics or Numerics(), scene, shots.columns)
     variant = variant_of(resolution, scene, shots)
+    if resolution.block:  # the window is a part of this variant
+        variant = arrays_of(scene, numerics or Numerics(), shots).variant
     for stage in (marching, free_flight):
         load(stage.build(variant).kernel, find_device(device))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpimpact.scene import Symmetry
 from warpimpact.solver.refinement import Estimates
-from warpimpact.solver.simulate import Outcomes, Replay
+from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, Replay
 
 
 def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
@@ -22,6 +22,13 @@ def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
     every = _repeated(outcomes, len(group))
     signs = np.tile([s.polar for s in group], (len(outcomes.status), 1))
     axial = np.tile([s.axial for s in group], (len(outcomes.status), 1))
+    if isinstance(every, LayeredOutcomes):
+        along_y, along_z = signs[:, 1, None, None], signs[:, 2, None, None]
+        every = replace(
+            every,
+            layer_standoff_yaw=every.layer_standoff_yaw * along_y,
+            layer_standoff_pitch=every.layer_standoff_pitch * along_z,
+        )
     return replace(
         every,
         angular_velocity=every.angular_velocity * axial,

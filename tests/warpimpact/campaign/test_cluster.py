@@ -1,5 +1,7 @@
 """Runs on a cluster of worker processes: the bits of a local run, even if a worker is killed during the run."""
 
+import io
+import logging
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -111,6 +113,41 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
     team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
     with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
         run_to_file(campaign, output, team=team, progress=lose_it)
+
+
+@pytest.mark.parametrize("lost", ["unreachable", "closed"])
+@pytest.mark.parametrize("request_", ["nthreads", "submit"])
+def test_a_scheduler_that_is_lost_between_tasks_is_told(
+    lost: str, request_: str, campaign: Campaign, cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client that has lost its scheduler raises one of these where it asks for anything."""
+    error = {
+        "unreachable": OSError("Timed out trying to connect to tcp://127.0.0.1:1 after 20 s"),
+        "closed": distributed.client.ClosedClientError("Client is closed"),
+    }[lost]
+
+    def lose_it(*_: object, **__: object) -> None:
+        raise error
+
+    def lose_all(_: Standing) -> None:
+        monkeypatch.setattr(distributed.Client, request_, lose_it)
+
+    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
+    with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
+        run_to_file(campaign, tmp_path / "a.nc", team=team, progress=lose_all)
+
+
+def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(campaign: Campaign, cluster: object) -> None:
+    said = io.StringIO()
+    handler = logging.StreamHandler(said)
+    logging.getLogger("distributed").addHandler(handler)
+    try:
+        with cluster_team(campaign, address=cluster.scheduler_address, device="cpu"):
+            logging.getLogger("distributed.client").error("Traceback (most recent call last)")
+        logging.getLogger("distributed.client").error("printed again")
+    finally:
+        logging.getLogger("distributed").removeHandler(handler)
+    assert said.getvalue() == "printed again\n"
 
 
 def test_workers_of_this_machine_listen_on_the_loopback(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:

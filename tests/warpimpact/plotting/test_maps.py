@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels.status import LayerStatus, Status
 from warpimpact.plotting import cell, hit_map, hit_maps, overview, save_beside, save_maps, status_map
 from warpimpact.scene import NoPattern
 
@@ -225,7 +225,7 @@ def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered
 
 
 def test_every_status_has_its_own_colour():
-    assert len({to_rgb(colour) for colour in cell.STATUS_COLOURS}) == len(Status)
+    assert len({to_rgb(colour) for colour in cell.STATUS_COLOURS}) == len(LayerStatus)
 
 
 def test_overview_shows_four_aligned_maps(covered):

@@ -12,7 +12,7 @@ from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate, P
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run
 from warpimpact.plotting import trajectory
-from warpimpact.plotting.trajectory import Pose, silhouette
+from warpimpact.plotting.poses import INSTANTS, Pose, silhouette
 
 LENGTH, CENTRE = 27.86e-3, 18.05e-3
 THICKNESS = 4e-3
@@ -68,7 +68,7 @@ def test_passage_shows_the_core_from_first_touch_to_the_end(history: xarray.Data
     figure = trajectory.passage(history)
     for view, axis in enumerate("yz"):
         outlines = cores(figure, view)
-        assert len(outlines) == trajectory.INSTANTS
+        assert len(outlines) == INSTANTS
         for outline, step in ((outlines[0], 0), (outlines[-1], -1)):
             pose = Pose(history["plate_position"].values[step], history["core_axis"].values[step])
             np.testing.assert_allclose(outline[:-1], silhouette(history, pose, axis) * 1e3)

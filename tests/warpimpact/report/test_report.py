@@ -22,7 +22,7 @@ from warpimpact.campaign.replay import replay
 from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.plotting.trajectory import poses_behind, poses_in_plate, silhouette
+from warpimpact.plotting.poses import poses_behind, poses_in_plate, silhouette
 from warpimpact.report import hits, report
 from warpimpact.results import files
 

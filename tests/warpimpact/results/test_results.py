@@ -16,6 +16,7 @@ from warpimpact.results.variables import (
     BENDING_VARIABLES,
     BURST_VARIABLES,
     EXIT_VARIABLES,
+    LAYER_STANDOFF_VARIABLES,
     LAYER_VARIABLES,
     OUTCOME_VARIABLES,
     SCATTER_VARIABLES,
@@ -237,4 +238,5 @@ def test_every_field_of_shots_and_outcomes_has_a_variable():
     ended = {*OUTCOME_VARIABLES, *EXIT_VARIABLES}
     assert {field.name for field in dataclasses.fields(Outcomes)} == ended
     assert {field.name for field in dataclasses.fields(BentOutcomes)} == ended | set(BENDING_VARIABLES)
-    assert {field.name for field in dataclasses.fields(LayeredOutcomes)} == ended | set(LAYER_VARIABLES)
+    of_layers = {*LAYER_VARIABLES, *LAYER_STANDOFF_VARIABLES}
+    assert {field.name for field in dataclasses.fields(LayeredOutcomes)} == ended | of_layers

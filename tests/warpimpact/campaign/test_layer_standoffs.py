@@ -1,0 +1,134 @@
+"""Stand-offs behind layers in a campaign: what a result, its table, its figures and a replay tell of them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign, hit_map, run, to_dataframe
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.text import CampaignError
+from warpimpact.plotting import poses
+from warpimpact.plotting.cell import shown
+from warpimpact.plotting.maps import layers_figure
+from warpimpact.results import files
+
+CAMPAIGN = """
+title = "two layers"
+[core]
+shape = "polynomial"
+coefficients = [3.0e-4, 0.24, -5.29]
+length = "27.86 mm"
+mass = "4 g"
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+pattern = { shape = "slot", length = "12 mm", width = "4 mm", spacing = ["8 mm", "16 mm"], staggered = true }
+[[layer]]
+gap = "60 mm"
+thickness = "2 mm"
+resistance = "2600 MPa"
+[[layer]]
+gap = "80 mm"
+thickness = "1 mm"
+resistance = "1 GPa"
+[impact]
+velocity = "825 m/s"
+[hits]
+count = 16
+seed = 2
+irreducible = true
+[numerics]
+time_step = "2 us"
+[output]
+standoffs = ["50 mm"]
+layer_standoffs = ["20 mm", "40 mm", "50 mm"]
+solid_reference = false
+"""
+
+
+def campaign(text: str = CAMPAIGN) -> Campaign:
+    return Campaign.from_text(text, name="test", folder=Path())
+
+
+@pytest.fixture(scope="module")
+def result() -> xarray.Dataset:
+    return run(campaign(), device="cpu")
+
+
+def test_a_file_keeps_them(result: xarray.Dataset, tmp_path: Path) -> None:
+    files.write(result, tmp_path / "layers.nc")
+    again = files.read(tmp_path / "layers.nc")
+    assert again["layer_standoff"].values.tolist() == [0.02, 0.04, 0.05]
+    tilt = again["layer_standoff_tilt"]
+    assert tilt.dims == ("hit", "layer", "layer_standoff")
+    np.testing.assert_array_equal(tilt, result["layer_standoff_tilt"])
+    known = np.isfinite(tilt.values).all(axis=0)  # 50 mm and 18 mm of core are more than a gap of 60 mm
+    assert known.tolist() == [
+        [True, True, False],
+        [True, True, True],
+        [True, True, True],
+    ]
+
+
+def test_images_of_a_hit_have_mirrored_angles(result: xarray.Dataset) -> None:
+    images = int(result.attrs["images"])
+    assert images > 1
+    for name in ("layer_standoff_yaw", "layer_standoff_pitch"):
+        angle = result[name].values[:images, 0, 0]
+        assert np.abs(angle).max() > 0.1
+        assert np.ptp(np.abs(angle)) == 0.0
+        assert len(set(np.sign(angle))) == 2, name
+    whole = np.sign(result["yaw"].values[:images, 0])
+    assert abs((np.sign(result["layer_standoff_yaw"].values[:images, 2, 2]) * whole).sum()) == images
+
+
+def test_a_table_has_a_column_for_each(result: xarray.Dataset) -> None:
+    table = to_dataframe(result)
+    np.testing.assert_array_equal(table["layer_standoff_tilt_0_40mm"], result["layer_standoff_tilt"][:, 0, 1])
+    np.testing.assert_array_equal(table["layer_deflection_1"], result["layer_deflection"][:, 1])
+
+
+def test_maps_choose_the_layer(result: xarray.Dataset) -> None:
+    image = hit_map(result, "layer_standoff_tilt", standoff=0.04, layer=0, pixels=20)
+    assert set(np.unique(image)) <= set(result["layer_standoff_tilt"].values[:, 0, 1].astype(float))
+    assert shown(result, "layer_standoff_tilt", 0.02, 0).title.startswith("tilt, 20 mm behind layer 0")
+    np.testing.assert_array_equal(shown(result, "layer_tilt").values, result["layer_tilt"].values[:, 2])
+    with pytest.raises(ValueError, match=r"has no layer 3; it has layers 0 \(the plate\) to 2"):
+        hit_map(result, "layer_tilt", layer=3)
+
+
+def test_the_figure_of_layers_has_a_row_for_each(result: xarray.Dataset) -> None:
+    titles = [axes.get_title() for axes in layers_figure(result).axes if axes.get_title()]
+    assert titles[0] == "layer 0\nperforated 100.0%"
+    assert [title.splitlines()[0] for title in titles[1::3]] == [f"residual velocity, layer {k}" for k in range(3)]
+    behind = [f"tilt, {at} mm behind layer {k}" for k, at in enumerate((40, 50, 50))]
+    assert [title.splitlines()[0] for title in titles[2::3]] == behind
+
+
+def test_a_replay_shows_the_core_between_the_layers(result: xarray.Dataset) -> None:
+    history = replay(result, 3)
+    assert history.attrs["agreement"] == "bit-identical"
+    found = poses.poses_behind(history)
+    assert list(found) == [
+        *(f"{at} mm behind\nlayer 0" for at in (20, 40)),
+        *(f"{at} mm behind\nlayer 1" for at in (20, 40, 50)),
+        "50 mm",
+    ]
+    pose = found["40 mm behind\nlayer 0"]
+    assert pose.position[0] == pytest.approx(0.044, abs=1e-9)
+    tilt = np.degrees(np.arccos(pose.axis[0]))
+    assert tilt == pytest.approx(float(result["layer_standoff_tilt"][3, 0, 1]), abs=1e-3)
+
+
+def test_a_plate_alone_has_no_stand_offs_behind_layers() -> None:
+    front, _, behind = CAMPAIGN.partition("[[layer]]")
+    alone = front + behind[behind.index("[impact]") :]
+    with pytest.raises(CampaignError, match=r"got output.layer_standoffs without \[\[layer\]\]"):
+        campaign(alone)
+
+
+def test_distances_that_no_gap_holds_are_refused() -> None:
+    with pytest.raises(CampaignError, match=r"got output.layer_standoffs of 0.07 m, but the widest gap is 0.08 m"):
+        campaign(CAMPAIGN.replace('"40 mm", "50 mm"]', '"70 mm"]'))
