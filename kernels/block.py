@@ -1,4 +1,4 @@
-"""The load of one step in the block layout: the lanes of a block share out the patches of a ring (kernels/lanes.py).
+"""The load of one step in the block layout: the lanes of a block share out the patches (kernels/lanes.py).
 
 The passes, the law and the filter are those of the simple layout (kernels/contact.py, kernels/exposure.py). Different
 are the place of the window, in the block's shared memory, and how exposure is added to it: as whole numbers, because
@@ -15,9 +15,10 @@ Where the barriers stand, and what would go wrong without each of them (E is the
 6. After `settle`: the next step adds to nodes of G that other lanes clear.
 7. After the window is cleared (`open_window`), as after 6.
 
-Touches need none: a patch belongs to one lane in both passes. `settle` needs none before it for G: it goes over the
-same nodes, in the same lanes, as the second direction of the filter. All conditions around barriers hold for all lanes
-alike, since they follow from sums over the lanes or from the state.
+Butterflies stand between the passes and 5, and between the steps. They make lanes wait, but order no memory: hence 5, 6
+and 7. Touches need no barrier: a patch belongs to one lane in both passes. Nor does `settle` need one before it for G:
+it goes over the same nodes, in the same lanes, as the second direction of the filter. All conditions around barriers
+hold for all lanes alike, since they follow from sums over the lanes or from the state.
 """
 
 from functools import cache
@@ -53,7 +54,7 @@ def build(variant: Variant) -> SimpleNamespace:
     Law, Load, Slopes, Footprint = laws.Law, motion.Load, resistances.Slopes, footprint.build(variant).Footprint
     Fields, Touches = memories.Fields, touching.Touches
     reals, integers = memory.build(real), memory.build(wp.int32)
-    read, write, read_index = reals.read, reals.write, integers.read
+    read, read_index = reals.read, integers.read
 
     @wp.func
     def own_fields(fields: Fields, slot: wp.int32):
@@ -77,14 +78,14 @@ def build(variant: Variant) -> SimpleNamespace:
         return window
 
     @wp.func
-    def expose(surface: Surface, fields: Fields, touches: Touches, first: wp.int32, units: real):
-        """Add the exposure of this lane's patches of a ring to the plate."""
-        j = block.lane()
-        while j < surface.around:
-            gain = read(touches.gain, first + j)
+    def expose(fields: Fields, touches: Touches, base: wp.int32, begin: wp.int32, end: wp.int32, units: real):
+        """Add the exposure of this lane's patches, of those with begin ≤ j < end, to the plate."""
+        j = begin + block.lane()
+        while j < end:
+            gain = read(touches.gain, base + j)
             if gain > zero:
-                cell = read_index(touches.cell, first + j)
-                y, z = read(touches.y, first + j), read(touches.z, first + j)
+                cell = read_index(touches.cell, base + j)
+                y, z = read(touches.y, base + j), read(touches.z, base + j)
                 whole.scatter(fields.gain, fields.cells_z, cell, y, z, gain * units)
             j += block.count()
 
@@ -114,43 +115,27 @@ def build(variant: Variant) -> SimpleNamespace:
         dt: real,
     ):
         """As in the simple layout (kernels/contact.py), by all lanes of a block."""
-        base = slot * surface.rings * surface.around
-        areas = slot * surface.rings * block.count() + block.lane()  # of this lane's patches of a ring
         load = Load()
-        coarsest = zero
-        for index in range(found.first_ring, found.last_ring + 1):
-            ring = surfaces.ring_at(surface, pose, index)
-            area = zero
-            if surfaces.closes(pose, ring):
-                first = base + index * surface.around
-                area = touching.find_touches(surface, plate, law, fields, window, touches, pose, ring, first, dt)
-            write(touches.ring_area, areas + index * block.count(), area)
-            load.touching = load.touching or area > zero
-            coarsest = wp.max(coarsest, ring.area)
-        load.touching = block.any_of(load.touching)
+        begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
+        base = slot * surface.rings * surface.around - begin
+        touching.find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
+        load.touching = block.any_of(touching.meet(plate, touches, base + begin, end - begin) > zero)
         if load.touching:
             if wp.static(variant.degrades):
+                coarsest = zero
+                for index in range(found.first_closing, found.last_closing + 1):
+                    coarsest = wp.max(coarsest, read(surface.area, index))
                 units = whole.units(law, window, coarsest, wp.length(pose.velocity), dt)
-                for index in range(found.first_ring, found.last_ring + 1):
-                    if read(touches.ring_area, areas + index * block.count()) > zero:
-                        expose(surface, fields, touches, base + index * surface.around, units)
+                expose(fields, touches, base, begin, end, units)
                 block.barrier()
                 whole.measure(fields.gain, window, found.box, units)
                 block.barrier()
                 memories.spread(plate, fields, window, found.box)
                 block.barrier()
-            slopes = Slopes()
-            for index in range(found.first_ring, found.last_ring + 1):
-                if read(touches.ring_area, areas + index * block.count()) > zero:
-                    ring = surfaces.ring_at(surface, pose, index)
-                    first = base + index * surface.around
-                    sums = touching.sum_ring(surface, law, fields, touches, pose, ring, first)
-                    load.force += sums.force
-                    load.moment += sums.moment
-                    slopes = resistances.added(slopes, resistances.slopes_of(ring, sums))
-            load.force = block.total_triple(load.force)
-            load.moment = block.total_triple(load.moment)
-            slopes = total_slopes(slopes)
+            sums = touching.sum_patches(surface, law, fields, touches, pose, base, begin, end)
+            load.force = block.total_triple(sums.force)
+            load.moment = block.total_triple(sums.moment)
+            slopes = total_slopes(sums.slopes)
             load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
             load.damping_vv = half * resistances.damping_vv(slopes)
             load.damping_vw = half * resistances.damping_vw(slopes)

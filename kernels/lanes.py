@@ -24,6 +24,8 @@ BLOCKS = 12
 registers to a lane."""
 LANE = "WP_TILE_THREAD_IDX"
 """Number of this lane in native code."""
+WAIT = "WP_TILE_SYNC();"
+"""A barrier in native code on a CPU: lanes that run one after another take turns there."""
 
 
 def split(variant: Variant) -> Callable[[str], str]:
@@ -73,11 +75,11 @@ def build(variant: Variant) -> SimpleNamespace:
         """Number of lanes."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(f"""
     #if defined(__CUDA_ARCH__)
         __syncwarp();
     #else
-        WP_TILE_SYNC();
+        {WAIT}
     #endif
     """)
     def barrier():
@@ -125,7 +127,9 @@ def build(variant: Variant) -> SimpleNamespace:
             return wp::array_t<{kind}>(field.data + slot * nodes, nodes);
         #endif
         """)
-        def place(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real): ...
+        def place(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real):
+            """A block's own nodes of one field."""
+            ...
 
         return place
 

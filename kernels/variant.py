@@ -8,10 +8,11 @@ from typing import Any
 import warp as wp
 
 CPU_FLAGS = (
-    "-march=native -mllvm=-inline-threshold=9000 -mstackrealign "
+    "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign "
     "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )
-"""Flags that let the compiler vectorise sums and divisions; NaN and infinity keep their meaning."""
+"""Flags that let the compiler vectorise sums and divisions, as wide as the processor can; its default for Intel is half
+of that. NaN and infinity keep their meaning."""
 
 
 @dataclass(frozen=True)

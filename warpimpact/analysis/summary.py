@@ -72,7 +72,8 @@ def promise_text(dataset: Result) -> str | None:
     tolerance = PROMISES[given["fidelity"]].tolerance
     stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
-    found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg"
+    depth = f" and {1e3 * told[attr.DEPTH_ERROR_P90]:.2g} mm of depth" if attr.DEPTH_ERROR_P90 in told else ""
+    found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg{depth}"
     if told[attr.PROMISE_KEPT]:
         return f"{given['fidelity']} keeps its promise ({stated}); {found}"
     return f"{given['fidelity']} does not keep its promise ({stated}) at the finest level it may use; {found}"

@@ -40,6 +40,7 @@ from ..scene.symmetry import check_layers, check_scatter
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
 from ..solver.bending import check_bending
+from ..solver.blocks import check_layout
 from ..solver.resolution import ONE_PLATE
 from .apart import with_scatter_apart
 from .drawn import DrawnSampler, Posterior, read_posterior
@@ -308,6 +309,18 @@ class Campaign(Model):
     def _core_has_a_bending_moment(self) -> Self:
         self.output.check_bending(self.core)
         check_bending(self.output, self.numerics)
+        return self
+
+    @model_validator(mode="after")
+    def _layout_computes_the_scene(self) -> Self:
+        if self.numerics.layout == "block":
+            check_layout(
+                nodal=self.numerics.scheme == "nodal",
+                double=self.numerics.precision == "double",
+                bends=self.output.bending,
+                layered=bool(self.layer),
+                burst=self.burst is not None,
+            )
         return self
 
     @model_validator(mode="after")

@@ -238,6 +238,7 @@ def _promised(promise: Promise) -> dict[str, Any]:
         attr.PROMISE_KEPT: int(promise.kept),
         attr.RESIDUAL_VELOCITY_ERROR_P90: promise.residual_velocity_error,
         attr.TILT_ERROR_P90: math.degrees(promise.tilt_error),
+        **({} if math.isnan(promise.depth_error) else {attr.DEPTH_ERROR_P90: promise.depth_error}),
     }
 
 
@@ -251,6 +252,7 @@ def promise_in(dataset: Result) -> Promise | None:
         kept=bool(told[attr.PROMISE_KEPT]),
         residual_velocity_error=float(told[attr.RESIDUAL_VELOCITY_ERROR_P90]),
         tilt_error=math.radians(float(told[attr.TILT_ERROR_P90])),
+        depth_error=float(told.get(attr.DEPTH_ERROR_P90, math.nan)),
     )
 
 

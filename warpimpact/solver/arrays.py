@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.bending import Sections, check_bending, sections_of
-from warpimpact.solver.blocks import check_layout, in_blocks
+from warpimpact.solver.blocks import SIMPLE_ONLY, check_layout, in_blocks
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
@@ -150,7 +150,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         ahead=record.ahead(core),
     )
     if resolution.block:
-        check_layout(arrays.variant)
+        check_layout(**{name: getattr(arrays.variant, name) for name in SIMPLE_ONLY})
         return in_blocks(arrays, shots)
     return arrays
 

@@ -9,17 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpimpact.kernels.variant import Variant
-
 if TYPE_CHECKING:
     from warpimpact.scene import Shots
     from warpimpact.solver.arrays import Arrays
 
-MOST_NODES = 6144
-"""Largest window of a block: with two fields of float32 it fills the 48 KiB of shared memory that a block of every CUDA
-device has."""
-STEP = 512
-"""Windows in shared memory are rounded up to this many nodes, so that few sizes are compiled."""
+SIZES = (1024, 2048, 3072, 4096, 6144)
+"""Windows that blocks have [nodes]; each is compiled by itself. Two fields of float32 of the largest fill the 48 KiB of
+shared memory that a block of every CUDA device has."""
 WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
 """Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
 its fine grid, large windows cost more time than the repetition of some shots."""
@@ -33,13 +29,16 @@ SIMPLE_ONLY: Mapping[str, str] = {
 """What only the simple layout computes: members of `Variant`, and what they are called."""
 
 
-def check_layout(variant: Variant) -> None:
+def check_layout(**wanted: bool) -> None:
     """Refuse what the block layout does not compute.
+
+    Args:
+        wanted: whether each of SIMPLE_ONLY is asked for.
 
     Raises:
         ValueError: names all of it.
     """
-    found = [words for name, words in SIMPLE_ONLY.items() if getattr(variant, name)]
+    found = [SIMPLE_ONLY[name] for name, asked in wanted.items() if asked]
     if found:
         raise ValueError(
             f'got numerics.layout = "block" beside {" and ".join(found)}, but it must be "simple" for that: a block '
@@ -64,5 +63,5 @@ def first_window(arrays: Arrays, shots: Shots) -> int:
 def in_blocks(arrays: Arrays, shots: Shots) -> Arrays:
     """The arrays for the block layout; as they are if the window does not fit a block."""
     nodes = first_window(arrays, shots) ** 2
-    window = STEP * math.ceil(nodes / STEP) if nodes <= MOST_NODES else 0
+    window = next((size for size in SIZES if size >= nodes), 0)
     return replace(arrays, variant=replace(arrays.variant, window=window))

@@ -23,7 +23,7 @@ from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
-from warpimpact.solver.arrays import arrays_of
+from warpimpact.solver.arrays import Arrays, arrays_of
 from warpimpact.solver.bending import bending_columns
 from warpimpact.solver.blocks import first_window
 from warpimpact.solver.bursts import (
@@ -79,15 +79,19 @@ class March:
         self.scene, self.shots, self.device = scene, shots, device
         self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
         check_bursts(shots, numerics)
-        self.arrays = arrays_of(scene, numerics, shots, traced=traced)
-        self.inputs = Inputs(self.arrays, device)
-        self.variant, self.stage = self.arrays.variant, self.inputs.stage
+        self._take(arrays_of(scene, numerics, shots, traced=traced))
         self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
-        self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
-        free = scene.record.flies_free(scene.core, scene.target)
-        self.passages = Passages(self.stage, len(shots), free, self.variant, device)
         self.cells = self._window_cells()
+
+    def _take(self, arrays: Arrays) -> None:
+        """Put the arrays on the device, with what their build of the kernels fills besides the outcomes."""
+        self.arrays, count = arrays, len(self.shots)
+        self.inputs = Inputs(arrays, self.device)
+        self.variant, self.stage = arrays.variant, self.inputs.stage
+        self.bending = wp.empty(count if self.variant.bends else 0, dtype=self.stage.Bending, device=self.device)
+        free = self.scene.record.flies_free(self.scene.core, self.scene.target)
+        self.passages = Passages(self.stage, count, free, self.variant, self.device)
 
     def march(self, progress: Progress | None = None) -> Any:
         """March all shots; repeat those that leave their window in wider windows."""
@@ -109,9 +113,7 @@ class March:
         """Double the windows; those that do not fit a block are for the simple layout."""
         self.cells = (2 * self.cells[0], 2 * self.cells[1])
         if 0 < self.variant.window < math.prod(self.cells):
-            self.arrays = replace(self.arrays, variant=replace(self.variant, window=0))
-            self.inputs = Inputs(self.arrays, self.device)
-            self.variant, self.stage = self.arrays.variant, self.inputs.stage
+            self._take(replace(self.arrays, variant=replace(self.variant, window=0)))
 
     def traces(self, contact: Any) -> list[Array]:
         """The trace of every shot of a traced march, with the state at its end."""
@@ -212,8 +214,7 @@ class March:
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
-        areas = size * (LANES if self.variant.window else 1)
-        per_ring: int = areas + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings: int = self.inputs.surface.rings * per_ring
         nodes = self._nodes(cells_y, cells_z)
         earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
@@ -256,7 +257,7 @@ class March:
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         rings = slots * self.inputs.surface.rings
-        touches.ring_area = empty(rings * (LANES if self.variant.window else 1))
+        touches.ring_area = empty(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)

@@ -25,6 +25,24 @@ SCATTERED = (
     .replace('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }')
     .replace('"4 g"  ', '{ distribution = "normal", mean = "4 g", std = "50 mg" }  ')
 )
+LAYERED_LIMIT = """\
+title = "limits"
+core = { shape = "ogive", diameter = "6.17 mm", length = "27 mm", crh = 3.0, mass = "5.25 g" }
+[plate]
+thickness = "2 mm"
+resistance = "2 GPa"
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[[layer]]
+gap = "10 mm"
+thickness = "4 mm"
+resistance = "3 GPa"
+[impact]
+velocity = "500 m/s"
+[hits]
+count = 300
+[numerics]
+fidelity = "draft"
+"""
 
 pytestmark = pytest.mark.usefixtures("small_shards")
 
@@ -77,6 +95,18 @@ def test_the_command_starts_workers_and_a_local_run_resumes_them(
     path.write_text(campaign.text.replace("count = 3000", "count = 400"), encoding="utf-8")
     assert main(["run", str(path), "-o", str(output), "--device", "cpu", "--workers", "1"]) == 0
     assert main(["run", str(path), "-o", str(local), "--device", "cpu"]) == 0
+    assert_same_bits(output, local)
+
+
+def test_limits_on_workers_are_those_of_a_local_search(
+    tmp_path: Path, assert_same_bits: Callable[[Path, Path], None]
+) -> None:
+    # Workers search their shards apart. The promise of the pilot goes to all of them.
+    path, output, local = tmp_path / "campaign.toml", tmp_path / "a.nc", tmp_path / "local.nc"
+    path.write_text(LAYERED_LIMIT, encoding="utf-8")
+    command = ["limit", str(path), "--quantity", "thickness", "--layer", "1", "--device", "cpu"]
+    assert main([*command, "-o", str(output), "--workers", "2"]) == 0
+    assert main([*command, "-o", str(local)]) == 0
     assert_same_bits(output, local)
 
 
