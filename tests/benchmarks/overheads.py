@@ -1,8 +1,11 @@
 """Costs of a campaign besides the march (start, compilation, file, memory), and what they depend on.
 
     python tests/benchmarks/overheads.py --largest 1000000    # writes results/overheads.json and .png beside it
+    python tests/benchmarks/overheads.py --ratios             # the two ratios alone, printed
 
-The commands are run as a user runs them. A slow result is no failure; the targets stand beside the figures.
+The commands are run as a user runs them. A slow result is no failure; the targets stand beside the figures. The two
+ratios are of commands that run in turn: a run of 100 hits to the bare imports, and a run less such a small one to
+`simulate` with the same shots. Each is given in elapsed time and in processor time, which tells more on a busy machine.
 """
 
 from __future__ import annotations
@@ -10,6 +13,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -23,12 +27,27 @@ from bench import CAMPAIGN, machine, seconds, shots_of, store
 from matplotlib.figure import Figure
 
 from warpimpact import Campaign, Plate, Scene, Shots, SlotPattern
-from warpimpact.campaign.run import run
 from warpimpact.results import files
 from warpimpact.solver.simulate import simulate
 
-COMMAND = [sys.executable, "-c", "import sys; from warpimpact.cli import main; sys.exit(main())"]
-TARGETS = {"help_seconds": 0.3, "warm_run_seconds": 2.0, "compilation_seconds": 5.0, "file_share": 0.1}
+COMMAND = [sys.executable, "-c", "from warpimpact.cli import command; command()"]
+IMPORTS = [sys.executable, "-c", "import warp, numpy, netCDF4, xarray; warp.init()"]
+SIMULATE = """
+import sys, time
+from warpimpact import Campaign, simulate
+from warpimpact.campaign.compute import promise_of
+campaign = Campaign.from_toml(sys.argv[1], count=int(sys.argv[2]))
+fidelity, shots = promise_of(campaign, "cpu").fidelity, campaign.sampler().shots(0, int(sys.argv[2]))
+simulate(campaign.scene, shots[:64], numerics=fidelity, device="cpu")
+begin = time.perf_counter(), time.process_time()
+simulate(campaign.scene, shots, numerics=fidelity, device="cpu")
+print(time.perf_counter() - begin[0], time.process_time() - begin[1])
+"""
+"""Prints the elapsed and the processor time of the shots of a campaign at the level of its promise [s]."""
+TARGETS = {"help_seconds": 0.3, "warm_run_seconds": 2.0, "compilation_seconds": 5.0}
+START_TARGET, CAMPAIGN_TARGET = 1.5, 1.1
+SMALL, COUNTS = 100, (16_384, 65_536)
+"""Hits of a run that is all start, and of those whose time is compared with `simulate`."""
 SMALLEST, PER_DECADE = 1000, 2
 PLATE_SIDES = (0.1, 0.3, 1.0, 3.0, 10.0)  # [m]
 LATTICES = (1, 4, 9, 25)  # unit cells of the pattern that the plate calls one
@@ -38,9 +57,10 @@ REPEATS = 3
 
 
 class Usage(NamedTuple):
-    """Usage of one finished command: elapsed time [s] and peak memory [bytes]."""
+    """Usage of one finished command: elapsed and processor time [s], and peak memory [bytes]."""
 
     seconds: float
+    processor: float
     peak_memory: int
 
 
@@ -50,9 +70,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     campaign = Campaign.from_toml(CAMPAIGN)
     values: dict[str, Any] = {"machine": machine()}
     with tempfile.TemporaryDirectory() as folder:
+        values |= _ratios(Path(folder), arguments.repeats)
+        if arguments.ratios:
+            return 0
         values |= _starts(Path(folder))
         values["hits"] = _hits(Path(folder), arguments.largest)
-        values["file_share"] = _file_share(campaign, Path(folder), arguments.largest)
     straight = _shots(campaign, 0.0)
     values["plate_side"] = _rates(campaign, {side: (_sized(campaign.plate, side), straight) for side in PLATE_SIDES})
     values["lattice"] = _rates(campaign, {count: (_relabelled(campaign.plate, count), straight) for count in LATTICES})
@@ -60,7 +82,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     for name, target in TARGETS.items():
         print(f"{name}: {values[name]:.3g} (target: below {target:g})")
     for row in values["hits"]:
-        print(f"{row['count']} hits: {row['hits_per_second']:.4g} hits/s, {row['peak_memory'] / 2**20:.0f} MiB at most")
+        share = row["compute_seconds"] / row["seconds"]
+        rate, memory = row["hits_per_second"], row["peak_memory"] / 2**20
+        print(f"{row['count']} hits: {rate:.4g} hits/s, {share:.1%} of the time computing, {memory:.0f} MiB at most")
     for name in ("plate_side", "lattice", "widest_yaw"):
         rates = ", ".join(f"{key:g}: {rate:.4g}" for key, rate in values[name].items())
         print(f"hits/s by {name}: {rates}")
@@ -71,27 +95,73 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description="costs of a campaign besides the march, and what they depend on")
     parser.add_argument("--largest", type=int, default=30_000, metavar="N", help="hits at most (default: 30000)")
+    parser.add_argument("--ratios", action="store_true", help="measure and print the two ratios alone")
+    parser.add_argument("--repeats", type=int, default=5, metavar="N", help="repetitions of the ratios (default: 5)")
     return parser
 
 
 def command(*arguments: str, **environment: str) -> Usage:
     """Run the warpimpact command to its end."""
+    return used([*COMMAND, *arguments], **environment)
+
+
+def used(command: list[str], **environment: str) -> Usage:
+    """Run a command to its end."""
     begin = time.perf_counter()
-    child = subprocess.Popen(
-        [*COMMAND, *arguments], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ | environment
-    )
+    child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=os.environ | environment)
     assert child.stderr is not None
     complaint = child.stderr.read()
     _, status, usage = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)  # waited for here, to learn of its memory
     if child.returncode:
-        raise RuntimeError(f"warpimpact {' '.join(arguments)}: {complaint.decode()}")
-    return Usage(time.perf_counter() - begin, 1024 * usage.ru_maxrss)
+        raise RuntimeError(f"{' '.join(command)}: {complaint.decode()}")
+    return Usage(time.perf_counter() - begin, usage.ru_utime + usage.ru_stime, 1024 * usage.ru_maxrss)
 
 
 def _run(folder: Path, count: int, **environment: str) -> Usage:
     output = str(folder / "result.nc")
     return command("run", str(CAMPAIGN), "-o", output, "--overwrite", f"--count={count}", "--device=cpu", **environment)
+
+
+def _ratios(folder: Path, repeats: int) -> dict[str, Any]:
+    """Small runs to bare imports, and runs less a small one to `simulate`: medians over repetitions in turn."""
+    _run(folder, SMALL)  # the first may build the kernels
+    starts = [(used(IMPORTS), _run(folder, SMALL)) for _ in range(repeats)]
+    start = {
+        "imports_seconds": statistics.median(imports.seconds for imports, _ in starts),
+        "run_seconds": statistics.median(small.seconds for _, small in starts),
+        "ratio": statistics.median(small.seconds / imports.seconds for imports, small in starts),
+        "processor_ratio": statistics.median(small.processor / imports.processor for imports, small in starts),
+    }
+    elapsed, processor = start["ratio"], start["processor_ratio"]
+    print(f"run of {SMALL} hits / imports: {elapsed:.2f}, processor {processor:.2f} (target: {START_TARGET})")
+    rows = []
+    for count in COUNTS:
+        turns = [(_run(folder, SMALL), _simulated(count), _run(folder, count)) for _ in range(repeats)]
+        ratios = [(large.seconds - small.seconds) / alone[0] for small, alone, large in turns]
+        of_processor = [(large.processor - small.processor) / alone[1] for small, alone, large in turns]
+        row = {
+            "count": count,
+            "simulate_seconds": statistics.median(alone[0] for _, alone, _ in turns),
+            "ratio": statistics.median(ratios),
+            "processor_ratio": statistics.median(of_processor),
+        }
+        rows.append(row)
+        elapsed, processor = row["ratio"], row["processor_ratio"]
+        print(f"{count} hits / simulate: {elapsed:.3f}, processor {processor:.3f} (target: {CAMPAIGN_TARGET})")
+    return {"start": start, "campaign": rows}
+
+
+def _simulated(count: int) -> tuple[float, float]:
+    """Elapsed and processor time of `simulate` alone [s]."""
+    done = subprocess.run(
+        [sys.executable, "-c", SIMULATE, str(CAMPAIGN), str(count)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    elapsed, processor = map(float, done.stdout.split()[-2:])
+    return elapsed, processor
 
 
 def _starts(folder: Path) -> dict[str, float]:
@@ -125,16 +195,6 @@ def _hits(folder: Path, largest: int) -> list[dict[str, float]]:
             }
         )
     return rows
-
-
-def _file_share(campaign: Campaign, folder: Path, count: int) -> float:
-    """Share of a run that it takes to write its file, without the imports at a first file."""
-    campaign = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
-    files.write(run(campaign, device="cpu"), folder / "first.nc")
-    begin = time.perf_counter()
-    dataset = run(campaign, device="cpu")
-    writing = seconds(lambda: files.write(dataset, folder / "share.nc"))
-    return writing / (time.perf_counter() - begin)
 
 
 def _sized(plate: Plate, side: float) -> Plate:

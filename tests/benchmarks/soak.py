@@ -33,6 +33,7 @@ COMMAND = """
 import resource, signal, sys
 from warpimpact.campaign import parts
 parts.FEWEST = 256
+parts.HELD = 0.1
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if int(sys.argv[1]):
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -151,6 +151,7 @@ def small_shards() -> Iterator[None]:
     """Shards as in small_shards.py."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(parts, "FEWEST", 256)
+        patched.setattr(parts, "HELD", 0.0)
         yield
 
 

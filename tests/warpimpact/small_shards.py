@@ -4,3 +4,4 @@ from warpimpact.campaign import parts
 
 SIZE = 256
 parts.FEWEST = SIZE
+parts.HELD = 0.0  # a test follows the shards on the disk

@@ -2,10 +2,13 @@
 
 Beside RESULT.nc the folder RESULT.nc.parts holds a manifest, which says what is being computed, and the shards, each
 the result of a fixed range of shots. A file is written under another name, flushed and renamed, so that whatever has
-its name is whole; a process that is killed loses what it was computing and no more. The name of a shard ends with a
-checksum of its bytes, its place and the campaign: a shard that was damaged, moved or taken from another run does not
-have it, and is computed again. A lock in the folder keeps a second run away; the system lets go of it when a process
+its name is whole; a process that is killed loses what it was computing and what came in the last HELD seconds. The name
+of a shard ends with a checksum of its bytes, its place and the campaign: a shard that was damaged, moved or taken from
+another run does not have it, and is computed again. The result file grows beside the shards meanwhile; it is worth
+nothing before it is complete. A lock in the folder keeps a second run away; the system lets go of it when a process
 ends, however it ends.
+
+Long because all that may befall a run on the disk stands together.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import json
 import logging
 import re
 import shutil
+import time
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -27,6 +31,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
+from warpimpact.results.growing import Growing
 from warpimpact.results.netcdf import attribute, read_table
 from warpimpact.results.table import Table
 
@@ -35,8 +40,12 @@ _logger = logging.getLogger(__name__)
 _MANIFEST = "manifest.json"
 _SHARDS = "hits_*.nc"
 _LOCK = "lock"
+_GROWING = ".growing.part"
 FEWEST, MOST, SHARDS = 2**11, 2**16, 32
-"""Shots per shard, and how many shards are aimed at between these. A shard costs some 40 ms beside its computing."""
+"""Shots per shard, and how many shards are aimed at between these. A shard costs some 10 ms beside its computing."""
+HELD = 1.0
+"""Seconds for which shards are held before they are on the disk, if they are few: a run that is that short needs none
+there."""
 
 
 def extent(count: int, at_a_plate: int = 1) -> int:
@@ -119,6 +128,10 @@ def claimed(output: Path) -> Iterator[None]:
 class Parts:
     """The shards of one run on the disk, in a folder that is `claimed`.
 
+    Args:
+        grows: whether the result file grows beside the shards as they come, so that no more than its end is left to do
+            when they are there; that needs to know how many there will be.
+
     Attributes:
         output: the result file.
         folder: where the shards are.
@@ -126,13 +139,23 @@ class Parts:
     """
 
     def __init__(
-        self, output: Path, content: Mapping[str, Any], total: int, tell: Callable[[str], object] = warnings.warn
+        self,
+        output: Path,
+        content: Mapping[str, Any],
+        total: int,
+        tell: Callable[[str], object] = warnings.warn,
+        *,
+        grows: bool = False,
     ) -> None:
         self.output, self.content, self.total, self._tell = output, content, total, tell
         self.folder = folder_of(output)
         self.extent: int = content["extent"]
         self.saved: dict[int, Path] = {}
         self._fingerprint = fingerprint(content)
+        self._held: dict[int, Table] = {}
+        self._written = time.monotonic()
+        self._grows, self._grown = grows, 0
+        self._growing: Growing | None = None
 
     @property
     def count(self) -> int:
@@ -262,11 +285,34 @@ class Parts:
         return self.folder / f"{self._stem(index)}_{seal}.nc"
 
     def save(self, index: int, table: Table) -> None:
-        """Put a shard on the disk.
+        """Take in a shard. It is on the disk after HELD seconds at most, if the run goes on.
 
         Raises:
-            OutputError: it cannot be written.
+            OutputError: what was held cannot be written.
         """
+        self._held[index] = table
+        if self._grows:
+            try:
+                self._grow()
+            except OutputError:  # as the disk is full, for instance: the shards are worth more
+                self._stop_growing()
+                self._grows = False
+        if time.monotonic() - self._written >= HELD or len(self._held) * self.extent >= files.CHUNK:
+            self.flush()
+
+    def flush(self) -> None:
+        """Put all shards on the disk.
+
+        Raises:
+            OutputError: one cannot be written; it is held, like those behind it.
+        """
+        while self._held:
+            index = min(self._held)
+            self._write(index, self._held[index])
+            del self._held[index]
+        self._written = time.monotonic()
+
+    def _write(self, index: int, table: Table) -> None:
         placed: dict[int, Path] = {}
 
         def named(written: Path) -> Path:
@@ -277,7 +323,10 @@ class Parts:
         _logger.info("shard %d of %d saved: %d hits", index + 1, self.count, table.sizes["hit"])
 
     def kept(self) -> int:
-        """Shards on the disk, one included that an interrupt has kept from being counted."""
+        """Shards on the disk when a run breaks off, one included that an interrupt has kept from being counted."""
+        self._stop_growing()
+        with suppress(OutputError):
+            self.flush()
         return len(self._shards())
 
     def load(self, index: int) -> Table:
@@ -286,7 +335,24 @@ class Parts:
         Raises:
             OutputError: it is gone or damaged meanwhile.
         """
-        return read_table(self._path(index))
+        return self._held[index] if index in self._held else read_table(self._path(index))
+
+    def _grow(self, count: int | None = None) -> None:
+        """Add the shards to the result file that are there and follow those in it, or the first `count` shards."""
+        if self._growing is None:
+            hits = min(self.total, (self.count if count is None else count) * self.extent)
+            self._growing = Growing(self.output, self.folder / _GROWING, hits)
+        there = self._held.keys() | self.saved.keys()
+        while self._grown in there if count is None else self._grown < count:
+            self._growing.add(self.load(self._grown))
+            self._grown += 1
+
+    def _stop_growing(self) -> None:
+        if self._growing is not None:
+            with suppress(OSError, RuntimeError):
+                self._growing.close()
+        self._growing, self._grown = None, 0
+        (self.folder / _GROWING).unlink(missing_ok=True)
 
     def finish(self, count: int, attributes: Callable[[Table], Mapping[str, Any]]) -> None:
         """Join the first `count` shards into the result file, and remove them.
@@ -297,8 +363,11 @@ class Parts:
         Raises:
             OutputError: the file cannot be written, or a shard is damaged meanwhile; the others are still there.
         """
-        paths = [self._path(index) for index in range(count)]
-        files.join(paths, self.output, {**attributes(self.load(0)), attr.FINGERPRINT: self._fingerprint})
+        told = {**attributes(self.load(0)), attr.FINGERPRINT: self._fingerprint}
+        self._grow(count)
+        assert self._growing is not None  # there are hits
+        self._growing.complete(told)
+        self._held.clear()
         _logger.info("%d shards joined into %s", count, self.output)
         self.discard()
 

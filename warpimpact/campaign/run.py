@@ -89,7 +89,8 @@ def run_to_file(
         Interrupted: by the keyboard; what is saved can be resumed.
     """
     with claimed(output), team or local_team(campaign, device) as members:
-        parts = Parts(output, manifest(campaign, members.made_by), len(campaign.sampler()), tell)
+        content, total = manifest(campaign, members.made_by), len(campaign.sampler())
+        parts = Parts(output, content, total, tell, grows=campaign.stop is None)
         if not parts.begin(resume=resume, overwrite=overwrite):
             return
         try:
@@ -162,7 +163,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
         watch.promise = team.job.promise_in(store.load(min(store.saved)))
     else:
         watch.promise = awaited(team.pilot(), _REPORT_EVERY, lambda: follow(watch.standing(0)))
-    tasks = _tasks(store, len(sampler), team.task)
+    tasks = _tasks(store, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
     waiting: dict[Future[Table], range] = {}
     try:
         while watch.end is None:
@@ -201,19 +202,16 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
     return shots[: max(1, _MOST_SOLID // campaign.at_a_plate) * campaign.at_a_plate]
 
 
-def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
-    """Ranges of shards that the store lacks, of about so many shots each."""
-    most, saved = max(1, shots // store.extent), frozenset(store.saved)
-    missing = (index for index in range(-(-total // store.extent)) if index not in saved)
-    task = range(0)
-    for index in missing:
-        if len(task) == most or index != task.stop:
-            if task:
-                yield task
-            task = range(index, index)
-        task = range(task.start, index + 1)
-    if task:
-        yield task
+def _tasks(store: _Store, total: int, shots: Callable[[], int]) -> Iterator[range]:
+    """Ranges of shards that the store lacks, each of about as many shots as are asked for when it begins."""
+    saved, shards, first = frozenset(store.saved), -(-total // store.extent), 0
+    while first < shards:
+        most, stop = max(1, shots() // store.extent), first
+        while stop < min(first + most, shards) and stop not in saved:
+            stop += 1
+        if stop > first:
+            yield range(first, stop)
+        first = max(stop, first + 1)
 
 
 def _split(table: Table, task: range, size: int) -> Iterator[tuple[int, Table]]:
@@ -261,6 +259,11 @@ class _Watch:
         while self.end is None and self._next in self._early:
             self._early.remove(self._next)
             self._advance(shard if self._next == index else self._load(self._next))
+
+    @property
+    def rate(self) -> float:
+        """Hits per second of computing so far; 0 before the first shard."""
+        return self._hits / self._time if self._time > 0.0 else 0.0
 
     def _advance(self, shard: Table) -> None:
         self._next += 1

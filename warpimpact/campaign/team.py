@@ -25,7 +25,10 @@ from warpimpact.solver.device import DeviceError, cores, find_device
 from warpimpact.solver.refinement import Refining
 
 CUDA_SHOTS = 2**17
-"""Shots per task on a GPU, which fewer would not fill; on a CPU a task is one shard."""
+"""Shots per task on a GPU, which fewer would not fill."""
+CPU_SHOTS, CPU_SECONDS = 2**14, 0.5
+"""Most shots of a task on the CPU of this machine, and the time that it is to take: its set-up, on one core, is lost in
+that. It is one shard at least, and one shard on the worker of a cluster."""
 _HIT_MAP = HitMap()
 
 
@@ -52,7 +55,7 @@ class Team:
         submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Table
             comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
-        task: shots per task.
+        task: shots per task, for a rate of shots per second; 0 where that is not known yet.
         made_by: versions, kind of device and the job's content, which decide the bits.
         underway: how many shots of unfinished tasks are done.
         refining: the task that has the longest way to its tolerance, None if there is none or it is not known.
@@ -62,7 +65,7 @@ class Team:
     pilot: Callable[[], Future[Any]]
     submit: Callable[[Any, Shots, Shots | None], Future[Table]]
     width: Callable[[], int]
-    task: int
+    task: Callable[[float], int]
     made_by: dict[str, str]
     underway: Callable[[], int]
     refining: Callable[[], Refining | None]
@@ -142,7 +145,7 @@ def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Itera
             pilot=lambda: begin(job.promise_of, campaign, str(devices[0]), progress),
             submit=lambda *shots: begin(work, *shots),
             width=lambda: 2 * len(devices),
-            task=_task_size(kind),
+            task=lambda rate: _task_size(kind) or min(CPU_SHOTS, int(CPU_SECONDS * rate)),
             made_by=kind | dict(job.content),
             underway=lambda: sum(done.copy().values()),
             refining=lambda: _longest(levels),
@@ -154,7 +157,8 @@ def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Itera
 
 
 def _task_size(kind: dict[str, str]) -> int:
-    return 1 if kind[attr.DEVICE] == "cpu" else CUDA_SHOTS
+    """Shots per task; 0 where the rate decides."""
+    return 0 if kind[attr.DEVICE] == "cpu" else CUDA_SHOTS
 
 
 @contextmanager
@@ -222,7 +226,7 @@ def cluster_team(
                 pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
                 submit=lambda *shots: asked(executor.submit, _compute_alike, job, campaign, *shots, how),
                 width=lambda: 2 * max(1, sum(asked(client.nthreads).values())),
-                task=_task_size(kind),
+                task=lambda rate: _task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
                 refining=lambda: _longest(levels),

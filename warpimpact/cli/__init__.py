@@ -7,9 +7,8 @@ arguments, messages and progress here; a number is computed in another room. It 
 import argparse
 import os
 import sys
-import threading
 from collections.abc import Sequence
-from contextlib import redirect_stdout
+from contextlib import redirect_stdout, suppress
 from typing import NoReturn
 
 from warpimpact import __version__
@@ -54,14 +53,13 @@ _COMMANDS = (
 def command() -> NoReturn:
     """Run one command as a process of its own.
 
-    A thread that is still computing when the command has ended, after Ctrl-C, has nothing to save: the process does not
-    wait for it.
+    Nothing is left to do when the command has ended, and the process ends at once. To free all that it has loaded would
+    take as long as a small run computes. A thread that is still computing, after Ctrl-C, has nothing to save.
     """
     code = main()
-    if threading.active_count() == 1:
-        sys.exit(code)
     for stream in (sys.stdout, sys.stderr):
-        stream.flush()
+        with suppress(OSError):  # who reads it has gone
+            stream.flush()
     os._exit(code)
 
 

@@ -3,8 +3,6 @@ hold.
 
 Inside the package everything is in SI and radians; angles become degrees here. The Dataset follows the CF conventions
 and opens with plain ``xarray.open_dataset``.
-
-Long because all that build and read a Dataset stands together.
 """
 
 from __future__ import annotations

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-import math
 import os
 import shutil
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.checks import fault, history_fault, packing_fault, study_fault, unusable
 from warpimpact.results.dataset import numbered
 from warpimpact.results.interrupts import uninterrupted
-from warpimpact.results.netcdf import read_table, write_table
+from warpimpact.results.netcdf import write_table
 from warpimpact.results.table import Table
 
 if TYPE_CHECKING:
@@ -72,46 +71,6 @@ CHUNK = 2**15
 """Hits per chunk of a joined file: 256 KiB of one variable."""
 
 
-def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> None:
-    """Write results one after the other into one file, whole or not at all, with one of them in memory at a time.
-
-    Args:
-        parts: results of the same campaign, in the order of their hits, on the disk of `path`.
-        path: the file; an existing one is replaced.
-        attributes: global attributes over those of the first part.
-
-    Raises:
-        OutputError: The file cannot be written; what was there before is untouched.
-    """
-    hits = 0
-    for part in parts:
-        with netCDF4.Dataset(part) as source:
-            hits += len(source.dimensions["hit"])
-    with aside(path, parts[0].parent) as file:
-        with uninterrupted():
-            table = read_table(parts[0]).assign_attrs(attributes)
-            write_table(table, file, chunk=min(hits, CHUNK))
-        at = table.sizes["hit"]
-        with netCDF4.Dataset(file, "a") as joined:
-            joined.set_auto_maskandscale(False)
-            for variable in joined.variables.values():
-                if variable.chunking() != "contiguous":  # of the megabytes that a variable may keep, two chunks will do
-                    variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
-            for part in parts[1:]:
-                at = _append(joined, part, at)
-
-
-def _append(joined: Any, part: Path, at: int) -> int:
-    """Copy the hits of a part behind those that are there; returns how many there are then."""
-    with netCDF4.Dataset(part) as source:
-        source.set_auto_maskandscale(False)
-        end = at + len(source.dimensions["hit"])
-        for name, variable in joined.variables.items():
-            if "hit" in variable.dimensions:
-                variable[at:end] = source[name][:]
-    return end
-
-
 def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:
     """How variables are stored: compressed."""
     encoding: dict[str, dict[str, Any]] = {
@@ -134,16 +93,24 @@ def aside(path: Path, folder: Path | None = None, *, named: Callable[[Path], Pat
     """
     written = (folder or path.parent) / f".{path.name}.{os.getpid()}.part"
     try:
-        yield written
-        _flush(written, os.O_RDWR)
-        os.replace(written, named(written) if named else path)
-        if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
-            _flush(path.parent, os.O_RDONLY)
-    except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
-        raise OutputError(f"{path}: cannot be written ({_cause(error, path)})") from error
+        with told_as(path):
+            yield written
+            _flush(written, os.O_RDWR)
+            os.replace(written, named(written) if named else path)
+            if os.name == "posix":  # elsewhere a folder cannot be opened, and needs no flushing
+                _flush(path.parent, os.O_RDONLY)
     finally:
         with suppress(OSError):
             written.unlink()
+
+
+@contextmanager
+def told_as(path: Path) -> Iterator[None]:
+    """Tell what goes wrong in writing as an OutputError of this file."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:  # netCDF reports a full disk as RuntimeError
+        raise OutputError(f"{path}: cannot be written ({_cause(error, path)})") from error
 
 
 def _flush(path: Path, mode: int) -> None:

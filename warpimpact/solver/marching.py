@@ -47,7 +47,9 @@ Progress = Callable[[int, int], None]
 Progress1 = Callable[[int], None]
 
 CPU_CHUNK = 64
-"""Most shots per launch on the CPU: few enough for an even load of the threads."""
+"""Most shots per launch on the CPU."""
+SHARES = 3
+"""Launches per thread into which the shots that are left would be divided at least."""
 CPU_LAUNCH = 0.25
 """Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
 CUDA_CHUNK = 65536
@@ -331,20 +333,22 @@ class March:
             finally:
                 idle.put(scratch)
 
-        # The first launches are of one shot each: some scenes take seconds per shot.
-        most, count, begun, done = max(1, min(CPU_CHUNK, total // (4 * len(slots)))), 1, 0, 0
+        # The first launches are of one shot each, as some scenes take seconds per shot; so are the last ones, as no
+        # thread is to wait long for another.
+        most, begun, done = 1, 0, 0
         waiting: set[Future[tuple[int, float]]] = set()
         with ThreadPoolExecutor(len(slots)) as pool:
             try:
                 while done < total:
                     while begun < total and len(waiting) < 2 * len(slots):
-                        count = min(chunk_of(count, self.at_a_plate), total - begun)
+                        share = max(1, (total - begun) // (SHARES * len(slots)))
+                        count = min(chunk_of(min(most, share), self.at_a_plate), total - begun)
                         waiting.add(pool.submit(work, begun, count))
                         begun += count
                     ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                     for shots, seconds in (future.result() for future in ended):
                         done += shots
-                        count = min(most, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
+                        most = min(CPU_CHUNK, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
                     progress(done)
             finally:
                 for future in waiting:

@@ -42,8 +42,8 @@ def test_memory_does_not_grow_with_the_count(
 ) -> None:
     monkeypatch.setattr("warpimpact.campaign.compute.simulate", at_once)
     run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
-    monkeypatch.setattr("warpimpact.campaign.parts.SHARDS", 48)  # 32 shards of 4096, which is quicker than 128
-    count = 2**17
+    monkeypatch.setattr("warpimpact.campaign.parts.SHARDS", 48)  # 32 shards of 16384, which is quicker than 128
+    count = 2**19
     many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
     output = tmp_path / "a.nc"
     tracemalloc.start()

@@ -1,0 +1,31 @@
+"""How shots are dealt out to the threads of a CPU."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from warpimpact import Campaign, simulate
+from warpimpact.solver.marching import CPU_CHUNK, March
+
+CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+
+
+@pytest.mark.parametrize("hits", [24, 700])
+@pytest.mark.parametrize("threads", [2, 3])
+def test_launches_begin_and_end_with_single_shots(hits: int, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign, counts, launch = Campaign.from_toml(CAMPAIGN), [], March._launch
+
+    def recorded(self: March, *arguments: Any) -> int:
+        counts.append(arguments[-1])
+        return launch(self, *arguments)
+
+    monkeypatch.setattr(March, "_launch", recorded)
+    monkeypatch.setattr("warpimpact.solver.marching.CPU_LAUNCH", 1e9)  # however slow the machine
+    simulate(campaign.scene, campaign.sampler().shots(0, hits), device="cpu", threads=threads)
+    first_windows = counts[: next(k + 1 for k in range(len(counts)) if sum(counts[: k + 1]) >= hits)]
+    assert sum(first_windows) == hits
+    assert max(first_windows) <= max(1, min(CPU_CHUNK, hits // (2 * threads)))
+    assert max(first_windows) > 1
+    assert first_windows[: 2 * threads] == [1] * 2 * threads
+    assert first_windows[-threads:] == [1] * threads
