@@ -189,9 +189,9 @@ def compare(
 
 
 def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
-    """Whether weight counts: a search of limits tells itself how heavy a target must be."""
+    """Whether weight counts: a search of thickness tells itself how heavy a target must be."""
     densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
-    return attr.LIMIT not in datasets[0].attrs and max(densities) > _SAME_WEIGHT * min(densities)
+    return datasets[0].attrs.get(attr.LIMIT) != "thickness" and max(densities) > _SAME_WEIGHT * min(densities)
 
 
 def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[Measure]]) -> bool:

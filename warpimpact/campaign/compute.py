@@ -84,7 +84,7 @@ def compute(
     )
     if solid is None:
         return dataset
-    solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
+    solid, reference = at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
     follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
     outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
     return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
@@ -160,12 +160,12 @@ class HitMap:
     Attributes:
         content: what decides the bits of a result, beside the campaign, the versions and the device.
         measures: whose running estimates are told; those of a hit map where there are none.
-        takes_solid: whether the solid plate of equal areal density is computed, too.
+        most_solid: shots at most at the solid plate of equal areal density.
     """
 
     content: Mapping[str, str] = MappingProxyType({})
     measures: Sequence[str] = ()
-    takes_solid = True
+    most_solid = 2**12
 
     def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> xarray.Dataset:
         """Compute some shots; the arguments are those of `compute`."""
@@ -185,7 +185,7 @@ def is_double(campaign: Campaign) -> bool:
     return campaign.numerics.precision == "double"
 
 
-def _at_solid(campaign: Campaign, shots: Shots) -> Shots:
+def at_solid(campaign: Campaign, shots: Shots) -> Shots:
     """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
     target, plate = campaign.target, campaign.plate
     own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}

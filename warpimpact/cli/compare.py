@@ -20,7 +20,8 @@ def add_compare(commands: Commands) -> None:
         "compare",
         _compare,
         summary="compare plates: which protects better",
-        description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. If "
+        description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. Of "
+        "targets with layers, and of limits, a second figure, FIGURE_weight.png, shows them against their weight. If "
         "you give a campaign with several plates, it is run first, each plate into NAME.nc beside the figure. A plate "
         "whose result exists already is not run again.",
         example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
@@ -57,7 +58,7 @@ def add_compare(commands: Commands) -> None:
 def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
     from warpimpact.analysis.comparison_text import comparison_text
-    from warpimpact.plotting import comparison_figure
+    from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
 
     is_campaign = arguments.files[0].suffix == ".toml"
@@ -79,6 +80,10 @@ def _compare(arguments: argparse.Namespace) -> int:
     print(comparison_text(comparison))
     comparison_figure(comparison).savefig(figure, dpi=150)
     print(f"{figure}{replaced}")
+    if (against_weight := weight_figure(comparison)) is not None:
+        beside = figure.with_stem(f"{figure.stem}_weight")
+        against_weight.savefig(beside, dpi=150)
+        print(beside)
     return code
 
 

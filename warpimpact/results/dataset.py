@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.limit import Limits
     from warpimpact.solver.refinement import Estimates
     from warpimpact.solver.simulate import Outcomes, Replay
 
@@ -97,27 +96,14 @@ def to_dataset(
         variables += v.ESTIMATE_VARIABLES
         values |= {name: getattr(estimates, name) for name in v.ESTIMATE_VARIABLES}
         values[v.CONVERGED] = estimates.converged.astype(np.int8)
-    described = _described(variables, values)
+    columns = described(variables, values)
     if not double:
-        described |= _in_single(described, (*ended, *v.ESTIMATE_VARIABLES))
+        columns |= _in_single(columns, (*ended, *v.ESTIMATE_VARIABLES))
     return xarray.Dataset(
-        described,
-        _described(along, coordinates),
+        columns,
+        described(along, coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
-
-
-def with_limits(dataset: xarray.Dataset, quantity: str, limits: Limits, images: int) -> xarray.Dataset:
-    """The Dataset of shots that just perforate, with their limits.
-
-    Args:
-        quantity: of the limits, a key of LIMITS.
-        limits: of the first of every `images` shots, SI.
-    """
-    names = v.LIMITS[quantity]
-    values: dict[str, Any] = {name: np.repeat(getattr(limits, name.field), images) for name in names}
-    values[names.converged] = values[names.converged].astype(np.int8)
-    return dataset.assign(_described(names, values))
 
 
 def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:
@@ -129,15 +115,15 @@ def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, 
         double: as in `to_dataset`.
     """
     values: dict[str, Any] = {variable: getattr(outcomes, variable.field) for variable in v.SOLID_VARIABLES}
-    described = _described(v.SOLID_VARIABLES, values)
-    return described if double else described | _in_single(described, v.SOLID_VARIABLES)
+    columns = described(v.SOLID_VARIABLES, values)
+    return columns if double else columns | _in_single(columns, v.SOLID_VARIABLES)
 
 
-def _in_single(described: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -> dict[str, tuple[Any, ...]]:
+def _in_single(columns: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -> dict[str, tuple[Any, ...]]:
     """Those of some variables that hold numbers, in single precision."""
     return {
         name: (dims, values.astype(np.float32), told)
-        for name, (dims, values, told) in described.items()
+        for name, (dims, values, told) in columns.items()
         if name in set(names) and values.dtype.kind == "f"
     }
 
@@ -145,7 +131,7 @@ def _in_single(described: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -
 def numbered(dataset: xarray.Dataset, first: int = 0) -> xarray.Dataset:
     """A Dataset whose hits have their numbers in the campaign, from `first` on."""
     numbers = np.arange(first, first + dataset.sizes["hit"], dtype=np.int32)
-    return dataset.assign_coords(_described((v.HIT,), {v.HIT: numbers}))
+    return dataset.assign_coords(described((v.HIT,), {v.HIT: numbers}))
 
 
 def hit_numbers(dataset: xarray.Dataset) -> NDArray[np.int64]:
@@ -194,8 +180,8 @@ def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> x
         attributes: global attributes: title, history, campaign, versions, device, ...
     """
     return xarray.Dataset(
-        _described(v.STUDY_VARIABLES, values),
-        _described(v.STUDY_COORDINATES, values),
+        described(v.STUDY_VARIABLES, values),
+        described(v.STUDY_COORDINATES, values),
         _ATTRIBUTES | attr.with_units(attributes),
     )
 
@@ -240,16 +226,16 @@ def history_dataset(
     dataset = (
         hit.drop_dims("vertex", errors="ignore")
         .rename({v.ANGULAR_VELOCITY: v.RESIDUAL_ANGULAR_VELOCITY})
-        .assign_coords(_described(v.HISTORY_COORDINATES, coordinates))
+        .assign_coords(described(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
     layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if scene.target.layers else ()
-    return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
+    return dataset.assign(described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )
 
 
-def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
+def described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
     """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them."""
     return {str(one): (one.dims, _in_units(one, values[one]), one.attributes) for one in variables}
 

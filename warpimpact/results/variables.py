@@ -285,12 +285,17 @@ LIMITS = {
 shot as it just perforates: at the end of its limit where the core passed."""
 LIMIT_VARIABLES = tuple(variables.value for variables in LIMITS.values())
 
+SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.items()}
+"""Limits of the first shots at the solid plate of equal areal density, by the quantity of the search; one if all shots
+are alike. Present only in a result of `warpimpact limit` with `output.solid_reference`."""
+SOLID_LIMIT_VARIABLES = tuple(SOLID_LIMITS.values())
+
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
-GROUPS = {"plate": OUTLINE_VARIABLES, "solid": tuple(SOLID_VARIABLES)}
+GROUPS = {"plate": OUTLINE_VARIABLES, "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES)}
 """What is not along "hit" stands in groups of the file. In memory these are coordinates, which no choice of hits
 spreads over the hits."""
 
