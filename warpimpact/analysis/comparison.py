@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.base import base_thickness, has_base
+from warpimpact.analysis.base import base_thickness, has_base, solid_note
 from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.summary import sampling_note
@@ -328,7 +328,7 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
     differing = (first_difference(one, other) for one, other in pairwise(asked))
     if (found := next(filter(None, differing), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
-    yield from dict.fromkeys(note for dataset in datasets if (note := sampling_note(dataset)))
+    yield from dict.fromkeys(note for d in datasets for note in (solid_note(d), sampling_note(d)) if note)
 
 
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:

@@ -16,6 +16,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.effects import Effect, effects
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import attributes as attr
@@ -208,6 +209,8 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
         row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
     if note := depth_note(measures):
+        rows.append(note)
+    if note := solid_note(dataset):
         rows.append(note)
     if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
         rows.append(

@@ -124,7 +124,7 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
             low, high = axes.get_xlim()
             margin = 0.03 * (high - low)
             axes.set_xlim(min(low, mean - margin), max(high, mean + margin))
-            axes.legend(loc="upper left", frameon=False, fontsize="small")
+            axes.legend(loc="lower right", frameon=False, fontsize="small")
     layer = int(dataset.attrs[attr.LIMIT_LAYER])
     whose, share_label = _CURVE[quantity]
     label = whose.format(f"layer {layer}" if layer else "the plate")

@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.effectiveness import SHOWN_UNITS
+from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison import Comparison, Contestant
@@ -46,16 +49,17 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     figure = Figure(figsize=(1.2 + 5.2 * len(wanted), 5.4), layout="constrained")
     for axes, name in zip(figure.subplots(1, len(wanted), squeeze=False)[0], wanted, strict=True):
         (_draw_needed if name == _THICKNESS else _draw_against_weight)(axes, comparison, name)
-    labels = {}
+    labels: dict[str, Artist] = {}
     for axes in figure.axes:
         labels |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
-    figure.legend(labels.values(), labels.keys(), loc="outside lower center", ncols=4, frameon=False)
+    figure.legend(list(labels.values()), list(labels), loc="outside lower center", ncols=4, frameon=False)
     figure.suptitle("Targets against their weight; 95 % intervals", fontsize="medium")
     return figure
 
 
 def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
     """One effect of every target, over its areal density."""
+    middle = _middle([plate.areal_density for plate in comparison.plates])
     for plate in comparison.plates:
         told = _by_name(plate)
         for ending, style in _STYLES.items():
@@ -64,21 +68,24 @@ def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
         if not math.isnan(told[name].solid):
             solid: dict[str, Any] = {"color": _GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
             axes.plot(plate.areal_density, told[name].solid, "D", label="solid plate of the same weight", **solid)
-        _name(axes, plate.name, plate.areal_density, told[name].value)
+        _name(axes, plate.name, (plate.areal_density, told[name].value), middle)
     _furnish(axes, _by_name(comparison.plates[0])[name], "areal density of the whole target [kg/m²]")
+    if name == "base_depth" and any(depth_note(plate.measures) for plate in comparison.plates):
+        axes.set_title("lower bounds: cores pierce a base, and count with its thickness", fontsize="medium", loc="left")
 
 
 def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
     """The limit thickness over the areal density that the target has with it, and what a solid plate needs."""
+    middle = _middle([_by_name(plate)[_NEEDED].value for plate in comparison.plates])
     for plate in comparison.plates:
         told = _by_name(plate)
         for ending, style in _STYLES.items():
             measure, density = told[name + ending], told[_NEEDED + ending]
             across = None if math.isnan(density.low) else (density.low, density.high)
             _draw_point(axes, density.value, measure, style, across)
-        _name(axes, plate.name, told[_NEEDED].value, told[name].value)
-    solids = {told.solid for plate in comparison.plates if not math.isnan((told := _by_name(plate)[_NEEDED]).solid)}
-    for solid in solids:
+        _name(axes, plate.name, (told[_NEEDED].value, told[name].value), middle)
+    needed = {_by_name(plate)[_NEEDED].solid for plate in comparison.plates}
+    for solid in filter(math.isfinite, needed):
         axes.axvline(solid, color=_GREY, linestyle="--", label="what a solid plate in place of the target needs")
     _furnish(axes, _by_name(comparison.plates[0])[name], "areal density that the target needs [kg/m²]")
 
@@ -102,14 +109,21 @@ def _draw_point(
     axes.errorbar(density, measure.value, yerr=ends, xerr=beside, fmt=marker, label=label, **point)
 
 
+def _middle(densities: Sequence[float]) -> float:
+    return 0.5 * (min(densities) + max(densities))
+
+
 def _ends(value: float, low: float, high: float) -> list[list[float]] | None:
     if math.isnan(low) or math.isnan(high):
         return None
     return [[max(0.0, value - low)], [max(0.0, high - value)]]
 
 
-def _name(axes: Axes, name: str, density: float, value: float) -> None:
-    axes.annotate(name, (density, value), xytext=(7, 5), textcoords="offset points", fontsize="small")
+def _name(axes: Axes, name: str, place: tuple[float, float], middle: float) -> None:
+    """The name of a target beside its point, towards the middle of the figure."""
+    left = place[0] <= middle
+    side, ha = (7, "left") if left else (-7, "right")
+    axes.annotate(name, place, xytext=(side, 6), textcoords="offset points", ha=ha, fontsize="small")
 
 
 def _furnish(axes: Axes, measure: Measure, label: str) -> None:

@@ -179,8 +179,25 @@ def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(make_pl
     points = {tuple(line.get_xydata()[0]) for line in share.lines if len(line.get_xdata()) == 1}
     assert {(23.55, 0.25), (60.0, 0.25), (23.55, 1.0), (60.0, 1.0)} <= points  # 1: the solid plate is perforated
     assert {text.get_text() for text in share.texts} == {"a", "b"}
+    assert depth.get_title(loc="left").startswith("lower bounds")  # a quarter of the cores pass
     alone = make_plate_result(np.full(6, 500.0))
     assert weight_figure(compare([alone, alone], ["a", "b"])) is None
+
+
+def test_a_solid_plate_that_can_stop_no_core_is_told_of(make_plate_result) -> None:
+    result = layered(make_plate_result(np.zeros(6), 0.0, Status.ARRESTED), np.ones(6, dtype=int), np.full(6, 5e-3))
+    solid = result.assign_coords(
+        solid_status=("solid_hit", [np.int8(0)]),
+        solid_residual_velocity=("solid_hit", [300.0]),
+        solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
+    )
+    told = "which weakens by time and so stops no core"
+    by_time = solid.assign_attrs(material='{"degradation": 0.8, "degradation_interval": 1e-6}')
+    assert told in effectiveness_text(by_time)
+    assert told in comparison_text(compare([by_time, by_time], ["a", "b"]))
+    by_path = solid.assign_attrs(material='{"degradation": 0.8, "degradation_distance": 1e-3}')
+    assert told not in effectiveness_text(by_path)
+    assert told not in effectiveness_text(solid.assign_attrs(material='{"degradation": 1.0}'))
 
 
 def test_the_figure_of_limits_stands_over_the_weight_that_the_target_needs(make_plate_result) -> None:
