@@ -16,7 +16,7 @@ import xarray
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.layers import of_layers, sections
+from warpimpact.results.layers import fields, of_layers, sections
 from warpimpact.scene import Plate
 
 if TYPE_CHECKING:
@@ -212,7 +212,8 @@ def history_dataset(
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
     cells = (replay.cell_y, replay.cell_z)
-    values |= sections(scene, hit, section)
+    behind = fields(scene, replay.behind)
+    values |= sections(scene, hit, section) | behind
     values |= outlines_in(plate, *((float(some.min()), float(some.max())) for some in cells))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
@@ -230,6 +231,7 @@ def history_dataset(
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
     layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if scene.target.layers else ()
+    layered = (*layered, *(name for name in v.LAYER_FIELDS if name in behind))
     return dataset.assign(described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )

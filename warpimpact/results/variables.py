@@ -350,6 +350,17 @@ LAYER_SOLID_ALONG_Z = Variable(
     "layer_solid_along_z", ("layer", "section"), "1", "1 where the layer is solid along z through the hit point, else 0"
 )
 
+_IN_WINDOW = ("snapshot", "layer", "layer_row", "layer_column")
+LAYER_CELL_Y = Variable("layer_cell_y", ("layer", "layer_row"), "m", "cell of the layer, y")
+LAYER_CELL_Z = Variable("layer_cell_z", ("layer", "layer_column"), "m", "cell of the layer, z")
+LAYER_RESISTANCE_SHARE = Variable(
+    "layer_resistance_share", _IN_WINDOW, "1", "share of the resistance left in the layer; 0 in holes"
+)
+
+LAYER_FIELDS = (LAYER_CELL_Y, LAYER_CELL_Z, LAYER_RESISTANCE_SHARE)
+"""Present only if the core reached a layer behind the plate that weakens. No value in a layer that does not, and beyond
+the window of one whose window is smaller than that of another. Layer 0 has its own variables."""
+
 LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
 """Present only with layers behind the plate, as LAYER_FACES, which are those of the hit here."""
 
