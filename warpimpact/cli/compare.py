@@ -65,7 +65,9 @@ def _compare(arguments: argparse.Namespace) -> int:
     default = arguments.files[0].stem if is_campaign else "comparison"
     figure = arguments.output or Path(f"{default}.png")
     # The figure of a campaign belongs to it as its results do.
-    check_picture(figure, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
+    beside = figure.with_stem(f"{figure.stem}_weight")
+    for picture in (figure, beside):
+        check_picture(picture, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
     replaced = " (replaced)" if figure.exists() else ""
     angle, standoff = _quantities(arguments)
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
@@ -81,7 +83,6 @@ def _compare(arguments: argparse.Namespace) -> int:
     comparison_figure(comparison).savefig(figure, dpi=150)
     print(f"{figure}{replaced}")
     if (against_weight := weight_figure(comparison)) is not None:
-        beside = figure.with_stem(f"{figure.stem}_weight")
         against_weight.savefig(beside, dpi=150)
         print(beside)
     return code
