@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 
@@ -51,3 +53,15 @@ def is_pierced(dataset: Result) -> Array:
     [hits]. NaN as in `base_depth`."""
     depth = base_depth(dataset)
     return np.where(np.isnan(depth), np.nan, depth >= base_thickness(dataset) if has_base(dataset) else np.nan)
+
+
+def solid_note(dataset: Result) -> str:
+    """What to know of the solid plate beside a base, if its material keeps it from stopping any core; mostly empty."""
+    material = json.loads(dataset.attrs.get(attr.MATERIAL, "{}"))
+    by_time = material.get("degradation", 1.0) < 1.0 and material.get("degradation_distance") is None
+    if not (has_base(dataset) and by_time and v.SOLID_VARIABLES.keys() <= dataset.variables.keys()):
+        return ""
+    return (
+        "The solid plate is of the material of the plate, which weakens by time and so stops no core, however slow. "
+        "Give degradation_distance in the place of degradation_interval for a solid plate that may stop cores."
+    )

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.base import base_thickness, has_base
+from warpimpact.analysis.base import base_thickness, has_base, solid_note
 from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.summary import sampling_note
@@ -189,9 +189,9 @@ def compare(
 
 
 def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
-    """Whether weight counts: a search of limits tells itself how heavy a target must be."""
+    """Whether weight counts: a search of thickness tells itself how heavy a target must be."""
     densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
-    return attr.LIMIT not in datasets[0].attrs and max(densities) > _SAME_WEIGHT * min(densities)
+    return datasets[0].attrs.get(attr.LIMIT) != "thickness" and max(densities) > _SAME_WEIGHT * min(densities)
 
 
 def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[Measure]]) -> bool:
@@ -328,7 +328,7 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
     differing = (first_difference(one, other) for one, other in pairwise(asked))
     if (found := next(filter(None, differing), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
-    yield from dict.fromkeys(note for dataset in datasets if (note := sampling_note(dataset)))
+    yield from dict.fromkeys(note for d in datasets for note in (solid_note(d), sampling_note(d)) if note)
 
 
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:

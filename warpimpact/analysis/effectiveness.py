@@ -16,11 +16,13 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.effects import Effect, effects
 from warpimpact.analysis.numbers import interval_text, number_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_reference
+from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -127,7 +129,7 @@ def gather(
     """The measures of `effectiveness` one after the other, each with the numbers that it is made of; of some effects
     `only`, by their names."""
     dealt = dealing(dataset) | {"confidence": confidence}
-    reference = solid_reference(dataset)
+    reference = solid_limits(dataset) if attr.LIMIT in dataset.attrs else solid_reference(dataset)
     for effect in effects(dataset, angle=angle, standoff=standoff):
         if only is not None and effect.name not in only:
             continue
@@ -136,8 +138,9 @@ def gather(
             yield _averaged(effect, _SHARE, values, solid, dealt)
         else:
             yield _averaged(effect, _MEAN, values, solid, dealt)
-            worst = None if solid is None else worst_tenth(solid)
-            yield _averaged(effect, _WORST_TENTH, worst_tenth(values), worst, dealt)
+            sign = -1.0 if effect.higher_is_better else 1.0
+            worst = None if solid is None else sign * worst_tenth(sign * solid)
+            yield _averaged(effect, _WORST_TENTH, sign * worst_tenth(sign * values), worst, dealt)
             yield _worst_point(effect, values, solid, dataset)
 
 
@@ -153,13 +156,14 @@ def _averaged(
 
 
 def _worst_point(effect: Effect, values: Array, solid: Array | None, dataset: xarray.Dataset) -> Evidence:
-    """The measure that is the largest value."""
+    """The measure that is the worst value: the largest, or the lowest where higher is better."""
     known = ~np.isnan(values)
-    place = int(np.argmax(np.where(known, values, -math.inf))) if known.any() else None
+    sign = -1.0 if effect.higher_is_better else 1.0
+    place = int(np.argmax(np.where(known, sign * values, -math.inf))) if known.any() else None
     estimate = _without_interval(math.nan if place is None else float(values[place]))
     hit = None if place is None else int(dataset[v.HIT][place])
-    largest = None if solid is None else np.atleast_1d(np.fmax.reduce(solid))
-    against = Ratio.of(estimate, values, largest, {})
+    worst = None if solid is None else np.atleast_1d(sign * np.fmax.reduce(sign * solid))
+    against = Ratio.of(estimate, values, worst, {})
     return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None, None)
 
 
@@ -188,7 +192,7 @@ def _measure(
     )
 
 
-SHOWN_UNITS = {"1": "", "mm": " [mm]", "J mm-2": " [J/mm²]", "kg m-2": " [kg/m²]"}
+SHOWN_UNITS = {"1": "", "mm": " [mm]", "J mm-2": " [J/mm²]", "kg m-2": " [kg/m²]", "m s-1": " [m/s]"}
 """Units behind a label."""
 
 
@@ -205,6 +209,8 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
         row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
     if note := depth_note(measures):
+        rows.append(note)
+    if note := solid_note(dataset):
         rows.append(note)
     if not with_solid and attr.OPEN_AREA in dataset.attrs and attr.LIMIT not in dataset.attrs:
         rows.append(

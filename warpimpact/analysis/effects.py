@@ -21,8 +21,9 @@ from warpimpact.scene import AnyCore, Core
 
 Array = NDArray[np.float64]
 
-_OF_LIMITS = v.LIMITS["thickness"].value
-_NEEDED = (v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.BROKEN, _OF_LIMITS, *base.NEEDED)
+_THICKNESS, _VELOCITY = (v.LIMITS[quantity].value for quantity in ("thickness", "velocity"))
+_OF_A_HIT = (v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.BROKEN)
+_NEEDED = (*_OF_A_HIT, _THICKNESS, _VELOCITY, *base.NEEDED)
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,11 @@ class Effect:
     Attributes:
         name: for programs.
         label: for people.
-        units: "1", "mm", "J mm-2" or "kg m-2".
+        units: "1", "mm", "J mm-2", "kg m-2" or "m s-1".
         definition: one sentence.
         source: where it comes from.
         higher_is_better: for whoever is behind the plate.
-        kind: "mean" of any numbers, larger where it is worse, or "share" of numbers 0 and 1.
+        kind: "mean" of any numbers, or "share" of numbers 0 and 1.
         values: of a hit map, NaN where a shot does not count.
     """
 
@@ -56,7 +57,7 @@ class Effect:
 
 
 def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) -> Iterator[Effect]:
-    """All there are for a result: of the base first, if there is one; of a search of the limit thickness, the limits.
+    """All there are for a result: of the base first, if there is one; of a search of limits, those alone.
 
     Args:
         angle: inclination beyond which a core counts as tilted [rad].
@@ -65,8 +66,11 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
     Raises:
         ResultError: the result has no such stand-off.
     """
-    if _OF_LIMITS in dataset:
+    if _THICKNESS in dataset:
         yield from _of_limits(dataset)
+        return
+    if _VELOCITY in dataset:
+        yield _of_limit_velocity(dataset)
         return
     if base.has_base(dataset):
         yield from _of_base()
@@ -190,8 +194,10 @@ def _of_limits(dataset: xarray.Dataset) -> Iterator[Effect]:
     layer, highest = int(told[attr.LIMIT_LAYER]), float(told[attr.LIMIT_HIGHEST])
     whose = f"layer {layer}" if layer else "the plate"
 
-    def limits(part: xarray.Dataset) -> Array:
-        return np.where(failed(part), np.nan, np.minimum(part[_OF_LIMITS].values, highest))
+    def of_layer(part: xarray.Dataset) -> Array:
+        is_this = all(part.attrs.get(name) == told.get(name) for name in (attr.LIMIT_LAYER, attr.LIMIT_ELSEWHERE))
+        values = 1e3 * _limits(part, _THICKNESS)
+        return values if is_this else np.full_like(values, np.nan)  # a solid plate for the whole has no such layer
 
     yield Effect(
         name="limit_thickness",
@@ -202,11 +208,10 @@ def _of_limits(dataset: xarray.Dataset) -> Iterator[Effect]:
         source="ballistic limit as in MIL-STD-662F, V50 Ballistic Test for Armor, of the thickness at one velocity",
         higher_is_better=False,
         kind="mean",
-        values=lambda part: 1e3 * limits(part),
+        values=of_layer,
     )
     if attr.LIMIT_ELSEWHERE not in told:
         return
-    elsewhere, density = float(told[attr.LIMIT_ELSEWHERE]), float(told[attr.LIMIT_DENSITY])
     yield Effect(
         name="limit_areal_density",
         label="areal density needed",
@@ -216,8 +221,33 @@ def _of_limits(dataset: xarray.Dataset) -> Iterator[Effect]:
         "Springer 2012",
         higher_is_better=False,
         kind="mean",
-        values=lambda part: elsewhere + density * limits(part),
+        values=_needed_density,
     )
+
+
+def _of_limit_velocity(dataset: xarray.Dataset) -> Effect:
+    highest = float(dataset.attrs[attr.LIMIT_HIGHEST])
+    return Effect(
+        name="limit_velocity",
+        label="limit velocity",
+        units="m s-1",
+        definition="Impact velocity at which a core just perforates the target; 0 for a core that touches no material, "
+        f"and {highest:g} m/s for one that is stopped even at that velocity, the largest tried.",
+        source="ballistic limit as in MIL-STD-662F, V50 Ballistic Test for Armor",
+        higher_is_better=True,
+        kind="mean",
+        values=lambda part: _limits(part, _VELOCITY),
+    )
+
+
+def _limits(part: xarray.Dataset, name: str) -> Array:
+    """Limits of a result, at most the largest value tried; NaN where the computation failed."""
+    return np.where(failed(part), np.nan, np.minimum(part[name].values, float(part.attrs[attr.LIMIT_HIGHEST])))
+
+
+def _needed_density(part: xarray.Dataset) -> Array:
+    elsewhere, density = float(part.attrs[attr.LIMIT_ELSEWHERE]), float(part.attrs[attr.LIMIT_DENSITY])
+    return np.asarray(elsewhere + density * _limits(part, _THICKNESS))
 
 
 def _is_broken(part: xarray.Dataset) -> Array:

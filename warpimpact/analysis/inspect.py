@@ -129,17 +129,24 @@ def _row(measure: Measure, estimate: Estimate) -> str:
 def failures(dataset: xarray.Dataset) -> Iterator[str]:
     """Every shot whose computation failed: its number, status and inputs."""
     inputs = [v.HIT_Y, v.HIT_Z, *v.shot_variables(dataset)]
+    places = [(name, layer) for name in inputs for layer in _layers_of(dataset, name)]
     count = 0
     for part in slices(dataset[[v.STATUS, *inputs]]):
         for place in np.flatnonzero(failed(part)):
             shot = part.isel(hit=place)
             if not count:
-                yield "failed shots: " + ", ".join(["hit", "status", *(_labelled(dataset, name) for name in inputs)])
+                yield "failed shots: " + ", ".join(["hit", "status", *(_labelled(dataset, *place) for place in places)])
             count += 1
-            values = "".join(f"{float(shot[name]):>14.6g}" for name in inputs)
+            own = (shot[name] if layer is None else shot[name][layer] for name, layer in places)
+            values = "".join(f"{float(value):>14.6g}" for value in own)
             yield f"{int(hit_numbers(part)[place]):>10d}  {Status(int(shot[v.STATUS])).name.lower():<14}{values}"
     yield f"{count} of {dataset.sizes['hit']} shots failed"
 
 
-def _labelled(dataset: xarray.Dataset, name: str) -> str:
-    return f"{name} [{dataset[name].attrs['units']}]"
+def _layers_of(dataset: xarray.Dataset, name: str) -> Iterable[int | None]:
+    return range(dataset.sizes["layer"]) if "layer" in dataset[name].dims else [None]
+
+
+def _labelled(dataset: xarray.Dataset, name: str, layer: int | None) -> str:
+    number = "" if layer is None else f"_{layer}"
+    return f"{name}{number} [{dataset[name].attrs['units']}]"

@@ -34,3 +34,25 @@ def slabs(history: xarray.Dataset, view: str) -> list[Slab]:
 def depth_of(history: xarray.Dataset) -> float:
     """From the front face of the target to the rear face of its last layer [m]."""
     return slabs(history, "y")[-1].rear
+
+
+class LayerField(NamedTuple):
+    """What is left of a layer behind the plate: its number, the cells of its window [m], and the share of the
+    resistance in them at every snapshot, shape [snapshots, cells_y, cells_z]."""
+
+    number: int
+    cell_y: NDArray[np.float64]
+    cell_z: NDArray[np.float64]
+    share: NDArray[np.float64]
+
+
+def fields_behind(history: xarray.Dataset) -> list[LayerField]:
+    """Those of the layers behind the plate that weaken and that the core reached."""
+    found = []
+    for number in range(history.sizes["layer"]) if v.LAYER_RESISTANCE_SHARE in history else ():
+        y, z = (history[name].values[number] for name in (v.LAYER_CELL_Y, v.LAYER_CELL_Z))
+        rows, columns = (int((cells == cells).sum()) for cells in (y, z))  # NaN fills up
+        if rows:
+            share = history[v.LAYER_RESISTANCE_SHARE].values[:, number, :rows, :columns]
+            found.append(LayerField(number, y[:rows], z[:columns], share))
+    return found

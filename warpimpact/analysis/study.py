@@ -21,6 +21,7 @@ import xarray
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import study_dataset
@@ -121,7 +122,13 @@ def study(
 
     Raises:
         DeviceError: the device is absent.
+        CampaignError: the campaign has bursts.
     """
+    if campaign.burst is not None:
+        raise CampaignError(
+            "got a burst, but a study measures hits on fresh plates: leave out the table [burst]; the first hit of a "
+            "burst has the errors of such a hit"
+        )
     settings = default_settings(campaign) if settings is None else settings
     bench = _Bench(campaign, hits, device, progress or (lambda done, total: None))
     pairs = [(bench.numerics(_doubled(level)), bench.numerics(level)) for level in levels]
@@ -158,11 +165,12 @@ def study(
 
 
 def default_settings(campaign: Campaign) -> dict[str, Numerics]:
-    """The fidelities by their names; the sweep and the literal scheme by their settings."""
+    """The fidelities by their names; the sweep and the literal scheme, which takes one plate, by their settings."""
     fidelities = {name: Numerics(fidelity=name) for name in FIDELITIES}
     sweep = [spelt_out(setting, campaign.scene, campaign.impact) for setting in SWEEP]
     nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
-    return fidelities | {label(campaign, numerics): numerics for numerics in sweep} | nodal
+    swept = fidelities | {label(campaign, numerics): numerics for numerics in sweep}
+    return swept if campaign.layer else swept | nodal
 
 
 def label(campaign: Campaign, numerics: Numerics) -> str:

@@ -60,7 +60,7 @@ class Output(Record):
 
     Attributes:
         failed_share: share of shots whose computation may fail; a run with more ends with exit code 3.
-        solid_reference: compute the solid plate of equal areal density, too, of a perforated plate.
+        solid_reference: compute the solid plate that is as heavy as the whole target, too; of limits, its limit.
         exit_state: store velocity, axis and position of every core at the end of contact.
     """
 

@@ -86,7 +86,7 @@ def compute(
     )
     if solid is None:
         return table
-    solid, reference = _at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
+    solid, reference = at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
     follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
     outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
     return table.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
@@ -160,10 +160,10 @@ class HitMap:
     """What a run computes of every hit of a campaign: how it ends. Another kind of run derives from it.
 
     Attributes:
-        takes_solid: whether the solid plate of equal areal density is computed, too.
+        most_solid: shots at most at the solid plate of equal areal density.
     """
 
-    takes_solid = True
+    most_solid = 2**12
 
     @property
     def content(self) -> Mapping[str, str]:
@@ -193,7 +193,7 @@ def is_double(campaign: Campaign) -> bool:
     return campaign.numerics.precision == "double"
 
 
-def _at_solid(campaign: Campaign, shots: Shots) -> Shots:
+def at_solid(campaign: Campaign, shots: Shots) -> Shots:
     """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
     target, plate = campaign.target, campaign.plate
     own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}

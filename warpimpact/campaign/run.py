@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""
-_MOST_SOLID = 2**12
-"""Shots at most at the solid plate of equal areal density."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -170,8 +168,8 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
             width = team.width()
             while len(waiting) < width and (task := next(tasks, None)) is not None:
                 shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
-                first = team.job.takes_solid and task.start == 0
-                solid = _solid_shots(campaign, shots[: store.extent]) if first else None
+                first = shots[: store.extent] if task.start == 0 else None
+                solid = None if first is None else _solid_shots(campaign, first, team.job.most_solid)
                 waiting[team.submit(watch.promise, shots, solid)] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
             stop_if_asked()
@@ -188,7 +186,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     return watch.end
 
 
-def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
+def _solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
     """Those of the first shard's shots that the solid plate of equal areal density takes: one tells of all where no two
     differ but in where they hit."""
     plate = campaign.plate
@@ -199,7 +197,7 @@ def _solid_shots(campaign: Campaign, shots: Shots) -> Shots | None:
     alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     if alike and campaign.burst is None:
         return shots[:1]
-    return shots[: max(1, _MOST_SOLID // campaign.at_a_plate) * campaign.at_a_plate]
+    return shots[: max(1, most // campaign.at_a_plate) * campaign.at_a_plate]
 
 
 def _tasks(store: _Store, total: int, shots: Callable[[], int]) -> Iterator[range]:

@@ -20,7 +20,8 @@ def add_compare(commands: Commands) -> None:
         "compare",
         _compare,
         summary="compare plates: which protects better",
-        description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. If "
+        description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. Of "
+        "targets with layers, and of limits, a second figure, FIGURE_weight.png, shows them against their weight. If "
         "you give a campaign with several plates, it is run first, each plate into NAME.nc beside the figure. A plate "
         "whose result exists already is not run again.",
         example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
@@ -57,14 +58,16 @@ def add_compare(commands: Commands) -> None:
 def _compare(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.comparison import compare
     from warpimpact.analysis.comparison_text import comparison_text
-    from warpimpact.plotting import comparison_figure
+    from warpimpact.plotting import comparison_figure, weight_figure
     from warpimpact.results import files
 
     is_campaign = arguments.files[0].suffix == ".toml"
     default = arguments.files[0].stem if is_campaign else "comparison"
     figure = arguments.output or Path(f"{default}.png")
     # The figure of a campaign belongs to it as its results do.
-    check_picture(figure, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
+    beside = figure.with_stem(f"{figure.stem}_weight")
+    for picture in (figure, beside):
+        check_picture(picture, overwrite=arguments.overwrite or (is_campaign and arguments.output is None))
     replaced = " (replaced)" if figure.exists() else ""
     angle, standoff = _quantities(arguments)
     paths = _plates_run(arguments, figure.parent) if is_campaign else named(arguments.files)
@@ -79,6 +82,9 @@ def _compare(arguments: argparse.Namespace) -> int:
     print(comparison_text(comparison))
     comparison_figure(comparison).savefig(figure, dpi=150)
     print(f"{figure}{replaced}")
+    if (against_weight := weight_figure(comparison)) is not None:
+        against_weight.savefig(beside, dpi=150)
+        print(beside)
     return code
 
 

@@ -35,6 +35,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.hit import hit_text
     from warpimpact.campaign.replay import replay
     from warpimpact.plotting.animation import save_animation, writer_for
+    from warpimpact.plotting.layers import layers
     from warpimpact.plotting.trajectory import FIGURES, save_figures
     from warpimpact.results import files
 
@@ -42,7 +43,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")
     check_output(output, overwrite=arguments.overwrite)
     check_suffix(output, "a history", ".nc")
-    for figure in FIGURES:
+    for figure in (*FIGURES, layers):
         check_output(output.with_name(f"{output.stem}_{figure.__name__}.png"), overwrite=arguments.overwrite)
     if film:
         writer_for(film)

@@ -1,7 +1,8 @@
 """The history of a hit as VTK files for ParaView: the moving surface of the core, and the plate as it weakens.
 
 It needs PyVista (`pip install 'warpimpact[vtk]'`). The folder contains ``core.pvd`` and ``plate.pvd``, which list the
-other files with their times. Lengths are in metres in the frame of the plate, times in seconds.
+other files with their times, and ``layer_1.pvd``, … of the layers behind the plate that weaken. Lengths are in metres
+in the frame of the plate, times in seconds.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 import xarray
 from scipy.spatial.transform import Rotation
 
+from warpimpact.analysis.slabs import LayerField, fields_behind
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import OutputError
@@ -32,7 +34,7 @@ _BODY = (v.VELOCITY, v.MARCHED_ANGULAR_VELOCITY, v.FORCE, v.MOMENT)
 
 
 def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
-    """Write a history into a new folder, whole or not at all; return the two files to open.
+    """Write a history into a new folder, whole or not at all; return the files to open.
 
     Args:
         history: a Dataset of `results.history_dataset`.
@@ -50,10 +52,14 @@ def write_vtk(history: xarray.Dataset, folder: Path) -> list[Path]:
             pieces.mkdir()
             _write_series(pieces, "core", "vtp", history[v.TIME].values, cores(history))
             _write_series(pieces, "plate", "vti", history[v.SNAPSHOT].values, plates(history))
+            for field in fields_behind(history):
+                meshes = layers_of(history, field)
+                _write_series(pieces, f"layer_{field.number}", "vti", history[v.SNAPSHOT].values, meshes)
             pieces.rename(folder)
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written ({error})") from error
-    return [folder / "core.pvd", folder / "plate.pvd"]
+    behind = [folder / f"layer_{field.number}.pvd" for field in fields_behind(history)]
+    return [folder / "core.pvd", folder / "plate.pvd", *behind]
 
 
 def cores(history: xarray.Dataset) -> Iterator[pyvista.PolyData]:
@@ -90,15 +96,26 @@ def _faces(rings: int) -> NDArray[np.int64]:
 
 def plates(history: xarray.Dataset) -> Iterator[pyvista.ImageData]:
     """The plate within reach of the core at every snapshot: a layer of cells with the share of the resistance left."""
+    cells = history[v.CELL_Y].values, history[v.CELL_Z].values
+    return _slices(cells, 0.0, history.attrs[attr.PLATE_THICKNESS], history[v.RESISTANCE_SHARE].values)
+
+
+def layers_of(history: xarray.Dataset, field: LayerField) -> Iterator[pyvista.ImageData]:
+    """The same of a layer behind the plate."""
+    front, rear = (float(history[name][field.number]) for name in (v.LAYER_FRONT, v.LAYER_REAR))
+    return _slices((field.cell_y, field.cell_z), front, rear - front, field.share)
+
+
+def _slices(cells: tuple[Array, Array], front: float, thickness: float, shares: Array) -> Iterator[pyvista.ImageData]:
     import pyvista
 
-    y, z = history[v.CELL_Y].values, history[v.CELL_Z].values
+    y, z = cells
     dy, dz = y[1] - y[0], z[1] - z[0]
-    for share in history[v.RESISTANCE_SHARE].values:
+    for share in shares:
         grid = pyvista.ImageData(
             dimensions=(2, len(y) + 1, len(z) + 1),
-            spacing=(history.attrs[attr.PLATE_THICKNESS], dy, dz),
-            origin=(0.0, y[0] - 0.5 * dy, z[0] - 0.5 * dz),
+            spacing=(thickness, dy, dz),
+            origin=(front, y[0] - 0.5 * dy, z[0] - 0.5 * dz),
         )
         grid.cell_data[v.RESISTANCE_SHARE] = share.ravel(order="F")
         yield grid

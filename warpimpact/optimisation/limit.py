@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 
+from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.proxy import proxy
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import HitMap, described, pilot_of
+from warpimpact.campaign.compute import HitMap, at_solid, described, pilot_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, with_limits
+from warpimpact.results.dataset import failed
+from warpimpact.results.limits import solid_limits, with_limits, with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
-from warpimpact.scene import Shots, Target
+from warpimpact.scene import Scene, Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     MOST_RUNS,
@@ -63,7 +65,7 @@ class LimitMap(HitMap):
     tolerance: float
     highest: float
     layer: int = 0
-    takes_solid = False
+    most_solid = 256
 
     @classmethod
     def of(
@@ -109,13 +111,13 @@ class LimitMap(HitMap):
 
         Args:
             shots: whole groups of images, as the campaign's sampler gives them.
-            how: promise, device, threads and progress as in `campaign.compute.compute`.
+            how: promise, solid, device, threads and progress as in `campaign.compute.compute`.
         """
         promise: LimitPromise | None = how["promise"]
         device, images = how.get("device", "auto"), len(campaign.symmetries)
         begin = time.perf_counter()
         limits = self._search(
-            campaign,
+            campaign.scene,
             shots[::images],
             campaign.numerics if promise is None else promise.fidelity,
             device=device,
@@ -140,7 +142,29 @@ class LimitMap(HitMap):
         )
         begun, *_ = dataset.attrs[attr.HISTORY].split()
         dataset.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {self.quantity}"
-        return with_limits(dataset, self.quantity, limits, images)
+        found = with_limits(dataset, self.quantity, limits, images)
+        return found if how.get("solid") is None else self._beside_solid(campaign, found, **how)
+
+    def _beside_solid(self, campaign: Campaign, found: Table, **how: Any) -> Table:
+        """The Dataset with the limits of some shots at the solid plate that is as heavy as the whole target."""
+        plate, promise, progress, hits = campaign.target.solid, how["promise"], how.get("progress"), found.sizes[v.HIT]
+        scene = campaign.scene.model_copy(update={"target": plate})
+        begin = time.perf_counter()
+        limits = replace(self, layer=0)._search(
+            scene,
+            at_solid(campaign, how["solid"]),
+            campaign.numerics if promise is None else promise.fidelity,
+            device=how.get("device", "auto"),
+            threads=how.get("threads"),
+            progress=progress and (lambda done, total: progress(hits, hits)),
+        )
+        highest = self.highest if self.quantity == "velocity" else THICKEST * plate.thickness
+        told = {
+            attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
+            attr.SOLID_LIMIT_DENSITY: plate.density,
+            attr.SOLID_LIMIT_HIGHEST: highest,
+        }
+        return with_solid_limits(found, self.quantity, limits).assign_attrs(attr.with_units(told))
 
     def promise_of(
         self, campaign: Campaign, device: str = "auto", progress: Progress | None = None
@@ -152,7 +176,7 @@ class LimitMap(HitMap):
         follow = progress and (lambda done, total: progress(0, len(pilot)))  # nothing new, but a place to stop
 
         def search(fidelity: Fidelity) -> Limits:
-            return self._search(campaign, pilot, fidelity, device=device, progress=follow)
+            return self._search(campaign.scene, pilot, fidelity, device=device, progress=follow)
 
         return keep_limits(search, campaign.numerics, squared=self.quantity == "thickness")
 
@@ -190,11 +214,11 @@ class LimitMap(HitMap):
         assert tried is not None  # searched
         return with_thickness(campaign.scene, self.layer, shots, np.repeat(tried, images))
 
-    def _search(self, campaign: Campaign, shots: Shots, numerics: Any, **how: Any) -> Limits:
+    def _search(self, scene: Scene, shots: Shots, numerics: Any, **how: Any) -> Limits:
         how |= {"numerics": numerics, "tolerance": self.tolerance}
         if self.quantity == "velocity":
-            return limit_velocity(campaign.scene, shots, highest=self.highest, **how)
-        return limit_thickness(campaign.scene, shots, layer=self.layer, **how)
+            return limit_velocity(scene, shots, highest=self.highest, **how)
+        return limit_thickness(scene, shots, layer=self.layer, **how)
 
 
 def _of_images(progress: Progress | None, images: int) -> Progress | None:
@@ -254,10 +278,12 @@ def limits_text(dataset: xarray.Dataset) -> str:
         rows += _proxy_lines(dataset)
     else:
         for name, estimate in quantiles(dataset).items():
-            ends = f"{factor * estimate.low:.5g} to {factor * estimate.high:.5g}"
+            ends = interval_text(factor * estimate.low, factor * estimate.high, "{:.5g}".format)
             what = "perforate" if quantity == "velocity" else "have a smaller limit"
             share = f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"
             rows.append(f"{name} = {factor * estimate.value:.5g} {unit}   95 % interval {ends}   ({share})")
+    if broken := int(np.isnan(value).sum()):
+        rows.append(f"{broken} hits failed, and count in none of these numbers")
     beyond, missed = int(np.isposinf(value).sum()), int((value == 0.0).sum())
     if beyond:
         rows.append(f"{beyond} hits have no limit {quantity} up to {factor * told[attr.LIMIT_HIGHEST]:g} {unit}")
@@ -267,9 +293,30 @@ def limits_text(dataset: xarray.Dataset) -> str:
         rows.append(
             f"{open_} hits were not found to {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
         )
+    rows += _solid_lines(dataset)
     rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
     rows.append(promise_line(dataset))
     return "\n".join(rows)
+
+
+def _solid_lines(dataset: xarray.Dataset) -> list[str]:
+    """The solid plate that replaces the whole target, and what its search cost; none without one."""
+    reference = solid_limits(dataset)
+    if reference is None:
+        return []
+    quantity = dataset.attrs[attr.LIMIT]
+    unit, factor = _UNITS[quantity]
+    value = reference[v.LIMITS[quantity].value].values
+    found = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
+    density = float(dataset.attrs[attr.AREAL_DENSITY])
+    if quantity == "thickness":
+        found += f", {float(np.nanmean(value)) * reference.attrs[attr.LIMIT_DENSITY]:.4g} kg/m²"
+        found += f" (the target as given has {density:.4g} kg/m²)"
+    else:
+        found += f", of {density:.4g} kg/m² as the target"
+    hits = f"{len(value)} hit{'s' if len(value) > 1 else ''}"
+    seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
+    return [f"solid plate in place of the whole target: limit {quantity} {found}; {hits} searched in {seconds:.2g} s"]
 
 
 def _proxy_lines(dataset: xarray.Dataset) -> list[str]:

@@ -9,10 +9,11 @@ import matplotlib as mpl
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
-from warpimpact.plotting.maps import hit_map, hit_maps, overview, save_beside, save_maps, status_map
+from warpimpact.plotting.maps import hit_map, hit_maps, layers_figure, overview, save_beside, save_maps, status_map
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.study import study_figure
 from warpimpact.plotting.trajectory import course, flight, largest_load, passage
+from warpimpact.plotting.weight import weight_figure
 
 mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error
 
@@ -25,6 +26,7 @@ __all__ = [
     "hit_map",
     "hit_maps",
     "largest_load",
+    "layers_figure",
     "marginals",
     "overview",
     "passage",
@@ -35,4 +37,5 @@ __all__ = [
     "status_map",
     "study_figure",
     "uncertainty",
+    "weight_figure",
 ]

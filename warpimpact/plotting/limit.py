@@ -15,6 +15,7 @@ from warpimpact.optimisation.limit import QUANTILES, promise_line, quantiles
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.results.limits import solid_limits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +24,7 @@ _BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
 _UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
-    "thickness": ("thickness of the plate", "share of the hits whose limit is thinner"),
+    "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
 }
 _LONGER_SIDE = 4.2  # of the map on paper [inch]
 
@@ -74,12 +75,24 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
         label = "as 1/cos(obliquity)" if quantity == "velocity" else "as cos(obliquity)"
         axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=label)
     across = "between axis and line of fire on impact" if yawed else "obliquity"
+    reference = solid_limits(dataset)
+    if reference is not None:
+        solid = np.broadcast_to(reference[v.LIMITS[quantity].value].values, value.shape)
+        axes.plot(along, factor * solid, "D", color="0.55", fillstyle="none", label=_solid_label(dataset, quantity))
     axes.set(xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
     axes.grid(color="0.9")
     axes.set_axisbelow(True)
     axes.legend(frameon=False)
     _inscribe(figure, dataset)
     return figure
+
+
+def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
+    """Of the solid plate; its thickness stands for the whole target, not for the layer that was searched."""
+    several = ", mean" if dataset.sizes.get("solid_hit", 1) > 1 and quantity == "velocity" else ""
+    if quantity == "velocity":
+        return f"solid plate of equal areal density{several}"
+    return "solid plate in place of the whole target"
 
 
 def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
@@ -103,7 +116,18 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
             axes.plot(factor * estimate.value, level, "o", color=_VERMILION, markersize=5)
             text = f" {name} = {factor * estimate.value:.4g} {unit}"
             axes.annotate(text, (factor * estimate.value, level), xytext=(8, -12), textcoords="offset points")
-    label, share_label = _CURVE[quantity]
+    reference = solid_limits(dataset)
+    if reference is not None:
+        mean = factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
+        if np.isfinite(mean):
+            axes.axvline(mean, color="0.55", linewidth=1.2, linestyle="--", label=_solid_label(dataset, quantity))
+            low, high = axes.get_xlim()
+            margin = 0.03 * (high - low)
+            axes.set_xlim(min(low, mean - margin), max(high, mean + margin))
+            axes.legend(loc="lower right", frameon=False, fontsize="small")
+    layer = int(dataset.attrs[attr.LIMIT_LAYER])
+    whose, share_label = _CURVE[quantity]
+    label = whose.format(f"layer {layer}" if layer else "the plate")
     axes.set(xlabel=f"{label} [{unit}]", ylabel=share_label, ylim=(0.0, 1.02))
     axes.grid(color="0.9")
     axes.set_axisbelow(True)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.hit_map import is_folded
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
 from warpimpact.plotting.distribution import dispersion, is_uncertain, marginals, uncertainty
@@ -168,7 +169,8 @@ def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite:
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
     """A sheet of several maps of one result, which says what it shows."""
     figure, panels = _sheet([dataset] * maps, columns=columns)
-    told = f"{shots_text(dataset)}; seen from behind the plate{note}"
+    folded = "; all hits of the bursts, folded into the cell" if is_folded(dataset) else ""
+    told = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}"
     _inscribe(figure, dataset.attrs.get(attr.TITLE, ""), told)
     return figure, panels
 

@@ -20,6 +20,7 @@ from matplotlib.patheffects import Normal, Stroke
 from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.analysis.surface import pressed
 from warpimpact.plotting.cell import words
+from warpimpact.plotting.layers import layers
 from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
 from warpimpact.plotting.pressure import pressure
 from warpimpact.results import attributes as attr
@@ -195,7 +196,7 @@ FIGURES = (passage, flight, largest_load, pressure, course, plate)
 def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]:
     """Write the figures of a history as PNG files ``<stem>_<figure>.png`` and return their paths."""
     paths = []
-    for draw in FIGURES:
+    for draw in (*FIGURES, layers) if v.LAYER_RESISTANCE_SHARE in dataset else FIGURES:
         paths.append(folder / f"{stem}_{draw.__name__}.png")
         draw(dataset).savefig(paths[-1], dpi=150)
     return paths

@@ -97,6 +97,10 @@ LIMIT_DENSITY = "limit_density"
 """Mass per area and thickness of that layer, its holes included."""
 LIMIT_ELSEWHERE = "limit_elsewhere"
 """Areal density of all other layers."""
+SOLID_LIMIT_TIME = "solid_limit_time"
+"""Time that the search at the solid plate took [s]."""
+SOLID_LIMIT_DENSITY, SOLID_LIMIT_HIGHEST = "solid_limit_density", "solid_limit_highest"
+"""Mass per volume of the solid plate that replaces the whole target, and the largest value tried."""
 LIMIT_TOLERANCE = "limit_tolerance"
 LIMIT_HIGHEST = "limit_highest"
 LIMIT_RESOLUTION = "limit_resolution"
@@ -123,6 +127,8 @@ UNITS = {
     OPEN_AREA: "1",
     AREAL_DENSITY: "kg m-2",
     LIMIT_DENSITY: "kg m-3",
+    SOLID_LIMIT_DENSITY: "kg m-3",
+    SOLID_LIMIT_TIME: "s",
     LIMIT_ELSEWHERE: "kg m-2",
     LIGAMENT: "m",
     PLATE_PERIOD: "m",

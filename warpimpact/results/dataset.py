@@ -15,7 +15,7 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.layers import of_layers, sections
+from warpimpact.results.layers import fields, of_layers, sections
 from warpimpact.results.table import Table
 from warpimpact.scene import Plate
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.limit import Limits
     from warpimpact.solver.refinement import Estimates
     from warpimpact.solver.simulate import Outcomes, Replay
 
@@ -99,12 +98,12 @@ def to_table(
         variables += v.ESTIMATE_VARIABLES
         values |= {name: getattr(estimates, name) for name in v.ESTIMATE_VARIABLES}
         values[v.CONVERGED] = estimates.converged.astype(np.int8)
-    described = _described(variables, values)
+    columns = described(variables, values)
     if not double:
-        described |= _in_single(described, (*ended, *v.ESTIMATE_VARIABLES))
+        columns |= _in_single(columns, (*ended, *v.ESTIMATE_VARIABLES))
     return Table.of(
-        described,
-        _described(along, coordinates),
+        columns,
+        described(along, coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
@@ -112,19 +111,6 @@ def to_table(
 def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **told: Any) -> xarray.Dataset:
     """The Dataset of the hit map; the arguments are those of `to_table`."""
     return to_table(scene, shots, outcomes, **told).to_xarray()
-
-
-def with_limits(dataset: AResult, quantity: str, limits: Limits, images: int) -> AResult:
-    """The result of shots that just perforate, with their limits.
-
-    Args:
-        quantity: of the limits, a key of LIMITS.
-        limits: of the first of every `images` shots, SI.
-    """
-    names = v.LIMITS[quantity]
-    values: dict[str, Any] = {name: np.repeat(getattr(limits, name.field), images) for name in names}
-    values[names.converged] = values[names.converged].astype(np.int8)
-    return dataset.assign(_described(names, values))
 
 
 def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:
@@ -136,15 +122,15 @@ def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, 
         double: as in `to_dataset`.
     """
     values: dict[str, Any] = {variable: getattr(outcomes, variable.field) for variable in v.SOLID_VARIABLES}
-    described = _described(v.SOLID_VARIABLES, values)
-    return described if double else described | _in_single(described, v.SOLID_VARIABLES)
+    columns = described(v.SOLID_VARIABLES, values)
+    return columns if double else columns | _in_single(columns, v.SOLID_VARIABLES)
 
 
-def _in_single(described: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -> dict[str, tuple[Any, ...]]:
+def _in_single(columns: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -> dict[str, tuple[Any, ...]]:
     """Those of some variables that hold numbers, in single precision."""
     return {
         name: (dims, values.astype(np.float32), told)
-        for name, (dims, values, told) in described.items()
+        for name, (dims, values, told) in columns.items()
         if name in set(names) and values.dtype.kind == "f"
     }
 
@@ -152,7 +138,7 @@ def _in_single(described: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -
 def numbered(dataset: AResult, first: int = 0) -> AResult:
     """A result whose hits have their numbers in the campaign, from `first` on."""
     numbers = np.arange(first, first + dataset.sizes["hit"], dtype=np.int32)
-    return dataset.assign_coords(_described((v.HIT,), {v.HIT: numbers}))
+    return dataset.assign_coords(described((v.HIT,), {v.HIT: numbers}))
 
 
 def hit_numbers(dataset: Result) -> NDArray[np.int64]:
@@ -203,8 +189,8 @@ def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> x
     import xarray
 
     return xarray.Dataset(
-        _described(v.STUDY_VARIABLES, values),
-        _described(v.STUDY_COORDINATES, values),
+        described(v.STUDY_VARIABLES, values),
+        described(v.STUDY_COORDINATES, values),
         _ATTRIBUTES | attr.with_units(attributes),
     )
 
@@ -235,7 +221,8 @@ def history_dataset(
         v.SOLID_ALONG_Z: plate.is_solid(np.array(hit_y), hit_z + section).astype(np.int8),
     }
     cells = (replay.cell_y, replay.cell_z)
-    values |= sections(scene, hit, section)
+    behind = fields(scene, replay.behind)
+    values |= sections(scene, hit, section) | behind
     values |= outlines_in(plate, *((float(some.min()), float(some.max())) for some in cells))
     coordinates: dict[str, Any] = {
         v.TIME: history.time,
@@ -249,16 +236,17 @@ def history_dataset(
     dataset = (
         hit.drop_dims("vertex", errors="ignore")
         .rename({v.ANGULAR_VELOCITY: v.RESIDUAL_ANGULAR_VELOCITY})
-        .assign_coords(_described(v.HISTORY_COORDINATES, coordinates))
+        .assign_coords(described(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
     layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if scene.target.layers else ()
-    return dataset.assign(_described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
+    layered = (*layered, *(name for name in v.LAYER_FIELDS if name in behind))
+    return dataset.assign(described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )
 
 
-def _described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
+def described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
     """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them."""
     return {str(one): (one.dims, _in_units(one, values[one]), one.attributes) for one in variables}
 

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from warpimpact.scene import Scene, Shots
+    from warpimpact.solver.layering import Weakened
 
 
 def of_layers(scene: Scene, shots: Shots) -> dict[str, NDArray[np.float64]]:
@@ -55,3 +56,19 @@ def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) ->
         v.LAYER_SOLID_ALONG_Y: np.array(along_y).astype(np.int8),
         v.LAYER_SOLID_ALONG_Z: np.array(along_z).astype(np.int8),
     }
+
+
+def fields(scene: Scene, behind: dict[int, Weakened]) -> dict[str, NDArray[Any]]:
+    """What is left of the layers behind the plate in a replayed hit, by LAYER_FIELDS; empty if none is reached that
+    weakens. Windows of several sizes are filled up with NaN."""
+    if not behind:
+        return {}
+    snapshots = len(next(iter(behind.values())).share)
+    rows = max(len(layer.cell_y) for layer in behind.values())
+    columns, layers = max(len(layer.cell_z) for layer in behind.values()), len(scene.target.plates)
+    cell_y, cell_z = np.full((layers, rows), np.nan), np.full((layers, columns), np.nan)
+    share = np.full((snapshots, layers, rows, columns), np.nan)
+    for number, layer in behind.items():
+        y, z = len(layer.cell_y), len(layer.cell_z)
+        cell_y[number, :y], cell_z[number, :z], share[:, number, :y, :z] = layer.cell_y, layer.cell_z, layer.share
+    return {v.LAYER_CELL_Y: cell_y, v.LAYER_CELL_Z: cell_z, v.LAYER_RESISTANCE_SHARE: share}

@@ -285,12 +285,17 @@ LIMITS = {
 shot as it just perforates: at the end of its limit where the core passed."""
 LIMIT_VARIABLES = tuple(variables.value for variables in LIMITS.values())
 
+SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.items()}
+"""Limits of the first shots at the solid plate of equal areal density, by the quantity of the search; one if all shots
+are alike. Present only in a result of `warpimpact limit` with `output.solid_reference`."""
+SOLID_LIMIT_VARIABLES = tuple(SOLID_LIMITS.values())
+
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
-GROUPS = {"plate": OUTLINE_VARIABLES, "solid": tuple(SOLID_VARIABLES)}
+GROUPS = {"plate": OUTLINE_VARIABLES, "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES)}
 """What is not along "hit" stands in groups of the file. In memory these are coordinates, which no choice of hits
 spreads over the hits."""
 
@@ -344,6 +349,17 @@ LAYER_SOLID_ALONG_Y = Variable(
 LAYER_SOLID_ALONG_Z = Variable(
     "layer_solid_along_z", ("layer", "section"), "1", "1 where the layer is solid along z through the hit point, else 0"
 )
+
+_IN_WINDOW = ("snapshot", "layer", "layer_row", "layer_column")
+LAYER_CELL_Y = Variable("layer_cell_y", ("layer", "layer_row"), "m", "cell of the layer, y")
+LAYER_CELL_Z = Variable("layer_cell_z", ("layer", "layer_column"), "m", "cell of the layer, z")
+LAYER_RESISTANCE_SHARE = Variable(
+    "layer_resistance_share", _IN_WINDOW, "1", "share of the resistance left in the layer; 0 in holes"
+)
+
+LAYER_FIELDS = (LAYER_CELL_Y, LAYER_CELL_Z, LAYER_RESISTANCE_SHARE)
+"""Present only if the core reached a layer behind the plate that weakens. No value in a layer that does not, and beyond
+the window of one whose window is smaller than that of another. Layer 0 has its own variables."""
 
 LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
 """Present only with layers behind the plate, as LAYER_FACES, which are those of the hit here."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import warp as wp
@@ -11,7 +12,10 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
+    from warpimpact.scene import Plate
     from warpimpact.solver.arrays import Arrays
+
+Array = NDArray[np.float64]
 
 DEEP = 0.6
 """Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
@@ -26,6 +30,63 @@ def deep_cells(arrays: Arrays, layer: int, cells: int) -> tuple[int, int]:
     half = 0.5 * cells * arrays.grid.spacing + DEEP * arrays.core.bounding_radius
     count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3)
     return count, count
+
+
+class Weakened(NamedTuple):
+    """What is left of a layer behind the plate, in the window where a core reached it.
+
+    Attributes:
+        cell_y, cell_z: centres of the cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
+        material: share of material in each cell, shape [cells_y, cells_z].
+        share: resistance left, as a share of Y; 0 in holes.
+    """
+
+    cell_y: Array
+    cell_z: Array
+    material: Array
+    share: Array
+
+
+def weakened(
+    arrays: Arrays, plates: Sequence[Plate], hit: tuple[float, float], scratch: tuple[Any, ...], cells: Sequence[Any]
+) -> dict[int, Weakened]:
+    """The layers behind the plate that weaken and that the last shot reached, after a march of one slot.
+
+    Args:
+        plates: of the target, in order.
+        hit: hit point of the shot (y, z) [m].
+        scratch: fields, touches, stack, … of the slot.
+        cells: of the windows of all layers.
+    """
+    fields, _, stack, *_ = scratch
+    is_open, homes = stack.open.numpy(), stack.home.numpy()
+    first, found = 0, {}
+    for k, (size, material) in enumerate(zip(cells, arrays.materials, strict=True)):
+        nodes = math.prod(size)
+        if k > 0 and nodes and is_open[k]:
+            exposure = fields.exposure.numpy()[first : first + nodes].astype(np.float64).reshape(size)
+            spacing, place = arrays.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
+            y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), size, spacing)
+            offset = float(material.offset_y[-1]), float(material.offset_z[-1])
+            solid = material_about(plates[k], y - offset[0], z - offset[1], spacing)
+            found[k] = Weakened(y, z, solid, solid * np.exp(material.decay_rate[-1] * exposure))
+        first += nodes
+    return found
+
+
+def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:
+    """Coordinates of the nodes of a window about its home, along y and z [m]."""
+    y, z = (np.asarray(at + (np.arange(n) - n // 2) * spacing) for at, n in zip(home, cells, strict=True))
+    return y, z
+
+
+def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:
+    """Share of material about every node, shape [nodes_y, nodes_z]."""
+    samples = 16
+    fine = (np.arange(samples) + 0.5) / samples - 0.5
+    along_y, along_z = ((nodes[:, None] + spacing * fine).reshape(-1) for nodes in (y, z))
+    solid = plate.is_solid(along_y[:, None], along_z[None, :])
+    return np.asarray(solid.reshape((len(y), samples, len(z), samples)).mean(axis=(1, 3)))
 
 
 class Passages:

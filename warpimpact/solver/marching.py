@@ -39,7 +39,7 @@ from warpimpact.solver.bursts import (
 from warpimpact.solver.device import cores, free_memory, halving, load
 from warpimpact.solver.exits import exits
 from warpimpact.solver.inputs import Inputs
-from warpimpact.solver.layering import Passages, deep_cells
+from warpimpact.solver.layering import Passages, Weakened, deep_cells, material_about, nodes_about, weakened
 from warpimpact.solver.resolution import Fidelity
 
 Array = NDArray[np.float64]
@@ -120,9 +120,9 @@ class March:
         rows = self.history.numpy().reshape(len(self.shots), self.arrays.rows, WIDTH)
         return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
 
-    def plate_after(self, steps: int, time_step: float) -> Array:
+    def plate_after(self, steps: int, time_step: float) -> tuple[Array, dict[int, Weakened]]:
         """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of
-        its march. All shots hit one plate."""
+        its march, and what is left of the layers behind it by their numbers. All shots hit one plate."""
         scratch, before = self._scratch(1, *self.cells), len(self.shots) - 1
         order = self.inputs.put(np.arange(before + 1), wp.int32)
         outcomes = self._empty(self.stage.Outcomes, (before + 1,))
@@ -135,12 +135,18 @@ class March:
             getattr(scratch[0], name).zero_()
         self._launch(order, outcomes, scratch, 1, before, 1)
         if self.variant.nodal:
-            return _host(scratch[0].share).reshape(self.cells)
+            return _host(scratch[0].share).reshape(self.cells), {}
         exposure = np.zeros(math.prod(self.cells))
         if self.variant.degrades and self.arrays.materials[0].weakens:
             exposure = _host(scratch[0].exposure)[: exposure.size]
         decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure.reshape(self.cells))
-        return np.asarray(self._material() * decayed)
+        return np.asarray(self._material() * decayed), self._behind(scratch)
+
+    def _behind(self, scratch: tuple[Any, ...]) -> dict[int, Weakened]:
+        if not (self.variant.layered and self.variant.degrades):
+            return {}
+        hit = float(self.shots.hit_y[-1]), float(self.shots.hit_z[-1])
+        return weakened(self.arrays, self.scene.target.plates, hit, scratch, self._windows(*self.cells))
 
     def body(self) -> MassProperties:
         """Mass properties of the last shot."""
@@ -149,19 +155,12 @@ class March:
 
     def nodes(self) -> tuple[Array, Array]:
         """Coordinates in the plate of the nodes of the last shot's window, along y and z [m]."""
-        hit = self.shots.hit_y[-1], self.shots.hit_z[-1]
-        spacing = self.arrays.grid.spacing
-        y, z = (at + (np.arange(count) - count // 2) * spacing for at, count in zip(hit, self.cells, strict=True))
-        return y, z
+        hit = float(self.shots.hit_y[-1]), float(self.shots.hit_z[-1])
+        return nodes_about(hit, self.cells, self.arrays.grid.spacing)
 
     def _material(self) -> Array:
         """Share of material about every node of the last shot's window."""
-        samples = 16
-        fine = (np.arange(samples) + 0.5) / samples - 0.5
-        y, z = ((nodes[:, None] + self.arrays.grid.spacing * fine).reshape(-1) for nodes in self.nodes())
-        solid = self.scene.target.plate.is_solid(y[:, None], z[None, :])
-        shape = (self.cells[0], samples, self.cells[1], samples)
-        return np.asarray(solid.reshape(shape).mean(axis=(1, 3)))
+        return material_about(self.scene.target.plate, *self.nodes(), self.arrays.grid.spacing)
 
     def report(self, contact: Any) -> dict[str, NDArray[Any]]:
         """Compute the free flight to the stand-offs; return all values on the host, by the names of `Outcomes`."""

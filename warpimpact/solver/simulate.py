@@ -14,6 +14,7 @@ from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.arrays import arrays_of, variant_of
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
+from warpimpact.solver.layering import Weakened
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.resolution import Fidelity, resolve
 
@@ -142,6 +143,8 @@ class Replay:
         resistance_share: resistance left, as a share of Y, in the cells of the plate that the core may reach: 0 in
             holes, shape [snapshots, cells_y, cells_z].
         cell_y, cell_z: centres of those cells in the plate [m], shapes [cells_y] and [cells_z].
+        behind: the same of every layer behind the plate that weakens and is reached, by its number, with `share` of
+            shape [snapshots, cells_y, cells_z].
     """
 
     outcomes: Outcomes
@@ -150,6 +153,7 @@ class Replay:
     resistance_share: Array
     cell_y: Array
     cell_z: Array
+    behind: dict[int, Weakened]
 
 
 def simulate(
@@ -226,14 +230,28 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None =
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     cell_y, cell_z = march.nodes()
+    left = [march.plate_after(count, time_step) for count in steps]
     return Replay(
         outcomes=replace(outcomes, **{name: values[-1:] for name, values in vars(outcomes).items()}),
         history=History.from_trace(trace, march.body()),
         plate_time=trace[steps, 0] - 0.5 * time_step if march.variant.layered else steps * time_step,
-        resistance_share=np.stack([march.plate_after(count, time_step) for count in steps]),
+        resistance_share=np.stack([share for share, _ in left]),
         cell_y=cell_y,
         cell_z=cell_z,
+        behind={number: _over_time(number, [behind for _, behind in left]) for number in left[-1][1]},
     )
+
+
+def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
+    """A layer at all snapshots, in its last window: before the core came there it was as new."""
+    last = left[-1][number]
+
+    def share(one: Weakened | None) -> Array:
+        if one is None or not (np.array_equal(one.cell_y, last.cell_y) and np.array_equal(one.cell_z, last.cell_z)):
+            return last.material
+        return one.share
+
+    return last._replace(share=np.stack([share(one.get(number)) for one in left]))
 
 
 def _traced(scene: Scene, shots: Shots, numerics: Numerics | Fidelity | None) -> March:

@@ -7,10 +7,14 @@ from dataclasses import fields, replace
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpimpact.scene import Symmetry
+from warpimpact.solver.layering import Weakened
 from warpimpact.solver.refinement import Estimates
 from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, Replay
+
+Array = NDArray[np.float64]
 
 
 def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
@@ -54,10 +58,19 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
     """
     history, polar, axial = replay.history, symmetry.polar, symmetry.axial
     signs = symmetry.along_y, symmetry.along_z
-    cells = [
-        (sign * cells + (to - sign * at))[::sign]  # increasing again
-        for cells, sign, at, to in zip((replay.cell_y, replay.cell_z), signs, home, image, strict=True)
-    ]
+
+    def moved(cells: tuple[Array, Array]) -> list[Array]:
+        return [
+            (sign * along + (to - sign * at))[::sign]  # increasing again
+            for along, sign, at, to in zip(cells, signs, home, image, strict=True)
+        ]
+
+    def turned(layer: Weakened) -> Weakened:
+        y, z = moved((layer.cell_y, layer.cell_z))
+        fields = (field[..., :: signs[0], :: signs[1]] for field in (layer.material, layer.share))
+        return Weakened(y, z, *fields)
+
+    cells = moved((replay.cell_y, replay.cell_z))
     return replace(
         replay,
         outcomes=unfolded(replay.outcomes, [symmetry]),
@@ -74,6 +87,7 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
         resistance_share=replay.resistance_share[:, :: signs[0], :: signs[1]],
         cell_y=cells[0],
         cell_z=cells[1],
+        behind={number: turned(layer) for number, layer in replay.behind.items()},
     )
 
 

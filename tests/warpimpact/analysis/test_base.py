@@ -16,9 +16,9 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.kernels.status import Status
 from warpimpact.optimisation.limit import LimitMap, limits_text
-from warpimpact.plotting import comparison_figure
-from warpimpact.results.dataset import with_limits
+from warpimpact.plotting import comparison_figure, weight_figure
 from warpimpact.results.files import ResultError
+from warpimpact.results.limits import with_limits
 from warpimpact.results.variables import STATUS
 from warpimpact.solver.limit import Limits
 
@@ -161,6 +161,61 @@ def test_targets_are_ranked_by_the_weight_that_they_need(make_plate_result) -> N
     assert comparison.at_equal_weight is None
     with pytest.raises(ResultError, match="limit"):
         compare([front, result], ["limits", "run"])
+
+
+def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(make_plate_result) -> None:
+    status = np.where(np.arange(400) % 4 == 0, Status.PERFORATED, Status.ARRESTED)
+    result = layered(make_plate_result(np.full(400, 100.0), 0.0, status), np.ones(400, dtype=int), np.full(400, 5e-3))
+    solid = result.assign(
+        solid_status=("solid_hit", [np.int8(0)]),
+        solid_residual_velocity=("solid_hit", [300.0]),
+        solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
+    )
+    comparison = compare([solid, solid.assign_attrs(areal_density=60.0)], ["a", "b"])
+    figure = weight_figure(comparison)
+    share, depth = figure.axes
+    assert share.get_ylabel() == "P(base perforated)"
+    assert depth.get_ylabel() == "depth in the base [mm]"
+    points = {tuple(line.get_xydata()[0]) for line in share.lines if len(line.get_xdata()) == 1}
+    assert {(23.55, 0.25), (60.0, 0.25), (23.55, 1.0), (60.0, 1.0)} <= points  # 1: the solid plate is perforated
+    assert {text.get_text() for text in share.texts} == {"a", "b"}
+    assert depth.get_title(loc="left").startswith("lower bounds")  # a quarter of the cores pass
+    alone = make_plate_result(np.full(6, 500.0))
+    assert weight_figure(compare([alone, alone], ["a", "b"])) is None
+
+
+def test_a_solid_plate_that_can_stop_no_core_is_told_of(make_plate_result) -> None:
+    result = layered(make_plate_result(np.zeros(6), 0.0, Status.ARRESTED), np.ones(6, dtype=int), np.full(6, 5e-3))
+    solid = result.assign_coords(
+        solid_status=("solid_hit", [np.int8(0)]),
+        solid_residual_velocity=("solid_hit", [300.0]),
+        solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
+    )
+    told = "which weakens by time and so stops no core"
+    by_time = solid.assign_attrs(material='{"degradation": 0.8, "degradation_interval": 1e-6}')
+    assert told in effectiveness_text(by_time)
+    assert told in comparison_text(compare([by_time, by_time], ["a", "b"]))
+    by_path = solid.assign_attrs(material='{"degradation": 0.8, "degradation_distance": 1e-3}')
+    assert told not in effectiveness_text(by_path)
+    assert told not in effectiveness_text(solid.assign_attrs(material='{"degradation": 1.0}'))
+
+
+def test_the_figure_of_limits_stands_over_the_weight_that_the_target_needs(make_plate_result) -> None:
+    result, thickness = make_plate_result(np.zeros(400)), np.random.default_rng(2).uniform(4e-3, 6e-3, 400)
+    told = {"solid_limit_density": 7850.0, "solid_limit_highest": 0.1}
+    one, other = (
+        limits(result, thickness, elsewhere)
+        .assign_coords(solid_limit_thickness=("solid_hit", [9e-3]))
+        .assign_attrs(told)
+        for elsewhere in (20.0, 0.0)
+    )
+    measures = named(one)
+    assert measures["limit_areal_density"].solid == pytest.approx(7850.0 * 9e-3)
+    (axes,) = weight_figure(compare([one, other], ["one", "other"])).axes
+    points = np.array([line.get_xydata()[0] for line in axes.lines if len(line.get_xdata()) == 1])
+    expected = measures["limit_areal_density"].value, measures["limit_thickness"].value
+    assert np.isclose(points, expected).all(axis=1).any()
+    assert any(np.allclose(line.get_xdata(), 7850.0 * 9e-3) for line in axes.lines)
 
 
 def test_a_search_tells_the_weights_of_the_target() -> None:

@@ -164,6 +164,18 @@ def test_default_settings_hold_fidelities_sweep_and_literal_scheme(campaign: Cam
     assert label(campaign, settings["8×12, ℓ/0.7, 3.86 µs"]) == "8×12, ℓ/0.7, 3.86 µs"
 
 
+def test_a_target_of_layers_is_studied_without_the_literal_scheme(campaign: Campaign) -> None:
+    behind = campaign.model_copy(update={"layer": ({"thickness": "2 mm", "resistance": "1 GPa", "gap": "50 mm"},)})
+    settings = default_settings(behind)
+    assert {one.scheme for one in settings.values()} == {"consistent"}
+    assert len(settings) == sum(one.scheme == "consistent" for one in default_settings(campaign).values())
+
+
+def test_bursts_are_refused_in_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", str(SLOTTED_PLATE.with_name("burst_of_five.toml"))]) == 2
+    assert "got a burst, but a study measures hits on fresh plates" in capsys.readouterr().err
+
+
 def test_errors_fall_from_coarse_to_fine(small: xarray.Dataset) -> None:
     for name in ("residual_velocity_error", "tilt_error"):
         errors = small[name].sel(quantile=0.9, setting=list(LADDER))

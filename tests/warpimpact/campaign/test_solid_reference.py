@@ -8,8 +8,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.campaign import run as run_module
 from warpimpact.campaign import team
+from warpimpact.campaign.compute import HitMap
 from warpimpact.campaign.run import run, run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
@@ -74,7 +74,7 @@ def test_it_takes_the_shots_of_the_first_shard_if_they_differ_and_none_if_not_as
 
 
 def test_shot_k_is_that_of_hit_k(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_module, "_MOST_SOLID", 100)
+    monkeypatch.setattr(HitMap, "most_solid", 100)
     dataset = computed(tmp_path, ('"825 m/s" ', '{ distribution = "uniform", low = 700, high = 850 } '))
     solid = solid_reference(dataset)
     assert solid is not None

@@ -1,0 +1,130 @@
+"""The solid plate beside a search of limits: what it is, what it costs, and what is told of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.inspect import inspect_text
+from warpimpact.campaign.run import run_to_file
+from warpimpact.campaign.team import local_team
+from warpimpact.kernels.status import Status
+from warpimpact.optimisation.limit import LimitMap, limits_text
+from warpimpact.plotting.limit import limit_figure
+from warpimpact.results import files
+
+LAYER = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
+TEXT = """\
+title = "limits"
+core = {{ shape = "ogive", diameter = "6.17 mm", length = "27 mm", crh = 3.0, mass = "5.25 g" }}
+[plate]
+thickness = "4 mm"
+resistance = "2600 MPa"
+shear_coefficient = 0.05
+pattern = {pattern}
+{layer}
+[impact]
+velocity = "500 m/s"
+[hits]
+count = 16
+[numerics]
+patches_axial = 14
+patches_around = 16
+time_step = "0.5 us"
+[output]
+standoffs = ["50 mm"]
+solid_reference = {solid}
+"""
+HOLES = '{ shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }'
+NONE = '{ shape = "none" }'
+
+
+def search(path: Path, quantity: str = "velocity", of_layer: int = 0, **given: str) -> xarray.Dataset:
+    text = TEXT.format(**{"pattern": HOLES, "layer": "", "solid": "true"} | given)
+    of = Campaign.from_text(text, name="text", folder=Path())
+    run_to_file(of, path, team=local_team(of, "cpu", LimitMap.of(of, quantity, layer=of_layer)))
+    return files.read(path)
+
+
+@pytest.fixture(scope="module")
+def velocity(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
+    return search(tmp_path_factory.mktemp("limit") / "velocity.nc")
+
+
+@pytest.fixture(scope="module")
+def thickness(tmp_path_factory: pytest.TempPathFactory) -> xarray.Dataset:
+    return search(tmp_path_factory.mktemp("limit") / "thickness.nc", "thickness", 1, layer=LAYER)
+
+
+def test_it_is_the_search_of_a_solid_plate_that_is_as_heavy(velocity: xarray.Dataset, tmp_path: Path) -> None:
+    density = 7850.0 * 4e-3 * (1.0 - np.pi * 2.5**2 / 64.0)
+    assert velocity.attrs["areal_density"] == pytest.approx(density, rel=1e-6)
+    alone = search(tmp_path / "a.nc", pattern=NONE)
+    thin = TEXT.format(pattern=NONE, layer="", solid="true").replace('"4 mm"', f"{density / 7850.0}")
+    of = Campaign.from_text(thin, name="text", folder=Path(), count=1)
+    run_to_file(of, tmp_path / "b.nc", team=local_team(of, "cpu", LimitMap.of(of)))
+    assert "solid_limit_velocity" not in alone.variables  # it is its own
+    expected = files.read(tmp_path / "b.nc")["limit_velocity"].values
+    assert velocity["solid_limit_velocity"].values == pytest.approx(expected, abs=1.0)
+    assert velocity.sizes["solid_hit"] == 1  # the hits differ in their places alone
+
+
+def test_it_changes_no_bit_of_the_hits(velocity: xarray.Dataset, tmp_path: Path) -> None:
+    without = search(tmp_path / "without.nc", solid="false")
+    assert "solid_limit_velocity" not in without.variables
+    for name in without.variables:
+        np.testing.assert_array_equal(without[name], velocity[name], err_msg=str(name))
+
+
+def test_a_limit_velocity_has_measures_and_a_ratio(velocity: xarray.Dataset) -> None:
+    mean, worst_tenth, worst = effectiveness(velocity)
+    values, solid = velocity["limit_velocity"].values, float(velocity["solid_limit_velocity"][0])
+    assert [one.label for one in (mean, worst)] == ["limit velocity, mean", "limit velocity, worst point"]
+    assert mean.value == pytest.approx(values.mean())
+    assert mean.higher_is_better
+    assert mean.ratio == pytest.approx(values.mean() / solid)
+    assert worst.value == values.min() == values[worst.hit]
+    assert worst.value <= worst_tenth.value < mean.value
+    assert worst_tenth.value == pytest.approx(np.sort(values)[:2].dot([1.0, 0.6]) / 1.6, rel=1e-6)
+
+
+def test_plates_of_other_weight_are_ranked_by_the_ratio(velocity: xarray.Dataset) -> None:
+    heavy = velocity.copy(deep=True)
+    heavy.attrs["areal_density"] *= 2.0
+    heavy["limit_velocity"] = velocity["limit_velocity"] * 1.1
+    heavy = heavy.assign_coords(solid_limit_velocity=velocity["solid_limit_velocity"] * 1.5)
+    found = compare([velocity, heavy], ["light", "heavy"])
+    assert found.at_equal_weight == {"limit_velocity", "limit_velocity_worst_tenth"}
+    assert found.ranks("limit_velocity") == {"light": 1, "heavy": 2}
+
+
+def test_of_a_thickness_it_tells_the_areal_density_that_a_solid_plate_needs(thickness: xarray.Dataset) -> None:
+    measures = {one.name: one for one in effectiveness(thickness)}
+    solid = 7850.0 * float(thickness["solid_limit_thickness"][0])
+    assert measures["limit_areal_density"].solid == pytest.approx(solid)
+    assert measures["limit_areal_density"].ratio == pytest.approx(measures["limit_areal_density"].value / solid)
+    assert np.isnan(measures["limit_thickness"].solid)  # it has no layer 1
+    assert f"{solid:.4g} kg/m² (the target as given has" in limits_text(thickness)
+
+
+def test_text_and_figure_tell_of_it(velocity: xarray.Dataset) -> None:
+    solid = float(velocity["solid_limit_velocity"][0])
+    assert f"limit velocity {solid:.5g} m/s" in limits_text(velocity)
+    assert "; 1 hit searched in " in limits_text(velocity)
+    *_, curve = limit_figure(velocity).axes[:2]
+    (line,) = [line for line in curve.lines if line.get_label().startswith("solid plate of equal areal density")]
+    assert line.get_xdata()[0] == pytest.approx(solid)
+    low, high = curve.get_xlim()
+    assert low < solid < high
+
+
+def test_failed_hits_are_told_and_named_with_the_thickness_of_each_layer(thickness: xarray.Dataset) -> None:
+    failed = thickness.copy(deep=True)
+    failed["status"][2] = Status.UNFINISHED
+    failed["limit_thickness"][2] = np.nan
+    assert "1 hits failed, and count in none of these numbers" in limits_text(failed)
+    assert "layer_thickness_1 [m]" in inspect_text(failed)

@@ -1,0 +1,138 @@
+"""Figure of targets against their weight: what the base behind the plate takes, beside the solid plate that would
+replace the whole target."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from matplotlib.figure import Figure
+
+from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+
+    from warpimpact.analysis.comparison import Comparison, Contestant
+    from warpimpact.analysis.effectiveness import Measure
+
+# Colours of Okabe and Ito, as in the figure of a comparison.
+_STYLES = {
+    "": ("mean, or share", "o", "#0072B2"),
+    "_worst_tenth": ("worst tenth", "s", "#D55E00"),
+    "_worst_point": ("worst hit", "x", "#000000"),
+}
+_GREY = "0.55"
+_AGAINST_WEIGHT = ("base_perforated_share", "base_depth", "limit_velocity")
+_THICKNESS, _NEEDED = "limit_thickness", "limit_areal_density"
+
+
+def weight_figure(comparison: Comparison) -> Figure | None:
+    """Measures of the base, or limits, against the areal density of the whole target, with their 95 % intervals; None
+    if the plates have none of them.
+
+    A limit thickness stands over the areal density that the target then has. A hollow diamond is the solid plate of the
+    same areal density; a line is what a solid plate needs.
+
+    Args:
+        comparison: the result of `analysis.comparison.compare`.
+    """
+    known = {measure.name for measure in comparison.plates[0].measures}
+    wanted = [name for name in (*_AGAINST_WEIGHT, _THICKNESS) if name in known]
+    if _NEEDED not in known:
+        wanted = [name for name in wanted if name != _THICKNESS]
+    if not wanted:
+        return None
+    figure = Figure(figsize=(1.2 + 5.2 * len(wanted), 5.4), layout="constrained")
+    for axes, name in zip(figure.subplots(1, len(wanted), squeeze=False)[0], wanted, strict=True):
+        (_draw_needed if name == _THICKNESS else _draw_against_weight)(axes, comparison, name)
+    labels: dict[str, Artist] = {}
+    for axes in figure.axes:
+        labels |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(list(labels.values()), list(labels), loc="outside lower center", ncols=4, frameon=False)
+    figure.suptitle("Targets against their weight; 95 % intervals", fontsize="medium")
+    return figure
+
+
+def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
+    """One effect of every target, over its areal density."""
+    middle = _middle([plate.areal_density for plate in comparison.plates])
+    for plate in comparison.plates:
+        told = _by_name(plate)
+        for ending, style in _STYLES.items():
+            if (measure := told.get(name + ending)) is not None:
+                _draw_point(axes, plate.areal_density, measure, style)
+        if not math.isnan(told[name].solid):
+            solid: dict[str, Any] = {"color": _GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
+            axes.plot(plate.areal_density, told[name].solid, "D", label="solid plate of the same weight", **solid)
+        _name(axes, plate.name, (plate.areal_density, told[name].value), middle)
+    _furnish(axes, _by_name(comparison.plates[0])[name], "areal density of the whole target [kg/m²]")
+    if name == "base_depth" and any(depth_note(plate.measures) for plate in comparison.plates):
+        axes.set_title("lower bounds: cores pierce a base, and count with its thickness", fontsize="medium", loc="left")
+
+
+def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
+    """The limit thickness over the areal density that the target has with it, and what a solid plate needs."""
+    middle = _middle([_by_name(plate)[_NEEDED].value for plate in comparison.plates])
+    for plate in comparison.plates:
+        told = _by_name(plate)
+        for ending, style in _STYLES.items():
+            measure, density = told[name + ending], told[_NEEDED + ending]
+            across = None if math.isnan(density.low) else (density.low, density.high)
+            _draw_point(axes, density.value, measure, style, across)
+        _name(axes, plate.name, (told[_NEEDED].value, told[name].value), middle)
+    needed = {_by_name(plate)[_NEEDED].solid for plate in comparison.plates}
+    for solid in filter(math.isfinite, needed):
+        axes.axvline(solid, color=_GREY, linestyle="--", label="what a solid plate in place of the target needs")
+    _furnish(axes, _by_name(comparison.plates[0])[name], "areal density that the target needs [kg/m²]")
+
+
+def _by_name(plate: Contestant) -> dict[str, Measure]:
+    return {measure.name: measure for measure in plate.measures}
+
+
+def _draw_point(
+    axes: Axes,
+    density: float,
+    measure: Measure,
+    style: tuple[str, str, str],
+    across: tuple[float, float] | None = None,
+) -> None:
+    """A measure over an areal density, with its interval, and that of the density where it is one of a measure."""
+    label, marker, colour = style
+    ends = _ends(measure.value, measure.low, measure.high)
+    beside = None if across is None else _ends(density, *across)
+    point: dict[str, Any] = {"color": colour, "markersize": 6.5, "capsize": 3.0, "zorder": 3}
+    axes.errorbar(density, measure.value, yerr=ends, xerr=beside, fmt=marker, label=label, **point)
+
+
+def _middle(densities: Sequence[float]) -> float:
+    return 0.5 * (min(densities) + max(densities))
+
+
+def _ends(value: float, low: float, high: float) -> list[list[float]] | None:
+    if math.isnan(low) or math.isnan(high):
+        return None
+    return [[max(0.0, value - low)], [max(0.0, high - value)]]
+
+
+def _name(axes: Axes, name: str, place: tuple[float, float], middle: float) -> None:
+    """The name of a target beside its point, towards the middle of the figure."""
+    left = place[0] <= middle
+    side, ha = (7, "left") if left else (-7, "right")
+    axes.annotate(name, place, xytext=(side, 6), textcoords="offset points", ha=ha, fontsize="small")
+
+
+def _furnish(axes: Axes, measure: Measure, label: str) -> None:
+    better = "higher" if measure.higher_is_better else "lower"
+    axes.set(xlabel=label, ylabel=f"{measure.label.removesuffix(', mean')}{SHOWN_UNITS[measure.units]}")
+    axes.set_title(f"{better} is better", fontsize="medium", loc="left")
+    if measure.units == "1":
+        axes.set_ylim(-0.04, 1.04)
+    axes.grid(color="0.92")
+    axes.margins(x=0.18)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)

@@ -1,0 +1,62 @@
+"""What a Dataset tells of a search of limits, and of the same search at the solid plate of equal areal density."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpimpact.kernels.status import Status
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import described, hit_numbers
+
+if TYPE_CHECKING:
+    import xarray
+
+    from warpimpact.results.table import AResult
+    from warpimpact.solver.limit import Limits
+
+
+def with_limits(dataset: AResult, quantity: str, limits: Limits, images: int) -> AResult:
+    """The Dataset of shots that just perforate, with their limits.
+
+    Args:
+        quantity: of the limits, a key of LIMITS.
+        limits: of the first of every `images` shots, SI.
+    """
+    names = v.LIMITS[quantity]
+    values: dict[str, Any] = {name: np.repeat(getattr(limits, name.field), images) for name in names}
+    values[names.converged] = values[names.converged].astype(np.int8)
+    return dataset.assign(described(names, values))
+
+
+def with_solid_limits(dataset: AResult, quantity: str, limits: Limits) -> AResult:
+    """The Dataset with the limits of its first shots at the solid plate, as coordinates."""
+    name = v.SOLID_LIMITS[quantity]
+    return dataset.assign_coords(described((name,), {name: limits.value}))
+
+
+def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
+    """The limits at the solid plate as a result of limits: along "hit", with the attributes of that plate. None if the
+    result has none. One shot tells of all hits; else they are those of the first hits."""
+    quantity = dataset.attrs.get(attr.LIMIT)
+    if quantity is None or (name := v.SOLID_LIMITS[quantity]) not in dataset.variables:
+        return None
+    if not {attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST} <= dataset.attrs.keys():
+        return None
+    values = dataset[name].values
+    if len(values) > 1 and not np.array_equal(hit_numbers(dataset[[v.HIT]])[: len(values)], np.arange(len(values))):
+        return None  # a choice of hits that are not the first ones
+    status = np.where(np.isnan(values), Status.UNFINISHED, Status.PERFORATED).astype(np.int8)
+    told = {
+        attr.LIMIT: quantity,
+        attr.LIMIT_LAYER: 0,
+        attr.LIMIT_HIGHEST: dataset.attrs[attr.SOLID_LIMIT_HIGHEST],
+        attr.LIMIT_ELSEWHERE: 0.0,
+        attr.LIMIT_DENSITY: dataset.attrs[attr.SOLID_LIMIT_DENSITY],
+    }
+    names = v.LIMITS[quantity].value, v.STATUS
+    import xarray
+
+    return xarray.Dataset(described(names, dict(zip(names, (values, status), strict=True))), attrs=told)
