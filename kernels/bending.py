@@ -20,7 +20,7 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, motion, resistances = core_surface.build(variant), rigid_body.build(variant), damping.build(variant)
-    Surface, Pose, Ring = surfaces.Surface, surfaces.Pose, surfaces.Ring
+    Surface, Pose = surfaces.Surface, surfaces.Pose
     Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Touches, Footprint, Sums = contact.build(variant).Touches, footprint.build(variant).Footprint, resistances.Sums
 
@@ -61,15 +61,15 @@ def build(variant: Variant) -> SimpleNamespace:
         broken_x: real
 
     @wp.func
-    def mean_force(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
+    def mean_force(sums: Sums, dv: vec3, dw: vec3):
         """Force on a ring [N], mean over the step, if the velocities change by (dv, dw) more than foreseen."""
-        slopes = resistances.slopes_of(ring, sums)
+        slopes = sums.slopes
         return sums.force - half * (resistances.damping_vv(slopes) * dv + resistances.damping_vw(slopes) * dw)
 
     @wp.func
-    def mean_moment(ring: Ring, sums: Sums, dv: vec3, dw: vec3):
+    def mean_moment(sums: Sums, dv: vec3, dw: vec3):
         """Moment of a ring about the centre of mass [N m], likewise."""
-        slopes = resistances.slopes_of(ring, sums)
+        slopes = sums.slopes
         coupled = wp.transpose(resistances.damping_vw(slopes)) * dv
         return sums.moment - half * (coupled + resistances.damping_ww(slopes) * dw)
 
@@ -119,10 +119,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 else:
                     area = touches.ring_area[here]
             if area > zero:
-                ring = surfaces.ring_at(surface, pose, index)
                 sums = touches.sums[here]
-                force += share * mean_force(ring, sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
-                moment += share * mean_moment(ring, sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
+                force += share * mean_force(sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
+                moment += share * mean_moment(sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)
             inertial = body.mass * (
                 sections.first[index] * push
                 + sections.second[index] * (turning + spun)

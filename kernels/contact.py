@@ -1,8 +1,8 @@
 """The load of one step on a core: the consistent law (docs/model.md §4), with the exposure at mid-step.
 
 A step makes two passes over the patches in the slab. The first pass finds the patches that touch and adds their
-exposure to the plate. The second pass reads the weakened plate and sums the load. The inner loops run over the patches
-of a ring without a branch, so a CPU computes several patches at once.
+exposure to the plate. The second pass reads the weakened plate and sums the load. Each pass is one loop over the
+patches of all rings without a branch, so a CPU computes several patches at once.
 """
 
 from functools import cache
@@ -11,28 +11,28 @@ from typing import Any
 
 import warp as wp
 
-from . import core_surface, damping, exposure, footprint, grip, interaction, memory, plate_grid, rigid_body
+from . import core_surface, damping, exposure, footprint, grip, interaction, lanes, memory, plate_grid, rigid_body
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
-    real, vec3 = variant.real, variant.vec3
+    real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    grips, resistances, memories = grip.build(variant), damping.build(variant), exposure.build(variant)
-    Footprint, Sums, Slopes = footprint.build(variant).Footprint, resistances.Sums, resistances.Slopes
-    Surface, Pose, Ring = surfaces.Surface, surfaces.Pose, surfaces.Ring
+    grips, resistances, memories, block = (part.build(variant) for part in (grip, damping, exposure, lanes))
+    Footprint, Sums = footprint.build(variant).Footprint, resistances.Sums
+    Surface, Pose = surfaces.Surface, surfaces.Pose
     Plate, Fields, Window = grid.Plate, memories.Fields, grid.Window
     Law, Load = laws.Law, motion.Load
-    ring_at, patch_at = surfaces.ring_at, surfaces.patch_at
+    ring_of, patch_at = surfaces.ring_of, surfaces.patch_at
     reals, integers = memory.build(real), memory.build(wp.int32)
     read, write, read_index, write_index = reals.read, reals.write, integers.read, integers.write
 
     @wp.struct
     class Touches:
-        """What the first pass finds for every patch of every slot.
+        """What the first pass finds for every patch of every slot, from the first ring on that may close in.
 
         `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
         that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
@@ -72,34 +72,47 @@ def build(variant: Variant) -> SimpleNamespace:
         window: Window,
         touches: Touches,
         pose: Pose,
-        ring: Ring,
-        first: wp.int32,
+        base: wp.int32,
+        begin: wp.int32,
+        end: wp.int32,
         dt: real,
     ):
-        """Fill in the touches of a ring's patches, from index `first` on; return the area that presses on material
-        [m²]."""
+        """Fill in the touches of the patches begin ≤ j < end, from index `base` + begin on, as if there were material
+        everywhere."""
         per_node = laws.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
-        j = int(0)
-        while j < surface.around:
-            patch = patch_at(pose, ring, read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j))
+        # A ring outside the slab, between others, may be outside the window, too. It touches nothing.
+        last_cell = window.first + (window.cells_y - 1) * window.cells_z - 2
+        j = begin
+        if wp.static(variant.window > 0):
+            j += block.lane()
+        while j < end:
+            ring = ring_of(surface, pose, j)
+            patch = patch_at(pose, ring, read(surface.cosine, j), read(surface.sine, j))
             grip = grips.grip_of(law, pose, ring, patch)
             face = grips.face_of(ring, patch, grip.shift)
             immersed = surfaces.immersed_area(pose, ring, patch, window.thickness, dt)
             if wp.static(variant.rimmed):
                 immersed *= grid.on_plate(plate, window, patch.y, patch.z)
             area = grip.share * immersed
-            write(touches.area, first + j, area)
+            write(touches.area, base + j, area)
             slope = laws.steady_slope(law, grip.share, grip.slope, face.closing)
-            write(touches.slope, first + j, slope * immersed)
-            write(touches.shift, first + j, grip.shift)
-            write(touches.gain, first + j, per_node * area * wp.abs(grips.normal_along_x(pose, patch, face)))
-            write_index(touches.tile, first + j, grid.tile_at(plate, window, patch.y, patch.z))
+            write(touches.slope, base + j, slope * immersed)
+            write(touches.shift, base + j, grip.shift)
+            write(touches.gain, base + j, per_node * area * wp.abs(grips.normal_along_x(pose, patch, face)))
+            write_index(touches.tile, base + j, grid.tile_at(plate, window, patch.y, patch.z))
             cell = grid.cell_at(window, patch.y, patch.z)
-            write_index(touches.cell, first + j, cell.index)
-            write(touches.y, first + j, cell.y)
-            write(touches.z, first + j, cell.z)
-            j += 1
-        return grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, surface.around)
+            write_index(touches.cell, base + j, wp.clamp(cell.index, window.first, last_cell))
+            write(touches.y, base + j, cell.y)
+            write(touches.z, base + j, cell.z)
+            if wp.static(variant.window > 0):
+                j += block.count()
+            else:
+                j += 1
+
+    @wp.func
+    def meet(plate: Plate, touches: Touches, first: wp.int32, count: wp.int32):
+        """Restrict touches to material, from index `first` on; return the area that presses on it [m²]."""
+        return grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
 
     @wp.func
     def expose(surface: Surface, fields: Fields, touches: Touches, first: wp.int32):
@@ -116,29 +129,43 @@ def build(variant: Variant) -> SimpleNamespace:
             j += 1
 
     def summing(weakened: bool) -> Any:
-        """The second pass over a ring, in a layer that weakens or in one that does not: without a branch inside."""
+        """The second pass, in a layer that weakens or in one that does not: without a branch inside."""
 
-        @wp.func(name="sum_ring_weakened" if weakened else "sum_ring_sound")
-        def sum_ring(
-            surface: Surface, law: Law, fields: Fields, touches: Touches, pose: Pose, ring: Ring, first: wp.int32
+        @wp.func(name="sum_weakened" if weakened else "sum_sound")
+        def sum_patches(
+            surface: Surface,
+            law: Law,
+            fields: Fields,
+            touches: Touches,
+            pose: Pose,
+            base: wp.int32,
+            begin: wp.int32,
+            end: wp.int32,
         ):
-            """Sum tractions and their slopes over a ring's touches."""
-            axial, right, up, around = real(0.0), real(0.0), real(0.0), real(0.0)
-            axial_c, axial_s = real(0.0), real(0.0)
-            slopes, slopes_c, slopes_s, slopes_cc, slopes_cs = real(0.0), real(0.0), real(0.0), real(0.0), real(0.0)
-            j = int(0)
-            while j < surface.around:
-                cosine, sine = read(surface.cosine, ring.first + j), read(surface.sine, ring.first + j)
+            """Sum tractions and their slopes over the touches of the patches begin ≤ j < end."""
+            axial, right, up = real(0.0), real(0.0), real(0.0)
+            roll, pitch, yaw = real(0.0), real(0.0), real(0.0)
+            aa, ac, as_ = real(0.0), real(0.0), real(0.0)
+            cc, cs, ss = real(0.0), real(0.0), real(0.0)
+            lc, ls = real(0.0), real(0.0)
+            lcc, lcs, lss = real(0.0), real(0.0), real(0.0)
+            llcc, llcs, llss = real(0.0), real(0.0), real(0.0)
+            j = begin
+            if wp.static(variant.window > 0):
+                j += block.lane()
+            while j < end:
+                ring = ring_of(surface, pose, j)
+                cosine, sine = read(surface.cosine, j), read(surface.sine, j)
                 patch = patch_at(pose, ring, cosine, sine)
-                face = grips.face_of(ring, patch, read(touches.shift, first + j))
+                face = grips.face_of(ring, patch, read(touches.shift, base + j))
                 left = one
                 if wp.static(weakened):
-                    cell = read_index(touches.cell, first + j)
-                    y, z = read(touches.y, first + j), read(touches.z, first + j)
+                    cell = read_index(touches.cell, base + j)
+                    y, z = read(touches.y, base + j), read(touches.z, base + j)
                     left = laws.remaining(law, memories.gather(fields.exposure, fields.cells_z, cell, y, z))
-                area = left * read(touches.area, first + j)
+                area = left * read(touches.area, base + j)
                 stress = laws.normal_stress(law, face.closing)
-                slope = left * read(touches.slope, first + j) * stress
+                slope = left * read(touches.slope, base + j) * stress
                 if wp.static(variant.rate_dependent):
                     slope += area * laws.stress_slope(law, face.closing)
                 # Traction = stress × (−n + η t), t against the sliding velocity.
@@ -153,35 +180,51 @@ def build(variant: Variant) -> SimpleNamespace:
                     f_outward -= rubbing * s_outward
                     f_around -= rubbing * s_around
                 force = area * stress
+                p_right = f_outward * cosine - f_around * sine
+                p_up = f_outward * sine + f_around * cosine
                 axial += force * f_axial
-                axial_c += force * f_axial * cosine
-                axial_s += force * f_axial * sine
-                right += force * (f_outward * cosine - f_around * sine)
-                up += force * (f_outward * sine + f_around * cosine)
-                around += force * f_around
-                slopes += slope
-                slopes_c += slope * cosine
-                slopes_s += slope * sine
-                slopes_cc += slope * cosine * cosine
-                slopes_cs += slope * cosine * sine
-                j += 1
+                right += force * p_right
+                up += force * p_up
+                roll += force * ring.radius * f_around
+                pitch += force * (ring.radius * f_axial * sine - ring.station * p_up)
+                yaw += force * (ring.station * p_right - ring.radius * f_axial * cosine)
+                # Normals are n = (a, r cos, r sin), and arm × n = l (0, −sin, cos).
+                lever = ring.station * ring.normal_radial - ring.radius * ring.normal_axial
+                a, turn = slope * ring.normal_axial, slope * lever
+                nc, ns = ring.normal_radial * cosine, ring.normal_radial * sine
+                kc, ks = lever * cosine, lever * sine
+                aa += a * ring.normal_axial
+                ac += a * nc
+                as_ += a * ns
+                cc += slope * nc * nc
+                cs += slope * nc * ns
+                ss += slope * ns * ns
+                lc += a * kc
+                ls += a * ks
+                lcc += turn * nc * cosine
+                lcs += turn * nc * sine
+                lss += turn * ns * sine
+                llcc += turn * kc * cosine
+                llcs += turn * kc * sine
+                llss += turn * ks * sine
+                if wp.static(variant.window > 0):
+                    j += block.count()
+                else:
+                    j += 1
             sums = Sums()
             sums.force = vec3(axial, right, up)
-            sums.moment = vec3(
-                ring.radius * around,
-                ring.radius * axial_s - ring.station * up,
-                ring.station * right - ring.radius * axial_c,
-            )
-            sums.slopes = slopes
-            sums.slopes_c = slopes_c
-            sums.slopes_s = slopes_s
-            sums.slopes_cc = slopes_cc
-            sums.slopes_cs = slopes_cs
+            sums.moment = vec3(roll, pitch, yaw)
+            sums.slopes.aa = aa
+            sums.slopes.ar = vec2(ac, as_)
+            sums.slopes.rr = vec3(cc, cs, ss)
+            sums.slopes.al = vec2(lc, ls)
+            sums.slopes.rl = vec3(lcc, lcs, lss)
+            sums.slopes.ll = vec3(llcc, llcs, llss)
             return sums
 
-        return sum_ring
+        return sum_patches
 
-    sum_ring, sum_sound = summing(variant.degrades), summing(False)
+    sum_patches, sum_sound = summing(variant.degrades), summing(False)
     mixed = variant.layered and variant.degrades  # layers that weaken beside layers that do not
 
     @wp.func
@@ -209,6 +252,25 @@ def build(variant: Variant) -> SimpleNamespace:
             touches.sums[index] = sums
 
     @wp.func
+    def summed(
+        surface: Surface,
+        law: Law,
+        fields: Fields,
+        window: Window,
+        touches: Touches,
+        pose: Pose,
+        base: wp.int32,
+        first: wp.int32,
+        last: wp.int32,
+    ):
+        """The second pass over the rings from `first` to `last`, in a layer of either kind."""
+        begin, end = first * surface.around, (last + 1) * surface.around
+        if wp.static(mixed):
+            if not window.weakens:
+                return sum_sound(surface, law, fields, touches, pose, base, begin, end)
+        return sum_patches(surface, law, fields, touches, pose, base, begin, end)
+
+    @wp.func
     def load_on(
         surface: Surface,
         plate: Plate,
@@ -226,44 +288,41 @@ def build(variant: Variant) -> SimpleNamespace:
         The damping of the load is half of the slope of the traction. The step is then of second order where the
         stress depends on the rate, and stable where a wall lies on the steep ramp of the contact.
         """
-        base = slot * surface.rings * surface.around
         load = Load()
+        begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
+        base = slot * surface.rings * surface.around - begin  # what a step touches stays in the fastest cache
+        find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
+        first, last = int(surface.rings), int(-1)  # of the rings that touch
         for index in range(found.first_ring, found.last_ring + 1):
-            ring = ring_at(surface, pose, index)
-            first = base + index * surface.around
             area = zero
-            if surfaces.closes(pose, ring):
-                area = find_touches(surface, plate, law, fields, window, touches, pose, ring, first, dt)
+            if index >= found.first_closing and index <= found.last_closing:
+                area = meet(plate, touches, base + index * surface.around, surface.around)
             touches.ring_area[slot * surface.rings + index] = area
-            load.touching = load.touching or area > zero
-        if load.touching:
+            if area > zero:
+                first, last = wp.min(first, index), index
+        if last >= 0:
+            load.touching = True
             if wp.static(variant.degrades):
                 if weakens(window):
                     # After all rings are found: a CPU has to wait before it reads single values that it has just
                     # stored as vectors.
-                    for index in range(found.first_ring, found.last_ring + 1):
+                    for index in range(first, last + 1):
                         if touches.ring_area[slot * surface.rings + index] > zero:
                             expose(surface, fields, touches, base + index * surface.around)
                     memories.spread(plate, fields, window, found.box)
-            slopes = Slopes()
-            for index in range(found.first_ring, found.last_ring + 1):
-                if touches.ring_area[slot * surface.rings + index] > zero:
-                    ring = ring_at(surface, pose, index)
-                    first = base + index * surface.around
-                    sums = Sums()
-                    if wp.static(mixed):
-                        if window.weakens:
-                            sums = sum_ring(surface, law, fields, touches, pose, ring, first)
-                        else:
-                            sums = sum_sound(surface, law, fields, touches, pose, ring, first)
-                    else:
-                        sums = sum_ring(surface, law, fields, touches, pose, ring, first)
-                    if wp.static(variant.bends):
-                        keep_sums(touches, slot * surface.rings + index, sums)
-                    load.force += sums.force
-                    load.moment += sums.moment
-                    load.damped = load.damped or sums.slopes > zero
-                    slopes = resistances.added(slopes, resistances.slopes_of(ring, sums))
+            sums = Sums()
+            if wp.static(variant.bends):
+                for index in range(first, last + 1):
+                    if touches.ring_area[slot * surface.rings + index] > zero:
+                        part = summed(surface, law, fields, window, touches, pose, base, index, index)
+                        keep_sums(touches, slot * surface.rings + index, part)
+                        sums = resistances.joined(sums, part)
+            else:
+                sums = summed(surface, law, fields, window, touches, pose, base, first, last)
+            load.force = sums.force
+            load.moment = sums.moment
+            slopes = sums.slopes
+            load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
             load.damping_vv = half * resistances.damping_vv(slopes)
             load.damping_vw = half * resistances.damping_vw(slopes)
             load.damping_ww = half * resistances.damping_ww(slopes)
@@ -273,5 +332,12 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     return SimpleNamespace(
-        Fields=Fields, Touches=Touches, open_window=open_window, clear_sums=clear_sums, load_on=load_on
+        Fields=Fields,
+        Touches=Touches,
+        open_window=open_window,
+        clear_sums=clear_sums,
+        find_touches=find_touches,
+        meet=meet,
+        sum_patches=sum_patches,
+        load_on=load_on,
     )

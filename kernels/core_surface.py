@@ -26,9 +26,10 @@ def build(variant: Variant) -> SimpleNamespace:
         Per ring: station ahead of the centre of mass and radius [m], area of one patch [m²], its normal along
         the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of
         the change of the normal over it.
-        `cosine` and `sine` are those of the patches' azimuths: first for even rings, then for odd rings. Odd rings are
-        turned by half a patch, so neighbouring rings do not all miss the same edge. The number of patches around a ring
-        is a multiple of 4.
+        `cosine` and `sine` are those of the azimuths of all patches, ring by ring. Odd rings are turned by half a
+        patch, so neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
+        4. `patches` repeats the members of a ring for each of its patches, one array behind the other: a CPU then goes
+        through the patches of all rings in one loop.
         """
 
         station: wp.array(dtype=real)
@@ -42,6 +43,7 @@ def build(variant: Variant) -> SimpleNamespace:
         turn_radial: wp.array(dtype=real)
         cosine: wp.array(dtype=real)
         sine: wp.array(dtype=real)
+        patches: wp.array(dtype=real)
         rings: wp.int32
         around: wp.int32
         max_radius: real
@@ -119,7 +121,25 @@ def build(variant: Variant) -> SimpleNamespace:
         ring.turn_radial = read(surface.turn_radial, index)
         ring.centre = pose.position + ring.station * pose.axis
         ring.sector = half_turn / real(surface.around)
-        ring.first = (index % 2) * surface.around
+        ring.first = index * surface.around
+        return ring
+
+    @wp.func
+    def ring_of(surface: Surface, pose: Pose, patch: wp.int32):
+        """The ring of a patch; the same as `ring_at`, but neighbours in memory belong to neighbouring patches."""
+        apart = surface.rings * surface.around
+        ring = Ring()
+        ring.station = read(surface.patches, patch)
+        ring.radius = read(surface.patches, patch + apart)
+        ring.area = read(surface.patches, patch + 2 * apart)
+        ring.normal_axial = read(surface.patches, patch + 3 * apart)
+        ring.normal_radial = read(surface.patches, patch + 4 * apart)
+        ring.half_axial = read(surface.patches, patch + 5 * apart)
+        ring.half_radial = read(surface.patches, patch + 6 * apart)
+        ring.turn_axial = read(surface.patches, patch + 7 * apart)
+        ring.turn_radial = read(surface.patches, patch + 8 * apart)
+        ring.centre = pose.position + ring.station * pose.axis
+        ring.sector = half_turn / real(surface.around)
         return ring
 
     @wp.func
@@ -230,6 +250,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Patch=Patch,
         pose_of=pose_of,
         ring_at=ring_at,
+        ring_of=ring_of,
         broadside=broadside,
         ends_of=ends_of,
         reach_along_x=reach_along_x,

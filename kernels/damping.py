@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface
 from .variant import Variant
 
 
@@ -14,20 +13,6 @@ def build(variant: Variant) -> SimpleNamespace:
     """Sums over a ring, and the blocks of the damping that follow from them, for one variant."""
     real, vec2, vec3, mat33 = variant.real, variant.vec2, variant.vec3, variant.mat33
     zero = real(0.0)
-    Ring = core_surface.build(variant).Ring
-
-    @wp.struct
-    class Sums:
-        """Sums over a ring: force [N] and moment [N m] along the body axes; the derivative of the tractions by the
-        closing speed [N s/m], weighted by 1, cos, sin, cos² and cos sin of the azimuth."""
-
-        force: vec3
-        moment: vec3
-        slopes: real
-        slopes_c: real
-        slopes_s: real
-        slopes_cc: real
-        slopes_cs: real
 
     @wp.struct
     class Slopes:
@@ -42,20 +27,14 @@ def build(variant: Variant) -> SimpleNamespace:
         rl: vec3
         ll: vec3
 
-    @wp.func
-    def slopes_of(ring: Ring, s: Sums):
-        """The slopes of a ring. Its normals are n = (a, r cos, r sin), and arm × n = l (0, −sin, cos)."""
-        a, r = ring.normal_axial, ring.normal_radial
-        lever = ring.station * r - ring.radius * a
-        once, twice = vec2(s.slopes_c, s.slopes_s), vec3(s.slopes_cc, s.slopes_cs, s.slopes - s.slopes_cc)
-        slopes = Slopes()
-        slopes.aa = a * a * s.slopes
-        slopes.ar = a * r * once
-        slopes.rr = r * r * twice
-        slopes.al = a * lever * once
-        slopes.rl = r * lever * twice
-        slopes.ll = lever * lever * twice
-        return slopes
+    @wp.struct
+    class Sums:
+        """Sums over some patches: force [N] and moment [N m] along the body axes, and the slopes of the tractions
+        [N s/m]."""
+
+        force: vec3
+        moment: vec3
+        slopes: Slopes
 
     @wp.func
     def damping_vv(s: Slopes):
@@ -97,20 +76,15 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def joined(a: Sums, b: Sums):
-        """Sums over a ring in two layers."""
+        """Sums over two sets of patches."""
         a.force += b.force
         a.moment += b.moment
-        a.slopes += b.slopes
-        a.slopes_c += b.slopes_c
-        a.slopes_s += b.slopes_s
-        a.slopes_cc += b.slopes_cc
-        a.slopes_cs += b.slopes_cs
+        a.slopes = added(a.slopes, b.slopes)
         return a
 
     return SimpleNamespace(
         Sums=Sums,
         Slopes=Slopes,
-        slopes_of=slopes_of,
         added=added,
         joined=joined,
         damping_vv=damping_vv,

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import memory, plate_grid
+from . import lanes, memory, plate_grid
 from .variant import Variant
 
 
@@ -15,7 +15,7 @@ def build(variant: Variant) -> SimpleNamespace:
     real = variant.real
     half = real(0.5)
     read, write = memory.build(real).read, memory.build(real).write
-    grid = plate_grid.build(variant)
+    grid, block, split = plate_grid.build(variant), lanes.build(variant), lanes.split(variant)
     Plate, Window, Box = grid.Plate, grid.Window, grid.Box
 
     @wp.struct
@@ -75,7 +75,8 @@ def build(variant: Variant) -> SimpleNamespace:
     scatter = scatter_plain if variant.double else scatter_single
 
     # Native, because a compiler vectorises these loops only if the pointers do not alias.
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start - step >= 0 && start + count + step <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ from = source.data + start;
@@ -83,6 +84,7 @@ def build(variant: Variant) -> SimpleNamespace:
     const auto* __restrict__ after = from + step;
     for (int j = 0; j < count; ++j) into[j] = middle * from[j] + side * (before[j] + after[j]);
     """)
+    )
     def filter_near(
         target: wp.array(dtype=real),
         source: wp.array(dtype=real),
@@ -95,13 +97,15 @@ def build(variant: Variant) -> SimpleNamespace:
         """target[j] = middle × source[j] + side × (source[j − step] + source[j + step]), start ≤ j < start + count."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start - step >= 0 && start + count + step <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ before = source.data + start - step;
     const auto* __restrict__ after = source.data + start + step;
     for (int j = 0; j < count; ++j) into[j] += side * (before[j] + after[j]);
     """)
+    )
     def filter_far(
         target: wp.array(dtype=real),
         source: wp.array(dtype=real),
@@ -113,34 +117,40 @@ def build(variant: Variant) -> SimpleNamespace:
         """target[j] += side × (source[j − step] + source[j + step]) for start ≤ j < start + count."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start >= 0 && start + count <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ from = source.data + start;
     for (int j = 0; j < count; ++j) into[j] += factor * from[j];
     """)
+    )
     def add_scaled(
         target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
     ):
         """target[j] += factor × source[j] for start ≤ j < start + count; target and source are different arrays."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start >= 0 && start + count <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     auto* __restrict__ from = source.data + start;
     for (int j = 0; j < count; ++j) { into[j] += factor * from[j]; from[j] = 0; }
     """)
+    )
     def take_scaled(
         target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
     ):
         """As `add_scaled`; then source[j] = 0."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     auto* __restrict__ into = target.data + start;
     for (int j = 0; j < count; ++j) into[j] = 0;
     """)
+    )
     def clear(target: wp.array(dtype=real), start: wp.int32, count: wp.int32):
         """target[start + j] = 0 for j < count."""
         ...
@@ -179,6 +189,8 @@ def build(variant: Variant) -> SimpleNamespace:
         start = window.first + box.y_low * stride
         count = (box.y_high - box.y_low + 1) * stride
         filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
+        if wp.static(variant.window > 0):
+            block.barrier()  # the other direction reads what other lanes have filtered, and overwrites what they read
         filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
         add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, plate_grid
+from . import core_surface, lanes, plate_grid
 from .variant import Variant
 
 
@@ -14,7 +14,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the footprint for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, grid = core_surface.build(variant), plate_grid.build(variant)
+    surfaces, grid, block = (part.build(variant) for part in (core_surface, plate_grid, lanes))
     Surface, Pose, ring_at = surfaces.Surface, surfaces.Pose, surfaces.ring_at
     Plate, Window, Box = grid.Plate, grid.Window, grid.Box
     far = wp.constant(2**20)  # nodes away: beyond any window
@@ -22,12 +22,14 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Footprint:
         """What a step can touch. `first_ring` and `last_ring` are the first and the last ring that can be in the slab;
-        last < first if there is none. `through` means that all rings are behind the rear face, `back` that all are
-        before the front face. `box` holds the nodes around the rings in the slab. `inside` means that the window holds
-        the box."""
+        last < first if there is none. `first_closing` and `last_closing` are those of them that may close in. `through`
+        means that all rings are behind the rear face, `back` that all are before the front face. `box` holds the nodes
+        around the rings in the slab. `inside` means that the window holds the box."""
 
         first_ring: wp.int32
         last_ring: wp.int32
+        first_closing: wp.int32
+        last_closing: wp.int32
         through: wp.bool
         back: wp.bool
         inside: wp.bool
@@ -48,8 +50,11 @@ def build(variant: Variant) -> SimpleNamespace:
         turning = half * dt * wp.length(pose.omega)
         # Integers, because a compiler vectorises their minimum, but not that of numbers that may be NaN.
         first_ring, last_ring, not_through, not_back = int(surface.rings), int(-1), int(0), int(0)
+        first_closing, last_closing = int(surface.rings), int(-1)
         y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
         index = int(0)
+        if wp.static(variant.window > 0):
+            index = block.lane()
         while index < surface.rings:
             ring = ring_at(surface, pose, index)
             reach = surfaces.reach_along_x(ring, pose, broadside, advance, turning)
@@ -57,6 +62,9 @@ def build(variant: Variant) -> SimpleNamespace:
             within = foremost > zero and rearmost < window.thickness
             first_ring = wp.min(first_ring, wp.where(within, index, surface.rings))
             last_ring = wp.max(last_ring, wp.where(within, index, -1))
+            closing = within and surfaces.closes(pose, ring)
+            first_closing = wp.min(first_closing, wp.where(closing, index, surface.rings))
+            last_closing = wp.max(last_closing, wp.where(closing, index, -1))
             not_through += wp.where(rearmost > window.thickness, 0, 1)
             not_back += wp.where(foremost < zero, 0, 1)
             wide_y, wide_z = ring.radius * across_y, ring.radius * across_z
@@ -64,10 +72,21 @@ def build(variant: Variant) -> SimpleNamespace:
             z_low = wp.min(z_low, wp.where(within, node_below(window, ring.centre[2] - wide_z), far))
             y_high = wp.max(y_high, wp.where(within, node_below(window, ring.centre[1] + wide_y), -far))
             z_high = wp.max(z_high, wp.where(within, node_below(window, ring.centre[2] + wide_z), -far))
-            index += 1
+            if wp.static(variant.window > 0):
+                index += block.count()
+            else:
+                index += 1
+        if wp.static(variant.window > 0):
+            first_ring, last_ring = block.least(first_ring), block.most(last_ring)
+            first_closing, last_closing = block.least(first_closing), block.most(last_closing)
+            not_through, not_back = block.most(not_through), block.most(not_back)
+            y_low, y_high = block.least(y_low), block.most(y_high)
+            z_low, z_high = block.least(z_low), block.most(z_high)
         found = Footprint()
         found.first_ring = first_ring
         found.last_ring = last_ring
+        found.first_closing = first_closing
+        found.last_closing = last_closing
         found.through = not_through == 0
         found.back = not_back == 0
         found.inside = True

@@ -2,6 +2,8 @@
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. So the load of one
 layer is the load of one plate (contact.load_on), and loads of layers add.
+
+Long because all of them read the same layers of the same slot.
 """
 
 from functools import cache
@@ -23,7 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, memories, contacts, launch = (part.build(variant) for part in (footprint, exposure, contact, conditions))
     Surface, Pose, Plate, Window, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window, laws.Law
-    Body, State, Load = motion.Body, motion.State, motion.Load
+    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Fields, Footprint, Touches, Shots = contacts.Fields, prints.Footprint, contacts.Touches, launch.Shots
     passages, hits, own = passage.build(variant), earlier.build(variant), launch.own
     Passage, Earlier = passages.Passage, hits.Earlier
@@ -178,12 +180,13 @@ def build(variant: Variant) -> SimpleNamespace:
         state: State,
         pose: Pose,
         before: Reached,
+        last: Change,
         time: real,
         flight: vec3,
         dt: real,
     ):
         """Find what a step can touch of every layer; open the windows of layers that are reached for the first time,
-        and record the layers that the core has left."""
+        and record the layers that the core has left. `last` is the change of its velocities in the last step."""
         reached = Reached()
         rearmost, foremost = surfaces.ends_of(surface, pose)
         reached.rearmost = rearmost
@@ -230,7 +233,11 @@ def build(variant: Variant) -> SimpleNamespace:
                 stack.found[here] = touch
                 near = True
             elif low > rear and not passages.has_left(passage, shot, k):
-                passages.leave(passage, body, shot, k, state, rearmost - rear, time, flight)
+                since = (rearmost - rear) / wp.max(state.velocity[0], one)
+                speed = wp.length(state.velocity)
+                if before.first != k or before.last != k:  # other layers slow the core down while it leaves this one
+                    speed = wp.length(pose.velocity - (since / dt) * last.velocity)
+                passages.leave(passage, body, shot, k, state, speed, since, time, flight)
                 passages.fly_on(passage, body, layers.standoffs, layers.ahead, shot, k, state, rear, flight)
             stack.near[here] = near
         return found, reached
@@ -308,13 +315,29 @@ def build(variant: Variant) -> SimpleNamespace:
         forwards, backwards = turning + state.velocity[0], turning - state.velocity[0]
         across = turning + wp.length(vec3(zero, state.velocity[1], state.velocity[2]))
         time = surface.bounding_radius / wp.max(wp.length(state.velocity), one)
-        if across > zero:
-            time = wp.min(time, reached.clearance / across)
+        time = wp.min(time, reached.clearance / wp.max(across, tiny))
         if forwards > zero:
             time = wp.min(time, ahead / forwards)
         if backwards > zero:
             time = wp.min(time, behind / backwards)
         return wp.max(zero, time - half * dt)
+
+    @wp.func
+    def is_behind(passage: Passage, shot: wp.int32):
+        """Whether the core has left the plate through its rear face."""
+        return passages.has_left(passage, shot, 0)
+
+    @wp.func
+    def is_between(layers: Layers, shot: wp.int32, reached: Reached, x: real):
+        """Whether the whole core is in the target, and its centre of mass, at x [m], in none of the layers."""
+        between = reached.rearmost > zero
+        for k in range(layers.count):
+            front = own_of(layers.front, k, shot)
+            rear = front + own_of(layers.thickness, k, shot)
+            between = between and (x < front or x > rear)
+            if k == layers.count - 1:
+                between = between and reached.foremost < rear
+        return between
 
     @wp.func
     def conclude(layers: Layers, passage: Passage, shot: wp.int32, status: wp.int32, reached: Reached):
@@ -343,6 +366,8 @@ def build(variant: Variant) -> SimpleNamespace:
         jump_of=jump_of,
         load_on=load_on,
         free_time=free_time,
+        is_behind=is_behind,
+        is_between=is_between,
         conclude=conclude,
         keep=keep,
     )

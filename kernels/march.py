@@ -5,10 +5,23 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import bending, contact, core_surface, damping, footprint, interaction, layers, nodal, plate_grid, rigid_body
+from . import (
+    bending,
+    block,
+    contact,
+    core_surface,
+    damping,
+    footprint,
+    interaction,
+    layers,
+    nodal,
+    plate_grid,
+    rigid_body,
+)
 from . import earlier as earlier_hits
 from . import shots as conditions
 from . import trace as tracing
+from .lanes import BLOCKS, LANES
 from .status import Status
 from .variant import Variant
 
@@ -20,11 +33,12 @@ def build(variant: Variant) -> SimpleNamespace:
     zero, half = real(0.0), real(0.5)
     steadied = real(8.0)  # onsets: as far as a step carries a core beyond the ramp
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
+    spent = real(2.5e-3)  # likewise: at 5 % it does not come back through a layer that it has left
     most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
     surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
     prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
     stacked, hits = layers.build(variant), earlier_hits.build(variant)
-    scheme = (nodal if variant.nodal else contact).build(variant)
+    scheme = (nodal if variant.nodal else block if variant.window else contact).build(variant)
     Surface, Pose, Plate, Law = surfaces.Surface, surfaces.Pose, grid.Plate, laws.Law
     Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
     Fields, Footprint, Touches = scheme.Fields, prints.Footprint, contact.build(variant).Touches
@@ -75,12 +89,14 @@ def build(variant: Variant) -> SimpleNamespace:
         pose: Pose,
         found: Footprint,
         touched: wp.bool,
+        behind: wp.bool,
         initial_energy: real,
         thickness: real,
     ):
         """The final status of a core, or RUNNING.
 
-        A core outside the slab cannot come back if it moves away faster than its rotation moves any part of it.
+        A core outside the slab cannot come back if it moves away faster than its rotation moves any part of it. A core
+        that turns back `behind` a layer, and is spent, rests there.
         """
         status = RUNNING
         energy = motion.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
@@ -89,6 +105,7 @@ def build(variant: Variant) -> SimpleNamespace:
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, pose.axis))
         leaving = wp.abs(state.velocity[0])
         beyond = wp.max(state.position[0] - thickness, -state.position[0])
+        rest = wp.where(behind and state.velocity[0] < zero, spent, still)
         gone = leaving > turning or beyond > surface.bounding_radius
         if not wp.isfinite(energy):
             status = NOT_FINITE
@@ -98,7 +115,7 @@ def build(variant: Variant) -> SimpleNamespace:
             status = wp.where(touched, PERFORATED, MISSED)
         elif found.back and state.velocity[0] < zero and gone:
             status = wp.where(touched, RICOCHETED, MISSED)
-        elif touched and energy - about_axis < still * initial_energy:
+        elif touched and energy - about_axis < rest * initial_energy:
             status = ARRESTED
         elif not found.inside:
             status = LEFT_WINDOW
@@ -127,7 +144,8 @@ def build(variant: Variant) -> SimpleNamespace:
         bending: wp.array(dtype=Bending),
         trace: wp.array2d(dtype=real),
     ):
-        """March one shot per thread: thread k computes shot order[first + k] in slot k mod slots.
+        """March one shot per thread, or per block of threads: number k computes shot order[first + k] in slot k mod
+        slots.
 
         Shots at one plate are numbered in a row, and are computed one after another in one slot.
         """
@@ -147,8 +165,12 @@ def build(variant: Variant) -> SimpleNamespace:
             reached = Reached()
             straight = launch.line_of_flight(shots, shot)
             flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
+            # A core that slides between two layers never ends: it has gone farther than one that goes straight through.
+            farthest = real(pace.longest_way) + wp.length(vec3(zero, flight[1], flight[2])) / flight[0] * thickness
         else:
             hit_y, hit_z = own(shots.hit_y, shot), own(shots.hit_z, shot)
+            if wp.static(variant.window > 0):
+                fields = scheme.own_fields(fields, slot)
             window = scheme.open_window(plate, thickness, fields, slot, hit_y, hit_z)
             if wp.static(variant.burst):
                 hits.recall(earlier, fields, plate, window, slot, 0, shot, hit_y, hit_z)
@@ -170,6 +192,7 @@ def build(variant: Variant) -> SimpleNamespace:
         last = Change()
         before_last = Change()
         step = int(0)
+        behind = bool(False)  # the plate
         while status == RUNNING and step < max_steps:
             omega = motion.angular_velocity(body, motion.axis_of(state.attitude), state.angular_momentum)
             pose = surfaces.pose_of(surface, state.position, state.attitude, state.velocity, omega)
@@ -191,13 +214,15 @@ def build(variant: Variant) -> SimpleNamespace:
                     state,
                     pose,
                     reached,
+                    last,
                     (real(step) + half) * dt + skipped,
                     flight,
                     dt,
                 )
+                behind = stacked.is_behind(passage, shot)
             else:
                 found = prints.footprint_of(surface, plate, window, pose, dt)
-            status = ended(surface, body, state, pose, found, touched, initial_energy, thickness)
+            status = ended(surface, body, state, pose, found, touched, behind, initial_energy, thickness)
             if status == RUNNING:
                 if wp.static(variant.layered):
                     law.onset_jump = stacked.jump_of(target, stack, slot, shot, reached)
@@ -237,12 +262,17 @@ def build(variant: Variant) -> SimpleNamespace:
                     if found.last_ring < 0:
                         free = stacked.free_time(surface, target, shot, state, pose, reached, dt)
                         skipped += free
+                        if wp.length(vec3(zero, state.position[1], state.position[2])) > farthest:
+                            max_steps = step
                 state = motion.drift(body, state, dt + free)
                 step += 1
         if pace.rows > 0:
             traces.record(trace, shot * pace.rows + step, (real(step) + half) * dt + skipped, state, vec3(), vec3())
         if status == RUNNING:
             status = UNFINISHED
+            if wp.static(variant.layered):
+                if touched and stacked.is_between(target, shot, reached, state.position[0]):
+                    status = ARRESTED
         if wp.static(variant.layered):
             stacked.conclude(target, passage, shot, status, reached)
         if wp.static(variant.burst):
@@ -251,6 +281,9 @@ def build(variant: Variant) -> SimpleNamespace:
             else:
                 hits.keep(earlier, fields, window, slot, shot)
         axis = motion.axis_of(state.attitude)
+        if wp.static(variant.window > 0):
+            if scheme.lane() > 0:  # all lanes know the outcome
+                return
         outcomes.status[shot] = status
         outcomes.steps[shot] = step
         outcomes.contact_duration[shot] = real(contact_steps) * dt
@@ -266,7 +299,7 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes.angular_momentum[shot] = state.angular_momentum
 
     return SimpleNamespace(
-        kernel=variant.kernel(march),
+        kernel=variant.kernel(march, (LANES, BLOCKS) if variant.window else None),
         Surface=Surface,
         Sections=Sections,
         Bending=Bending,

@@ -108,15 +108,15 @@ def build(variant: Variant) -> SimpleNamespace:
         shot: wp.int32,
         layer: wp.int32,
         state: State,
-        beyond: real,
+        speed: real,
+        since: real,
         time: real,
         flight: vec3,
     ):
-        """Record how a core whose last point is `beyond` a layer's rear face [m] left the layer."""
-        since = beyond / wp.max(state.velocity[0], one)
+        """Record how a core left a layer at a speed [m/s], `since` [s] before the time."""
         axis = motion.turned(body, motion.axis_of(state.attitude), state.angular_momentum, -since)
         passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, PASSED, MISSED)
-        passage.velocity[shot, layer] = wp.length(state.velocity)
+        passage.velocity[shot, layer] = speed
         passage.tilt[shot, layer] = angle_between(axis, flight)
         passage.time[shot, layer] = time - since
         passage.deflection[shot, layer] = angle_between(state.velocity, flight)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from . import lanes
 from .variant import Variant
 
 
@@ -17,6 +18,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the plate for one variant."""
     real = variant.real
     zero, half, one = real(0.0), real(0.5), real(1.0)
+    split = lanes.split(variant)
 
     @wp.struct
     class Plate:
@@ -138,11 +140,12 @@ def build(variant: Variant) -> SimpleNamespace:
         return within(row, plate.tile_y) * plate.tile_z + within(column, plate.tile_z)
 
     # Native, because a compiler reads several cells at once only if the pointers do not alias.
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start >= 0 && start + count <= area.shape[0]);
     const auto scale = [count](auto* __restrict__ area, auto* __restrict__ slope, auto* __restrict__ gain,
                                const int* __restrict__ at, const auto* __restrict__ tile, int cells) {
-        auto total = 0 * area[0];
+        decltype(0 * area[0]) total = 0;
         for (int j = 0; j < count; ++j) {
             assert(at[j] >= 0 && at[j] < cells);
             const auto share = tile[at[j]];
@@ -155,6 +158,7 @@ def build(variant: Variant) -> SimpleNamespace:
     };
     return scale(area.data + start, slope.data + start, gain.data + start, at.data + start, tile.data, tile.shape[0]);
     """)
+    )
     def meet(
         area: wp.array(dtype=real),
         slope: wp.array(dtype=real),

@@ -42,7 +42,7 @@ class LayerStatus(IntEnum):
 
 _SENTENCES = {
     Status.PERFORATED: "The core touched the target and left it through the rear face.",
-    Status.ARRESTED: "The core came to rest in the target.",
+    Status.ARRESTED: "The core came to rest in the target, or stays between two of its layers.",
     Status.RICOCHETED: "The core touched the target and left it through the front face.",
     Status.MISSED: "The core passed without touching material.",
     Status.UNFINISHED: "The core was still in the target when the step limit was reached.",

@@ -8,10 +8,11 @@ from typing import Any
 import warp as wp
 
 CPU_FLAGS = (
-    "-march=native -mllvm=-inline-threshold=9000 -mstackrealign "
+    "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign "
     "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )
-"""Flags that let the compiler vectorise sums and divisions; NaN and infinity keep their meaning."""
+"""Flags that let the compiler vectorise sums and divisions, as wide as the processor can; its default for Intel is half
+of that. NaN and infinity keep their meaning."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Variant:
         bends: the core's largest bending moment is recorded.
         layered: the target has several layers.
         burst: several shots hit one and the same plate.
+        window: nodes of a shot's window in shared memory, at most, in the block layout: one block of CUDA threads per
+            shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
     """
 
     double: bool = False
@@ -39,6 +42,7 @@ class Variant:
     bends: bool = False
     layered: bool = False
     burst: bool = False
+    window: int = 0
 
     @property
     def real(self) -> Any:
@@ -64,12 +68,21 @@ class Variant:
     @property
     def name(self) -> str:
         """A legal identifier, unique to the variant."""
-        return "_".join(["variant", *(field.name for field in fields(self) if getattr(self, field.name))])
+        given = {field.name: getattr(self, field.name) for field in fields(self)}
+        parts = [name if value is True else f"{name}{value}" for name, value in given.items() if value]
+        return "_".join(["variant", *parts])
 
-    def kernel(self, function: Callable[..., None]) -> wp.Kernel:
+    def kernel(self, function: Callable[..., None], launch_bounds: tuple[int, ...] | None = None) -> wp.Kernel:
         """The launchable kernel of a device function. It has its own module, so that only launched kernels are
-        compiled."""
+        compiled.
+
+        Args:
+            launch_bounds: threads of a block on CUDA, and how many blocks a multiprocessor is to hold at least.
+        """
         module = wp.get_module(f"{function.__module__}.{self.name}")
         module.options["enable_backward"] = False
         module.options["cpu_compiler_flags"] = CPU_FLAGS
-        return wp.Kernel(function, key=function.__name__, module=module)
+        if launch_bounds is None:
+            return wp.Kernel(function, key=function.__name__, module=module)
+        module.options["block_dim"] = launch_bounds[0]
+        return wp.Kernel(function, key=function.__name__, module=module, options={"launch_bounds": launch_bounds})

@@ -7,8 +7,7 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from datetime import UTC, datetime
 from importlib.util import find_spec
 from pathlib import Path
@@ -81,17 +80,6 @@ def seconds(work: Callable[[], Any]) -> float:
     begin = time.perf_counter()
     work()
     return time.perf_counter() - begin
-
-
-@contextmanager
-def on_cores(count: int) -> Iterator[None]:
-    """Restrict this thread, and those that it starts meanwhile, to `count` of its cores."""
-    allowed = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, set(sorted(allowed)[:count]))
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, allowed)
 
 
 def cores() -> int:

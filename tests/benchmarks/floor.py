@@ -8,15 +8,20 @@ addresses and rings outside the slab. So a march can only be slower.
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
+from functools import cache
 
 import numpy as np
+import warp as wp
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from warpimpact import Campaign, Numerics, Shots
+from warpimpact.kernels.variant import Variant
 from warpimpact.solver.history import History
-from warpimpact.solver.resolution import resolve
+from warpimpact.solver.resolution import Fidelity, resolve
 from warpimpact.solver.rings import rings_of
 from warpimpact.solver.simulate import trace
 
@@ -43,8 +48,25 @@ class Work:
     bytes: float
 
 
-def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
+def work_of(campaign: Campaign, shots: Shots, numerics: Numerics | Fidelity) -> Work:
     """Work of the law at one resolution, from the histories of the shots on the CPU."""
+    around = resolve(numerics, campaign.scene).patches_around
+    steps, in_slab, in_contact = 0, 0, 0
+    for near, acting in contacts(campaign, shots, numerics):
+        steps += 1
+        in_slab += around * int(near.any(axis=1).sum())
+        in_contact += int(acting.sum())
+    hits = len(shots)
+    operations = (LOOK * in_slab + ACT * in_contact) / hits
+    moved = (LOOK_BYTES * in_slab + ACT_BYTES * in_contact) / hits
+    return Work(steps / hits, in_slab / hits, in_contact / hits, operations, moved)
+
+
+def contacts(
+    campaign: Campaign, shots: Shots, numerics: Numerics | Fidelity
+) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
+    """For every step of the shots: the patches that reach into the slab, and those of them that advance, each of shape
+    [rings, around]."""
     core, plate = campaign.core, campaign.plate
     resolution = resolve(numerics, campaign.scene)
     rings = rings_of(core, resolution.patches_axial, resolution.patches_around, resolution.patch_width)
@@ -57,11 +79,8 @@ def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
     normal = outward[:, None, None] * circle
     normal[..., 0] += (rings.area_axial / area)[:, None]
     slack = np.hypot(rings.half_axial, rings.half_radial)[:, None]
-
-    steps, in_slab, in_contact = 0, 0, 0
     for rows in trace(campaign.scene, shots, numerics=numerics):
         history = History.from_trace(rows[:-1], core.mass_properties)  # the last row is the end
-        steps += len(history.time)
         for position, attitude, velocity, omega in zip(
             history.position, history.attitude, history.velocity, history.angular_velocity, strict=True
         ):
@@ -69,17 +88,40 @@ def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
             depth = position[0] + arm @ turn[0]
             near = (depth > -slack) & (depth < plate.thickness + slack)
             speed = (velocity @ turn + np.cross(omega @ turn, arm)) * normal
-            in_slab += resolution.patches_around * int(near.any(axis=1).sum())
-            in_contact += int((near & (speed.sum(axis=-1) > 0.0)).sum())
-    hits = len(shots)
-    operations = (LOOK * in_slab + ACT * in_contact) / hits
-    moved = (LOOK_BYTES * in_slab + ACT_BYTES * in_contact) / hits
-    return Work(steps / hits, in_slab / hits, in_contact / hits, operations, moved)
+            yield near, near & (speed.sum(axis=-1) > 0.0)
 
 
-def cpu_peak(cores: int) -> float:
-    """float32 operations per second of some cores, if each has two 256-bit units for fused multiply-adds."""
-    path = Path("/proc/cpuinfo")
-    lines = path.read_text().splitlines() if path.exists() else []
-    clocks = [float(line.split(":")[1]) * 1e6 for line in lines if line.startswith("cpu MHz")]
-    return cores * 2 * 8 * 2 * max(clocks, default=float("nan"))
+_LOOP = """
+    typedef float lanes __attribute__((vector_size(64)));  // as many registers as the processor needs for it
+    lanes sums[12];
+    for (int k = 0; k < 12; ++k) sums[k] = (lanes){} + 0.01f * k;
+    // The square keeps a compiler from joining two turns into one; the sums stay between -0.5 and 0.5.
+    for (int turn = 0; turn < turns; ++turn)
+        for (int k = 0; k < 12; ++k) sums[k] = sums[k] * sums[k] - 0.4f;
+    float total = 0.0f;
+    for (int k = 0; k < 12; ++k) for (int lane = 0; lane < 16; ++lane) total += sums[k][lane];
+    return total;
+"""
+_TURNS, _PER_TURN, _RUNS = 4_000_000, 12 * 16 * 2, 5
+
+
+@cache
+def measured_peak() -> float:
+    """float32 operations per second of one core, measured: independent multiply-adds in registers, each of which
+    counts as two operations, by the compiler of the kernels. The best of some runs of processor time counts."""
+
+    @wp.func_native(_LOOP)
+    def chains(turns: wp.int32) -> wp.float32: ...
+
+    def loop(turns: wp.int32, total: wp.array(dtype=wp.float32)):
+        total[wp.tid()] = chains(turns)
+
+    kernel, total = Variant().kernel(loop), wp.empty(1, dtype=wp.float32, device="cpu")
+
+    def seconds(turns: int) -> float:
+        begin = time.process_time()
+        wp.launch(kernel, dim=1, inputs=[turns, total], device="cpu")
+        return time.process_time() - begin
+
+    seconds(1)  # compiles it
+    return _TURNS * _PER_TURN / min(seconds(_TURNS) for _ in range(_RUNS))

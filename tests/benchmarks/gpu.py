@@ -1,6 +1,7 @@
-"""warpimpact on a CUDA device: hits per second at every fidelity, ratio to the floor, and comparison with the CPU.
+"""warpimpact on a CUDA device: hits per second of both layouts at every fidelity, ratio to the floor, comparison with
+the CPU, and ten million hits into a file.
 
-    python tests/benchmarks/gpu.py              # writes results/gpu.json and .png beside it
+    python tests/benchmarks/gpu.py              # writes results/gpu.json and .png beside it, within ten minutes
 
 It needs the checkout and warpimpact's dependencies, no installation. The exit code is 1 if the device's answers differ
 from the CPU's by more than stated, and 2 if there is no CUDA device.
@@ -12,8 +13,10 @@ import argparse
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,11 +25,17 @@ from floor import work_of
 from matplotlib.figure import Figure
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.run import run_to_file
 from warpimpact.scene import Numerics, Record, Scene, Shots
 from warpimpact.solver.device import DeviceError, find_device
 from warpimpact.solver.simulate import Outcomes, simulate
 
 FIDELITIES = ("draft", "standard", "reference")
+LAYOUTS = {"draft": ("simple", "block"), "standard": ("simple", "block"), "reference": ("simple",)}
+"""Layouts that are measured; windows of the reference do not fit a block."""
+END_TO_END = 10_000_000
+"""Number of hits that are computed into a file."""
+AIM = {"standard [hits/s]": 1e6, "end to end [s]": 30.0}
 SMALLEST, GROWTH = 1024, 4
 LONGEST = 4.0
 """The number of hits of a fidelity grows until a run takes this long [s]."""
@@ -86,27 +95,40 @@ def clock_of(device: Any) -> float:
 
 def measure(campaign: Campaign, device: str, peak: float) -> dict[str, Any]:
     """All figures of a device with a peak of `peak` operations per second; each is printed when it is known."""
-    values: dict[str, Any] = {"fidelities": {}, "tolerance": TOLERANCE, "same": True}
+    values: dict[str, Any] = {"fidelities": {}, "tolerance": TOLERANCE, "aim": AIM, "same": True}
     for name in FIDELITIES:
-        numerics = Numerics(fidelity=name)
-        work = work_of(campaign, shots_of(campaign, FLOOR_HITS), numerics)
-        rates = growth(campaign, numerics, device)
+        work = work_of(campaign, shots_of(campaign, FLOOR_HITS), Numerics(fidelity=name))
         floor = peak / work.operations
-        differences = difference(campaign, numerics, device)
-        same = all((np.array(differences[key]) <= TOLERANCE[key]).all() for key in TOLERANCE)
-        best = max(rates.values())
-        print(f"{name}: {best:.4g} hits/s; the floor allows {floor:.3g}, {floor / best:.3g} times as many")
-        print(f"  floor: {work.steps:.3g} steps, {work.operations:.3g} operations per hit")
-        print(f"  against the CPU on {SAME_HITS} hits: {_told(differences)}: {'same' if same else 'NOT THE SAME'}")
-        values["fidelities"][name] = {
-            "hits_per_second": rates,
-            "floor_hits_per_second": floor,
-            "above_floor": floor / best,
-            "work": asdict(work),
-            "difference": differences,
-        }
-        values["same"] &= same
+        print(f"{name}: the floor allows {floor:.3g} hits/s; {work.steps:.3g} steps, {work.operations:.3g} operations")
+        found = {layout: of_layout(campaign, name, layout, device, floor) for layout in LAYOUTS[name]}
+        values["fidelities"][name] = {"floor_hits_per_second": floor, "work": asdict(work), "layouts": found}
+        values["same"] &= all(one["same"] for one in found.values())
+    values["end_to_end"] = {layout: end_to_end(campaign, layout, device) for layout in LAYOUTS["standard"]}
     return values
+
+
+def of_layout(campaign: Campaign, fidelity: str, layout: str, device: str, floor: float) -> dict[str, Any]:
+    """Speed of one layout, and its difference from the CPU's simple layout."""
+    numerics = Numerics(fidelity=fidelity, layout=layout)
+    rates, differences = growth(campaign, numerics, device), difference(campaign, numerics, device)
+    same = all((np.array(differences[key]) <= TOLERANCE[key]).all() for key in TOLERANCE)
+    best = max(rates.values())
+    print(f"{fidelity}, {layout}: {best:.4g} hits/s; the floor allows {floor / best:.3g} times as many")
+    print(f"  against the CPU on {SAME_HITS} hits: {_told(differences)}: {'same' if same else 'NOT THE SAME'}")
+    return {"hits_per_second": rates, "above_floor": floor / best, "difference": differences, "same": same}
+
+
+def end_to_end(campaign: Campaign, layout: str, device: str) -> dict[str, float]:
+    """Seconds of a run of END_TO_END hits into a file, and its bytes."""
+    hits = campaign.hits.model_copy(update={"count": END_TO_END})
+    many = campaign.model_copy(update={"hits": hits, "numerics": Numerics(layout=layout)})
+    few = many.model_copy(update={"hits": hits.model_copy(update={"count": SMALLEST})})
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "many.nc"
+        run_to_file(few, path, device=device)  # builds the kernels
+        taken = seconds(lambda: run_to_file(many, path, device=device, overwrite=True))
+        print(f"{END_TO_END} hits into a file, {layout}: {taken:.3g} s, {path.stat().st_size / 1e9:.3g} GB", flush=True)
+        return {"seconds": taken, "bytes": path.stat().st_size}
 
 
 def growth(campaign: Campaign, numerics: Numerics, device: str) -> dict[int, float]:
@@ -117,7 +139,7 @@ def growth(campaign: Campaign, numerics: Numerics, device: str) -> dict[int, flo
         some = copied(shots, -(-count // DISTINCT))[:count]
         taken = min(seconds(lambda some=some: _simulate(campaign, some, numerics, device)) for _ in range(2))
         rates[count] = count / taken
-        print(f"  {numerics.fidelity}: {count} hits at {rates[count]:.4g} hits/s", flush=True)
+        print(f"  {numerics.fidelity}, {numerics.layout}: {count} hits at {rates[count]:.4g} hits/s", flush=True)
         count *= GROWTH
     return rates
 
@@ -131,7 +153,8 @@ def _simulate(campaign: Campaign, shots: Shots, numerics: Numerics, device: str)
 def difference(campaign: Campaign, numerics: Numerics, device: str) -> dict[str, tuple[float, float]]:
     """Residual velocity [m/s] and tilt [°] on a device against the CPU; infinite where a status differs."""
     shots = shots_of(campaign, SAME_HITS)
-    there, here = (_simulate(campaign, shots, numerics, name) for name in (device, "cpu"))
+    simple = numerics.model_copy(update={"layout": "simple"})
+    there, here = _simulate(campaign, shots, numerics, device), _simulate(campaign, shots, simple, "cpu")
     off = np.stack([there.residual_velocity - here.residual_velocity, np.degrees(there.tilt - here.tilt)[:, -1]])
     off = np.abs(np.where(there.status == here.status, off, np.inf))
     return {"90 %": tuple(np.quantile(off, 0.9, axis=1).tolist()), "max": tuple(off.max(axis=1).tolist())}
@@ -147,9 +170,10 @@ def draw(values: dict[str, Any]) -> Figure:
     axes = figure.subplots()
     for name, colour in zip(FIDELITIES, ("#009E73", "#0072B2", "#D55E00"), strict=True):
         found = values["fidelities"][name]
-        axes.plot(
-            list(found["hits_per_second"]), list(found["hits_per_second"].values()), "o-", color=colour, label=name
-        )
+        for layout, measured in found["layouts"].items():
+            rates = measured["hits_per_second"]
+            style = "o-" if layout == "block" else "s--"
+            axes.plot(list(rates), list(rates.values()), style, color=colour, label=f"{name}, {layout}")
         axes.axhline(found["floor_hits_per_second"], color=colour, linestyle=":")
     axes.set(xscale="log", yscale="log", xlabel="hits", ylabel="hits per second")
     axes.grid(color="0.9")

@@ -1,71 +1,76 @@
-"""warpimpact beside a Numba and a NumPy peer on the same hits: error, hits per second, ratios.
+"""warpimpact beside a Numba peer on three scenes, and beside a NumPy peer of the paper's literal scheme on one of them.
 
     pip install -e '.[bench]'
     python tests/benchmarks/peers.py            # writes results/peers.json and .png beside it
 
-The exit code is 1 if an error is larger than its setting states, or if the two programs of the literal scheme disagree.
-NumPy runs on one core, and its ratio says so.
+Costs are processor time of one core per hit. All contenders of a scene run in turn, round after round, and the median
+round counts, so the ratios mean something on a busy machine, too. Errors are those of 90 % of the hits against the
+converged answer of the law with its onset. The peer's cost at an accuracy is interpolated between its settings.
+
+The exit code is 1 if standard is not as accurate as it states, or if the two programs of the literal scheme disagree.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numba_peer
 import numpy as np
 import numpy_peer
-import xarray
-from bench import CAMPAIGN, copied, cores, machine, on_cores, seconds, shots_of, store
-from floor import cpu_peak, work_of
+from bench import CHECKOUT, copied, machine, shots_of, store
+from floor import measured_peak, work_of
 from matplotlib.figure import Figure
+from random_scenes import FINE, Answer, extrapolated, off, p90, stepped
 
 from warpimpact import Campaign, Numerics, Record, Scene, Shots
-from warpimpact.analysis.study import LEVELS, QUOTED, study
-from warpimpact.solver.resolution import Fidelity, spelt_out
+from warpimpact.solver.promise import PROMISES, keep
+from warpimpact.solver.resolution import FIDELITIES, LADDER, Fidelity
 from warpimpact.solver.simulate import simulate
 
-STATED = {"draft": (2.0, 5.0), "standard": (1.0, 1.0), "reference": (0.1, 0.3)}
-"""Stated 90 % errors of warpimpact's fidelities: m/s, and degrees of tilt at the last stand-off."""
+SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
+"""Campaigns by the name of their scene; the first one is that of the literal scheme, too."""
+LEVELS = 6
+"""Levels of LADDER, from the coarsest on."""
+STATED = (1.0, 1.0)
+"""90 % errors that standard promises: m/s, and degrees of tilt at the last stand-off."""
+SLACK = 1.15
+"""Factor of STATED within which the plain standard has to be; a campaign's pilot would take a finer level instead."""
 SAME = (0.01, 0.01)
 """Allowed 90 % difference between the literal schemes of warpimpact in double precision and of NumPy: m/s and
 degrees."""
 COARSEST = Fidelity(8, 12, 0.7, 1.0)
 """The fidelity to compare with programs of the literal scheme. It is still far more accurate than they are."""
 LITERAL_HITS, FLOOR_HITS = 128, 8
-TIMED = 0.5
-"""Length of one timed run [s]."""
-ROUNDS = 3
-"""Runs of each contender, in turn with the others; the best one counts."""
+TIMED = 0.15
+"""Processor time of one timed run [s]."""
+ROUNDS = 7
+"""Runs of each contender, in turn with the others."""
 COLOURS = {"warpimpact": "#0072B2", "Numba": "#D55E00", "NumPy": "0.35"}
+
+Errors = tuple[float, float]
 
 
 @dataclass
 class Contender:
-    """A program at one setting. `march` computes shots on a number of cores."""
+    """A program at one setting. `march` computes shots on one core; `costs` are those of every round [s per hit]."""
 
     program: str
     setting: str
-    march: Callable[[Shots, int], Any]
-    error: tuple[float, float]
-    stated: tuple[float, float] | None = None
-    other_status: int = 0
-    rates: dict[int, float] = field(default_factory=dict)
+    march: Callable[[Shots], Answer]
+    error: Errors = (np.nan, np.nan)
+    costs: list[float] = field(default_factory=list)
 
     @property
-    def rate(self) -> float:
-        """Hits per second on all the cores it can use."""
-        return self.rates[max(self.rates)]
-
-    @property
-    def fails(self) -> bool:
-        """Whether its error is larger than stated."""
-        beyond = self.stated is not None and any(np.array(self.error) > self.stated)
-        return bool(beyond or self.other_status)
+    def cost(self) -> float:
+        """Processor time of one core per hit [s]."""
+        return float(np.median(self.costs))
 
     def summary(self) -> dict[str, Any]:
         """As it goes into the JSON file."""
@@ -74,50 +79,45 @@ class Contender:
             "setting": self.setting,
             "residual_velocity_error": self.error[0],
             "tilt_error": self.error[1],
-            "stated": self.stated,
-            "hits_per_second": self.rates,
+            "microseconds_per_hit": 1e6 * self.cost,
         }
+
+
+class Bout(NamedTuple):
+    """A scene with everybody's results. `taken` is the level of LADDER that a pilot takes for standard."""
+
+    name: str
+    contenders: list[Contender]
+    taken: int
+    uncertainty: Errors
+    floor: dict[str, Any]
+
+    def ours(self, level: int) -> Contender:
+        """warpimpact at a level of LADDER."""
+        return next(one for one in self.contenders if one.setting == _name(level))
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, print, store; returns 1 if something disagrees."""
-    arguments = _parser().parse_args(argv)
-    campaign = Campaign.from_toml(CAMPAIGN)
-    shots = shots_of(campaign, arguments.hits)
-    settings = {name: Numerics(fidelity=name) for name in STATED} | {
-        "coarsest": spelt_out(COARSEST, campaign.scene, campaign.impact),
-        "nodal": Numerics(scheme="nodal"),
-    }
-    truth = study(campaign, hits=len(shots), device="cpu", settings=settings, levels=LEVELS[: arguments.levels])
-    contenders = [
-        *_warpimpact(campaign, truth, settings),
-        *_numba(campaign, truth, shots),
-        *_numpy(campaign, truth, shots),
-    ]
-    measure(contenders, shots)
-    apart = literal_difference(campaign, shots[:LITERAL_HITS])
-    ratios = compare(contenders)
-    print(table(contenders, truth))
-    for pair in ratios:
-        print(f"{pair['warpimpact']} / {pair['peer']}: {pair['ratio']:.3g}")
-    floors = floors_of(campaign, contenders, shots[:FLOOR_HITS])
-    for one in floors:
-        print(
-            f"{one['warpimpact']}: {one['operations']:.3g} operations and {one['bytes']:.3g} bytes per hit, "
-            f"{one['above_floor']:.3g} times the floor at {one['peak']:.3g} operations/s"
-        )
+    parser = argparse.ArgumentParser(description="warpimpact beside a Numba and a NumPy peer on the same hits")
+    parser.add_argument("--hits", type=int, default=256, help="Sobol hits over the unit cell (default: 256)")
+    hits = parser.parse_args(argv).hits
+    peak = measured_peak()
+    bouts = [fight(name, file, hits, peak) for name, file in SCENES.items()]
+    for bout in bouts:
+        print(table(bout))
+    apart = literal_difference(Campaign.from_toml(_path("slotted plate")))
     print(f"literal scheme, warpimpact against NumPy: {apart[0]:.2g} m/s and {apart[1]:.2g}° apart (90 %)")
     values = {
         "machine": machine() | {"numba": numba.__version__, "numpy": np.__version__},
-        "hits": len(shots),
-        "converged_answer_uncertain_by": _uncertainty(truth),
-        "contenders": [one.summary() for one in contenders],
-        "ratios": ratios,
-        "floors": floors,
+        "hits": hits,
+        "peak_operations_per_second": peak,
+        "scenes": {bout.name: summary(bout) for bout in bouts},
         "literal_difference": apart,
     }
-    store("peers", values, draw(contenders, truth))
-    wrong = [f"{one.program} {one.setting}" for one in contenders if one.fails]
+    store("peers", values, draw(bouts))
+    standard = LADDER.index(FIDELITIES["standard"])
+    wrong = [bout.name for bout in bouts if excess(bout.ours(standard).error, STATED) > SLACK]
     if any(np.array(apart) > SAME):
         wrong.append("the literal scheme")
     if wrong:
@@ -125,173 +125,215 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 1 if wrong else 0
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description="warpimpact beside a Numba and a NumPy peer on the same hits")
-    parser.add_argument("--hits", type=int, default=512, help="Sobol hits over the unit cell (default: 512)")
-    parser.add_argument(
-        "--levels",
-        type=int,
-        choices=range(2, len(LEVELS) + 1),
-        default=2,
-        help="refinements behind the converged answer (default: 2; 3 takes minutes more and halves its uncertainty)",
-    )
-    return parser
+def fight(name: str, file: str, hits: int, peak: float) -> Bout:
+    """All contenders on one scene: errors, costs, and warpimpact's distance from the floor."""
+    campaign = Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml")
+    shots = shots_of(campaign, hits)
+    coarse, truth = (_converged(campaign, shots, level) for level in FINE)
+    contenders = [*_warpimpact(campaign), *_numba(campaign)]
+    for one in contenders:
+        one.error = _error(one.march(shots), truth)
+    if name == next(iter(SCENES)):
+        contenders += _literal(campaign, shots, truth)
+    measure(contenders, shots)
+    pilot = shots_of(campaign, PROMISES["standard"].pilot)
+    taken = LADDER.index(keep(_scene(campaign), Numerics(), pilot, device="cpu").fidelity)
+    bout = Bout(name, contenders, taken, _error(coarse, truth), {})
+    standard = FIDELITIES["standard"]
+    work = work_of(campaign, shots[:FLOOR_HITS], standard)
+    above = bout.ours(LADDER.index(standard)).cost * peak / work.operations
+    return bout._replace(floor=asdict(work) | {"above_floor": above})
 
 
-def _warpimpact(campaign: Campaign, truth: xarray.Dataset, settings: dict[str, Numerics]) -> list[Contender]:
-    def one(name: str) -> Contender:
-        def march(shots: Shots, count: int) -> None:
-            with on_cores(count):
-                _simulate(campaign, shots, settings[name])
-
-        found = truth.sel(setting=name, quantile=QUOTED).isel(standoff=-1)
-        error = found["residual_velocity_error"].item(), found["tilt_error"].item()
-        literal = name == "nodal"
-        other = 0 if literal else int(found["other_status"])
-        return Contender("warpimpact", "literal" if literal else name, march, error, STATED.get(name), other)
-
-    return [one(name) for name in settings]
+def _path(name: str) -> Any:
+    return CHECKOUT / "campaigns" / f"{SCENES[name]}.toml"
 
 
-def _simulate(campaign: Campaign, shots: Shots, numerics: Numerics) -> Any:
+def _scene(campaign: Campaign) -> Scene:
     record = Record(standoffs=campaign.output.standoffs[-1:])
-    scene = Scene(core=campaign.core, target=campaign.plate, record=record)
-    return simulate(scene, shots, numerics=numerics, device="cpu")
+    return Scene(core=campaign.core, target=campaign.plate, interaction=campaign.interaction, record=record)
 
 
-def _numba(campaign: Campaign, truth: xarray.Dataset, shots: Shots) -> list[Contender]:
+def _march(campaign: Campaign, numerics: Numerics | Fidelity) -> Callable[[Shots], Answer]:
+    scene = _scene(campaign)
+
+    def march(shots: Shots) -> Answer:
+        found = simulate(scene, shots, numerics=numerics, device="cpu", threads=1)
+        return Answer(found.status, found.residual_velocity, found.tilt[:, 0])
+
+    return march
+
+
+def _converged(campaign: Campaign, shots: Shots, level: Fidelity) -> Answer:
+    """A fine level, without its step's error of second order."""
+    return extrapolated(*(_march(campaign, stepped(level, k * level.travel))(shots) for k in (2.0, 1.0)))
+
+
+def _error(answer: Answer, truth: Answer) -> Errors:
+    """90 % errors [m/s], [°]; infinite where the status differs."""
+    velocity, tilt = off(answer, truth)
+    return p90(velocity), p90(tilt)
+
+
+def _name(level: int) -> str:
+    fidelity = LADDER[level]
+    named = [name for name, one in FIDELITIES.items() if one == fidelity]
+    return f"level {level}{''.join(f', {name}' for name in named)}"
+
+
+def _warpimpact(campaign: Campaign) -> list[Contender]:
+    return [Contender("warpimpact", _name(k), _march(campaign, LADDER[k])) for k in range(LEVELS)]
+
+
+def _numba(campaign: Campaign) -> list[Contender]:
     standoff = campaign.output.standoffs[-1]
 
-    def one(setting: numba_peer.Setting, stated: tuple[float, float]) -> Contender:
-        peer = numba_peer.Peer(campaign.core, campaign.plate, setting)
-        status, velocity, tilt = peer(shots, standoff, cores())
-        other = int(((status != truth["status"]) & (truth["settled"] == 1)).sum())
-        error = _errors(truth, velocity, tilt)
-        return Contender("Numba", str(setting), lambda some, n: peer(some, standoff, n), error, stated, other)
+    def one(setting: numba_peer.Setting) -> Contender:
+        peer = numba_peer.Peer(campaign.core, campaign.plate, campaign.interaction, setting)
+        return Contender("Numba", str(setting), lambda shots: Answer(*peer(shots, standoff, 1)))
 
-    return [one(*item) for item in numba_peer.SETTINGS.items()]
+    return [one(setting) for setting in numba_peer.SETTINGS]
 
 
-def _numpy(campaign: Campaign, truth: xarray.Dataset, shots: Shots) -> list[Contender]:
-    standoff = campaign.output.standoffs[-1]
+def _literal(campaign: Campaign, shots: Shots, truth: Answer) -> list[Contender]:
+    """The paper's literal scheme in NumPy, and warpimpact's coarsest setting beside it."""
+    standoff, some = campaign.output.standoffs[-1], min(LITERAL_HITS, len(shots))
 
     def one(setting: str, batch: int) -> Contender:
         peer = numpy_peer.Peer(campaign.core, campaign.plate, batch=batch)
-        error = _errors(truth, *peer(shots, standoff))
-        return Contender("NumPy", setting, lambda some, _: peer(some, standoff), error)
 
-    return [one("literal, points at once", 1), one("literal, points and hits at once", numpy_peer.BATCH)]
+        def march(shots: Shots) -> Answer:
+            velocity, tilt = peer(shots, standoff)
+            return Answer(np.zeros(len(shots), np.int8), velocity, tilt)
 
+        return Contender("NumPy", setting, march)
 
-def _errors(truth: xarray.Dataset, velocity: np.ndarray, tilt: np.ndarray) -> tuple[float, float]:
-    """90 % errors [m/s], [°] over the settled hits."""
-    off = (velocity - truth["residual_velocity"].values, np.degrees(tilt) - truth["tilt"].values[:, -1])
-    settled = truth["settled"].values == 1
-    return tuple(float(np.quantile(np.abs(values[settled]), QUOTED)) for values in off)
-
-
-def _uncertainty(truth: xarray.Dataset) -> tuple[float, float]:
-    last = truth.isel(level=-1, standoff=-1).sel(quantile=QUOTED)
-    return last["residual_velocity_change"].item(), last["tilt_change"].item()
-
-
-def literal_difference(campaign: Campaign, shots: Shots) -> tuple[float, float]:
-    """Difference between two independent programs of the literal scheme, 90 % [m/s], [°]."""
-    ours = _simulate(campaign, shots, Numerics(scheme="nodal", precision="double"))
-    peer = numpy_peer.Peer(campaign.core, campaign.plate, restrained=True)
-    velocity, tilt = peer(shots, campaign.output.standoffs[-1])
-    off = velocity - ours.residual_velocity, np.degrees(tilt - ours.tilt[:, -1])
-    return tuple(float(np.quantile(np.abs(values), QUOTED)) for values in off)
-
-
-def measure(contenders: Sequence[Contender], shots: Shots) -> None:
-    """Best rate of each contender, on one core and on all. They run in turn, so that a disturbance affects all of
-    them."""
-    counts = sorted({1, cores()})
-    runs = []
-    for one in contenders:
-        for count in [1] if one.program == "NumPy" else counts:
-            one.march(shots[:64], count)  # builds what is to be built
-            guess = 64 / seconds(lambda one=one, count=count: one.march(shots[:64], count))
-            hits = max(64, int(guess * TIMED))
-            runs.append((one, count, copied(shots, -(-hits // len(shots)))[:hits]))
-    for _ in range(ROUNDS):
-        for one, count, some in runs:
-            rate = len(some) / seconds(lambda one=one, count=count, some=some: one.march(some, count))
-            one.rates[count] = max(rate, one.rates.get(count, 0.0))
-
-
-def compare(contenders: Sequence[Contender]) -> list[dict[str, Any]]:
-    """The ratios for which the project has targets. Each fidelity is compared with the fastest Numba setting of its
-    stated error, on all cores, and with NumPy on its one core. All cores are compared with one core."""
-    ours = {one.setting: one for one in contenders if one.program == "warpimpact"}
-    pairs = []
-    for name in STATED:
-        exact = [one for one in contenders if one.program == "Numba" and all(np.array(one.error) <= STATED[name])]
-        pairs += [(name, max(exact, key=lambda one: one.rate))] if exact else []
-    pairs += [(name, one) for one in contenders if one.program == "NumPy" for name in ours]
-    rivals = [
-        {"warpimpact": name, "peer": f"{one.program} {one.setting}", "ratio": ours[name].rate / one.rate}
-        for name, one in pairs
+    found = [
+        Contender("warpimpact", "coarsest", _march(campaign, COARSEST)),
+        one("literal, points at once", 1),
+        one("literal, points and hits at once", numpy_peer.BATCH),
     ]
-    scaling = [
-        {"warpimpact": name, "peer": "itself on one core", "ratio": one.rate / one.rates[1]}
-        for name, one in ours.items()
-    ]
-    return rivals + scaling
-
-
-def floors_of(campaign: Campaign, contenders: Sequence[Contender], shots: Shots) -> list[dict[str, Any]]:
-    """How many times longer the fidelities take than their arithmetic would at the machine's peak (floor.py)."""
-    peak = cpu_peak(cores())
-    found = []
-    for one in contenders:
-        if one.program == "warpimpact" and one.setting in STATED:
-            work = work_of(campaign, shots, Numerics(fidelity=one.setting))
-            above = peak / work.operations / one.rate
-            found.append({"warpimpact": one.setting, "peak": peak, "above_floor": above} | asdict(work))
+    for contender in found:
+        answer = contender.march(shots[:some])
+        same = answer._replace(status=truth.status[:some]) if contender.program == "NumPy" else answer
+        contender.error = _error(same, Answer(*(values[:some] for values in truth)))
     return found
 
 
-def table(contenders: Sequence[Contender], truth: xarray.Dataset) -> str:
-    """Contenders with errors and rates."""
-    lines = [f"{'':44}{'m/s':>8}{'°':>8}{'hits/s':>10}{'1 core':>10}    (errors: 90 %)"]
+def literal_difference(campaign: Campaign) -> Errors:
+    """Difference between two independent programs of the literal scheme, 90 % [m/s], [°]."""
+    shots = shots_of(campaign, LITERAL_HITS)
+    ours = _march(campaign, Numerics(scheme="nodal", precision="double"))(shots)
+    peer = numpy_peer.Peer(campaign.core, campaign.plate, restrained=True)
+    velocity, tilt = peer(shots, campaign.output.standoffs[-1])
+    return _error(Answer(ours.status, velocity, tilt), ours)
+
+
+def measure(contenders: Sequence[Contender], shots: Shots) -> None:
+    """Costs of each contender. They run in turn, so that a disturbance affects all of them."""
+
+    def seconds(one: Contender, some: Shots) -> float:
+        begin = time.process_time()
+        one.march(some)
+        return time.process_time() - begin
+
+    runs = []
     for one in contenders:
-        name = f"{one.program} {one.setting}"
+        one.march(shots[:64])  # builds what is to be built
+        hits = max(64, int(64 * TIMED / seconds(one, shots[:64])))
+        runs.append((one, copied(shots, -(-hits // len(shots)))[:hits]))
+    for _ in range(ROUNDS):
+        for one, some in runs:
+            one.costs.append(seconds(one, some) / len(some))
+
+
+def excess(error: Errors, accuracy: Errors) -> float:
+    """How many times larger the error is than the accuracy, in the worse of velocity and tilt."""
+    return max(e / a for e, a in zip(error, accuracy, strict=True))
+
+
+def cost_at(contenders: Sequence[Contender], accuracy: Errors) -> tuple[float, bool]:
+    """Cost of an accuracy [s per hit], interpolated between the settings that no other one beats, on logarithmic
+    scales; and whether they enclose it. If not, the cost is that of the nearest."""
+    points = sorted((one.cost, excess(one.error, accuracy)) for one in contenders)
+    front = [point for k, point in enumerate(points) if all(point[1] < other[1] for other in points[:k])]
+    for (cheap, above), (dear, below) in itertools.pairwise(front):
+        if above > 1.0 >= below:
+            share = np.log(above) / np.log(above / below)
+            return float(cheap * (dear / cheap) ** share), True
+    return front[0 if front[0][1] <= 1.0 else -1][0], False
+
+
+def ratios(bout: Bout) -> list[dict[str, Any]]:
+    """Cost of the Numba peer over that of standard, at the accuracy that standard reaches and at the one it promises;
+    plain, and at the level that a pilot takes."""
+    peers = [one for one in bout.contenders if one.program == "Numba"]
+    found = []
+    for what, level in (("standard", LADDER.index(FIDELITIES["standard"])), ("standard by its pilot", bout.taken)):
+        ours = bout.ours(level)
+        for accuracy, errors in (("reached", ours.error), ("promised", STATED)):
+            cost, enclosed = cost_at(peers, errors)
+            found.append(
+                {
+                    "warpimpact": f"{what} ({_name(level)})",
+                    "accuracy": accuracy,
+                    "residual_velocity_error": errors[0],
+                    "tilt_error": errors[1],
+                    "peer_microseconds": 1e6 * cost,
+                    "enclosed": enclosed,
+                    "ratio": cost / ours.cost,
+                }
+            )
+    return found
+
+
+def summary(bout: Bout) -> dict[str, Any]:
+    """As it goes into the JSON file."""
+    return {
+        "converged_answer_uncertain_by": bout.uncertainty,
+        "contenders": [one.summary() for one in bout.contenders],
+        "ratios": ratios(bout),
+        "floor": bout.floor,
+    }
+
+
+def table(bout: Bout) -> str:
+    """Contenders with errors and costs, the ratios, and the floor."""
+    lines = [f"\n{bout.name:44}{'m/s':>8}{'°':>8}{'µs/hit':>10}    (errors: 90 %)"]
+    for one in bout.contenders:
         error = f"{one.error[0]:8.3f}{one.error[1]:8.3f}"
-        lines.append(f"{name:44}{error}{one.rate:10.4g}{one.rates[1]:10.4g}{'  *' if one.fails else ''}")
-    velocity, tilt = _uncertainty(truth)
-    return "\n".join([*lines, f"converged answer: uncertain by {velocity:.2g} m/s and {tilt:.2g}°"])
+        lines.append(f"{one.program + ' ' + one.setting:44}{error}{1e6 * one.cost:10.1f}")
+    lines.append(f"converged answer: uncertain by {bout.uncertainty[0]:.2g} m/s and {bout.uncertainty[1]:.2g}°")
+    for pair in ratios(bout):
+        errors = f"{pair['residual_velocity_error']:.2f} m/s and {pair['tilt_error']:.2f}°"
+        outside = "" if pair["enclosed"] else " (outside its settings)"
+        lines.append(f"{pair['warpimpact']}: {pair['ratio']:.3g} × Numba at {errors}, {pair['accuracy']}{outside}")
+    floor = bout.floor
+    work = f"{floor['operations']:.3g} operations and {floor['bytes']:.3g} bytes per hit"
+    return "\n".join([*lines, f"standard: {work}, {floor['above_floor']:.3g} times the floor"])
 
 
-def draw(contenders: Sequence[Contender], truth: xarray.Dataset) -> Figure:
-    """Error against hits per second; hollow on one core."""
-    figure = Figure(figsize=(11, 5), layout="constrained")
-    panels = figure.subplots(1, 2)
-    for index, (axes, name) in enumerate(zip(panels, ("residual velocity [m/s]", "tilt at 130 mm [°]"), strict=True)):
-        axes.set(xscale="log", yscale="log", xlabel="hits per second", ylabel=f"90 % error of {name}")
-        axes.grid(which="major", color="0.9")
-        for program, colour in COLOURS.items():
-            some = sorted((one for one in contenders if one.program == program), key=lambda one: one.rate)
-            line = [one for one in some if "literal" not in one.setting]
-            axes.plot([one.rate for one in line], [one.error[index] for one in line], color=colour, linewidth=1)
-            for one in some:
-                marker, error = "X" if "literal" in one.setting else "o", one.error[index]
-                axes.plot([one.rates[1], one.rate], [error, error], color=colour, linewidth=0.6, linestyle=":")
-                axes.plot(one.rates[1], error, marker, markerfacecolor="white", color=colour)
-                axes.plot(one.rate, error, marker, color=colour)
-                if one.stated and program == "warpimpact":
-                    axes.annotate(one.setting, (one.rate, error), xytext=(6, 5), textcoords="offset points")
-            axes.plot([], [], "o", color=colour, label=program)
-        bottom = 0.5 * min(_uncertainty(truth)[index], *(one.error[index] for one in contenders))
-        axes.axhspan(bottom, _uncertainty(truth)[index], color="0.9", label="converged answer uncertain")
-        axes.set_ylim(bottom=bottom)
-        axes.margins(x=0.12)
-    panels[0].plot([], [], "o", color="0.5", markerfacecolor="white", label="one core")
-    panels[0].plot([], [], "X", color="0.5", label="the paper's literal scheme")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False)
-    what = machine()
-    figure.suptitle(f"Slotted plate, {truth.sizes['hit']} hits; {what['processor']}, {what['cores']} cores")
+def draw(bouts: Sequence[Bout]) -> Figure:
+    """Error against cost: a row for every quantity, a column for every scene."""
+    figure = Figure(figsize=(12, 7), layout="constrained")
+    panels = figure.subplots(2, len(bouts), sharex="col")
+    for column, bout in enumerate(bouts):
+        for row, name in enumerate(("residual velocity [m/s]", "tilt at 130 mm [°]")):
+            axes = panels[row, column]
+            axes.set(xscale="log", yscale="log")
+            axes.grid(which="major", color="0.9")
+            for program, colour in COLOURS.items():
+                some = [one for one in bout.contenders if one.program == program and "coarsest" not in one.setting]
+                if some and program != "NumPy":
+                    errors = [one.error[row] for one in some]
+                    axes.plot([1e6 * one.cost for one in some], errors, "o-", color=colour, label=program)
+            axes.axhline(STATED[row], color="0.5", linestyle=":", label="promise of standard")
+            if column == 0:
+                axes.set_ylabel(f"90 % error of {name}")
+        panels[0, column].set_title(bout.name)
+        panels[1, column].set_xlabel("µs of one core per hit")
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+    figure.suptitle(f"{machine()['processor']}, one core, {machine()['date']}")
     return figure
 
 

@@ -252,8 +252,8 @@ def one_round(folder: Path, draw: random.Random, counts: Counter[str]) -> list[s
 
 
 def promises(folder: Path, said: str) -> bool:
-    """Whether a run that broke off tells how to go on, if there is anything to go on with."""
-    return "--resume" in said or not shards(folder)
+    """Whether a run that broke off tells how to go on, if there is anything to go on with and it had begun."""
+    return "--resume" in said or "cannot be reached" in said or not shards(folder)
 
 
 def one_run(folder: Path, who: str, fault: str, draw: random.Random, counts: Counter[str]) -> tuple[int | str, str]:

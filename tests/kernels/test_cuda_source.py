@@ -1,5 +1,7 @@
 """The device code compiles for CUDA (sm_90), on a machine without a GPU too."""
 
+import re
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +9,7 @@ import pytest
 import warp as wp
 
 from warpimpact.kernels import free_flight, march
+from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.variant import Variant
 
 
@@ -27,3 +30,22 @@ def test_kernel_compiles_to_ptx(stage: Any, variant: Variant, tmp_path: Path) ->
     entries = [line for line in ptx.read_text().splitlines() if ".entry" in line]
     assert len(entries) == 1
     assert f" {kernel.key}_" in entries[0]
+
+
+@pytest.mark.parametrize("variant", [Variant(window=2048), Variant(window=512, degrades=False, rimmed=True)])
+def test_block_keeps_its_window_in_shared_memory(variant: Variant, tmp_path: Path) -> None:
+    kernel = march.build(variant).kernel
+    wp.compile_aot_module(kernel.module, arch=90, use_ptx=True, module_dir=tmp_path)
+    ptx = next(tmp_path.glob("*.ptx")).read_text()
+    shared = re.findall(r"\.shared \.align 4 \.b8 \S*?(exposure|gain)\[(\d+)\]", ptx)
+    assert shared == ([("exposure", "8192"), ("gain", "8192")] if variant.degrades else [])
+    assert f".maxntid {LANES}, 1, 1" in ptx
+    used = Counter(re.findall(r"^\s+(?:@!?%p\d+ )?((?:ld|st|atom|red|shfl|bar|barrier)\.[\w.:]+)", ptx, re.MULTILINE))
+    spaces = {name.split(".")[1] for name in used if name.startswith(("ld.", "st."))}
+    assert spaces <= {"global", "shared", "local", "param", "const"}  # none through a generic address
+    assert used["shfl.sync.bfly.b32"] >= 5 * 20
+    assert not [name for name in used if name.startswith("bar.sync")]  # a warp waits for itself alone
+    if variant.degrades:
+        assert used["bar.warp.sync"] == 7  # kernels/block.py tells what for
+        assert used["ld.shared.f32"] >= 4 + 4
+        assert sum(count for name, count in used.items() if name.startswith(("atom.shared.add", "red.shared.add"))) >= 4

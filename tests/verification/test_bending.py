@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.scene import CirclePattern, Core, Numerics, Plate, Record, Scene, Shots
+from warpimpact.scene import CirclePattern, Core, Layer, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import arrays
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.bending import Sections, sections_of
@@ -18,8 +18,8 @@ from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_pla
 COUNT = 32
 
 
-def bent(plate: Plate, shots: Shots, device: str = "cpu", **numerics: Any) -> BentOutcomes:
-    scene = Scene(core=PAPER_CORE, target=plate, record=Record(bending=True))
+def bent(target: Plate | Target, shots: Shots, device: str = "cpu", **numerics: Any) -> BentOutcomes:
+    scene = Scene(core=PAPER_CORE, target=target, record=Record(bending=True))
     outcomes = simulation.simulate(scene, shots, numerics=Numerics(precision="double", **numerics), device=device)
     assert isinstance(outcomes, BentOutcomes)
     return outcomes
@@ -87,6 +87,21 @@ def test_what_touches_nothing_is_not_bent() -> None:
     missed = bent(paper_plate(pattern=CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))), shots_at())
     assert missed.largest_bending_moment[0] == missed.bending_stress[0] == 0.0
     assert np.isnan(missed.bending_section[0])
+
+
+@pytest.mark.parametrize("shares", [(0.5, 0.5), (0.2, 0.5, 0.3)])
+def test_parts_without_a_gap_bend_a_core_as_the_whole_does(shares: tuple[float, ...], device: str) -> None:
+    # The moment at a section comes from the loads of all layers together.
+    whole = solid_plate(thickness=6e-3, degradation=1.0)
+    parts = [whole.model_copy(update={"thickness": share * whole.thickness}) for share in shares]
+    layers = tuple(Layer(**{name: getattr(part, name) for name in part.model_fields_set}) for part in parts[1:])
+    shots = slanted_shots()
+    expected = bent(whole, shots, device, time_step=1e-6)
+    got = bent(Target(plate=parts[0], layers=layers), shots, device, time_step=1e-6)
+    alone = bent(parts[0], shots, device, time_step=1e-6)
+    for name in ("largest_bending_moment", "bending_stress"):
+        np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-3)
+        assert np.median(getattr(alone, name)) < 0.9 * np.median(getattr(expected, name))
 
 
 def test_a_core_without_the_mass_of_its_slices_is_refused() -> None:

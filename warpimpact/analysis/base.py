@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 Array = NDArray[np.float64]
 
@@ -18,19 +21,19 @@ NEEDED = (v.STATUS, v.STOPPED_IN, v.DEPTH, v.LAYER_THICKNESS, *v.LAYER_FACES)
 """Variables that say so."""
 
 
-def has_base(dataset: xarray.Dataset) -> bool:
+def has_base(dataset: Result) -> bool:
     """Whether there are layers behind the plate."""
     return v.STOPPED_IN in dataset
 
 
-def base_thickness(dataset: xarray.Dataset) -> Array:
+def base_thickness(dataset: Result) -> Array:
     """Thickness of the base [m]: one number, or shape [hits] where it scatters."""
     if v.LAYER_THICKNESS in dataset:
         return np.asarray(dataset[v.LAYER_THICKNESS].values[:, -1])
-    return np.asarray((dataset[v.LAYER_REAR] - dataset[v.LAYER_FRONT]).values[-1])
+    return np.asarray(dataset[v.LAYER_REAR].values[-1] - dataset[v.LAYER_FRONT].values[-1])
 
 
-def base_depth(dataset: xarray.Dataset) -> Array:
+def base_depth(dataset: Result) -> Array:
     """How deep every core goes into the base [m], shape [hits]; NaN where the computation failed.
 
     A core that stops before the base or bounces off it counts 0. A core that pierces or passes the base counts with the
@@ -45,14 +48,14 @@ def base_depth(dataset: xarray.Dataset) -> Array:
     return np.where(failed(dataset), np.nan, np.where(passed(dataset), thickness, depth))
 
 
-def is_pierced(dataset: xarray.Dataset) -> Array:
+def is_pierced(dataset: Result) -> Array:
     """1 where a core comes out of the rear face of the base, whether it rests in the base or passes it, else 0; shape
     [hits]. NaN as in `base_depth`."""
     depth = base_depth(dataset)
     return np.where(np.isnan(depth), np.nan, depth >= base_thickness(dataset) if has_base(dataset) else np.nan)
 
 
-def solid_note(dataset: xarray.Dataset) -> str:
+def solid_note(dataset: Result) -> str:
     """What to know of the solid plate beside a base, if its material keeps it from stopping any core; mostly empty."""
     material = json.loads(dataset.attrs.get(attr.MATERIAL, "{}"))
     by_time = material.get("degradation", 1.0) < 1.0 and material.get("degradation_distance") is None

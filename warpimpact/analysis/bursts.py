@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray
 
 from warpimpact.analysis.numbers import interval_text, plus_minus
 from warpimpact.analysis.summary import UNITS, means_of, slices
@@ -20,6 +20,9 @@ from warpimpact.results.measures import Array, Measure, dealing
 from warpimpact.statistics.clusters import cluster_estimate, cluster_numbers
 from warpimpact.statistics.comparisons import confidence_of_each
 from warpimpact.statistics.intervals import Estimate, estimate_of
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 BINS = 12
 """Bins of distance, with equal numbers of hits; fewer if the hits lie at fewer distances."""
@@ -73,7 +76,7 @@ class Bursts:
         return math.inf if noticed[-1] is self.distances[-1] else noticed[-1].distance[2]
 
 
-def bursts(dataset: xarray.Dataset) -> Bursts:
+def bursts(dataset: Result) -> Bursts:
     """Analyse a result of bursts; of an open file one number per hit is in memory."""
     members = shots_at_a_plate(dataset)
     velocity, *tilts = means_of((v.RESIDUAL_VELOCITY, v.TILT), dataset[v.STANDOFF].values.tolist())

@@ -6,9 +6,9 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 
 from warpimpact.analysis import base
 from warpimpact.analysis.numbers import interval_text
@@ -18,6 +18,9 @@ from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
 from warpimpact.solver.promise import PROMISES
 from warpimpact.statistics.intervals import Estimate, estimate_of
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 SLICE = 2**18
 """Hits in memory at a time."""
@@ -56,7 +59,7 @@ class Summary:
     base_depth: Spread | None = None
 
 
-def promise_text(dataset: xarray.Dataset) -> str | None:
+def promise_text(dataset: Result) -> str | None:
     """What the errors of the numerics are, and whether the fidelity keeps its promise; None of an older result."""
     told = dataset.attrs
     if attr.NUMERICS_GIVEN not in told or attr.LIMIT in told:
@@ -69,13 +72,14 @@ def promise_text(dataset: xarray.Dataset) -> str | None:
     tolerance = PROMISES[given["fidelity"]].tolerance
     stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
-    found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg"
+    depth = f" and {1e3 * told[attr.DEPTH_ERROR_P90]:.2g} mm of depth" if attr.DEPTH_ERROR_P90 in told else ""
+    found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg{depth}"
     if told[attr.PROMISE_KEPT]:
         return f"{given['fidelity']} keeps its promise ({stated}); {found}"
     return f"{given['fidelity']} does not keep its promise ({stated}) at the finest level it may use; {found}"
 
 
-def summary(dataset: xarray.Dataset) -> Summary:
+def summary(dataset: Result) -> Summary:
     """Summarise a hit map; velocity, deflection and tilt count only the cores that passed the plate."""
     codes, standoffs = status_codes(dataset), dataset[v.STANDOFF].values.tolist()
     velocity, deflection, *tilt = means_of((v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT), standoffs)
@@ -92,7 +96,7 @@ def summary(dataset: xarray.Dataset) -> Summary:
     )
 
 
-def _base_depth(dataset: xarray.Dataset) -> Spread | None:
+def _base_depth(dataset: Result) -> Spread | None:
     if not base.has_base(dataset):
         return None
     needed = dataset[[name for name in base.NEEDED if name in dataset]]
@@ -109,9 +113,7 @@ def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> lis
     ]
 
 
-def estimated(
-    dataset: xarray.Dataset, measures: Sequence[Measure], confidence: float = 0.95
-) -> dict[Measure, Estimate]:
+def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals; of an open file only a slice is in memory at a time."""
     tallies = [Tally(measure, **dealing(dataset), confidence=confidence) for measure in measures]
     for part in slices(dataset[[v.STATUS, *(name for name in MEASURED if name in dataset)]]):
@@ -120,7 +122,7 @@ def estimated(
     return {tally.measure: tally.estimate() for tally in tallies}
 
 
-def slices(dataset: xarray.Dataset) -> Iterator[xarray.Dataset]:
+def slices(dataset: Result) -> Iterator[Any]:
     """Its hits in slices that are loaded one at a time."""
     for first in range(0, dataset.sizes["hit"], SLICE):
         yield dataset.isel(hit=slice(first, first + SLICE)).load()
@@ -133,7 +135,7 @@ _SAMPLINGS = {
 }
 
 
-def sampling_note(dataset: xarray.Dataset) -> str:
+def sampling_note(dataset: Result) -> str:
     """What there is to say of the intervals of a result because of its sampling, if anything."""
     told = dataset.attrs
     if is_choice(dataset):
@@ -144,7 +146,7 @@ def sampling_note(dataset: xarray.Dataset) -> str:
     return _SAMPLINGS.get(told.get(attr.SAMPLING, ""), "") if told.get(attr.REPLICATES, 1) == 1 else ""
 
 
-def summary_text(dataset: xarray.Dataset) -> str:
+def summary_text(dataset: Result) -> str:
     """The summary as a short table; statuses that did not occur are left out."""
     result = summary(dataset)
     hits = dataset.sizes["hit"]
@@ -166,7 +168,7 @@ UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "N m": " N m", "
 """Units as people write them."""
 
 
-def stop_lines(dataset: xarray.Dataset) -> list[str]:
+def stop_lines(dataset: Result) -> list[str]:
     """What the stop rule asked for, if there was one."""
     told = dataset.attrs
     if attr.STOP_QUANTITY not in told:
@@ -179,7 +181,7 @@ def stop_lines(dataset: xarray.Dataset) -> list[str]:
     ]
 
 
-def symmetry_text(dataset: xarray.Dataset) -> str:
+def symmetry_text(dataset: Result) -> str:
     """How many hits of a map with `hits.irreducible` were computed, and where the others come from."""
     computed, hits = dataset.attrs[attr.COMPUTED_HITS], dataset.sizes["hit"]
     if computed == hits:

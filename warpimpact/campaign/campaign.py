@@ -40,6 +40,7 @@ from ..scene.symmetry import check_layers, check_scatter
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
 from ..solver.bending import check_bending
+from ..solver.blocks import check_layout
 from ..solver.resolution import ONE_PLATE
 from .apart import with_scatter_apart
 from .drawn import DrawnSampler, Posterior, read_posterior
@@ -63,7 +64,7 @@ class Output(Record):
         exit_state: store velocity, axis and position of every core at the end of contact.
     """
 
-    standoffs: Annotated[tuple[PositiveLength, ...], Field(min_length=1, max_length=64)] = (0.05, 0.13)
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, min_length=1, max_length=64)] = (0.05, 0.13)
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
     exit_state: Annotated[bool, Field(strict=True)] = True
@@ -92,7 +93,7 @@ class Campaign(Model):
     title: Title
     core: AnyCore
     plate: Plate
-    layer: Annotated[tuple[Layer, ...], Field(max_length=MOST_LAYERS)] = ()
+    layer: Annotated[tuple[Layer, ...], Field(fail_fast=True, max_length=MOST_LAYERS)] = ()
     impact: Impact
     hits: Hits
     interaction: Interaction = Interaction()
@@ -308,6 +309,18 @@ class Campaign(Model):
     def _core_has_a_bending_moment(self) -> Self:
         self.output.check_bending(self.core)
         check_bending(self.output, self.numerics)
+        return self
+
+    @model_validator(mode="after")
+    def _layout_computes_the_scene(self) -> Self:
+        if self.numerics.layout == "block":
+            check_layout(
+                nodal=self.numerics.scheme == "nodal",
+                double=self.numerics.precision == "double",
+                bends=self.output.bending,
+                layered=bool(self.layer),
+                burst=self.burst is not None,
+            )
         return self
 
     @model_validator(mode="after")

@@ -13,17 +13,17 @@ from dataclasses import asdict, fields, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.drawn import Posterior
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import solid_coordinates, to_dataset
+from warpimpact.results.dataset import solid_coordinates, to_table
+from warpimpact.results.table import Table
 from warpimpact.scene import Burst, Numerics, Scene, Shots, Symmetry
 from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
@@ -33,6 +33,9 @@ from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_t
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
 from warpimpact.solver.simulate import Outcomes, build, simulate
 from warpimpact.solver.unfold import unfolded, unfolded_estimates
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 _FEWEST_BURSTS = 8
 """Of a pilot, however many shots they have."""
@@ -48,7 +51,7 @@ def compute(
     threads: int | None = None,
     progress: Progress | None = None,
     refining: Callable[[Refining], None] | None = None,
-) -> xarray.Dataset:
+) -> Table:
     """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
     Args:
@@ -59,7 +62,7 @@ def compute(
         refining: as in `simulate_to_tolerance`; not called without a tolerance.
 
     Returns:
-        The Dataset of results/dataset.py, one entry per shot; it is a complete result.
+        The columns of results/dataset.py, one entry per shot; they are a complete result.
 
     Raises:
         DeviceError: the device is absent.
@@ -72,7 +75,7 @@ def compute(
     begin = time.perf_counter()
     outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining, campaign.drawn)
     elapsed = time.perf_counter() - begin
-    dataset = described(
+    table = described(
         campaign,
         shots,
         outcomes,
@@ -83,11 +86,11 @@ def compute(
         estimates=estimates,
     )
     if solid is None:
-        return dataset
+        return table
     solid, reference = at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
     follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
     outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
-    return dataset.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
+    return table.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
 
 
 def described(
@@ -100,8 +103,8 @@ def described(
     elapsed: float,
     attributes: Mapping[str, Any],
     estimates: Estimates | None = None,
-) -> xarray.Dataset:
-    """The Dataset of some shots of a campaign.
+) -> Table:
+    """The columns of some shots of a campaign.
 
     Args:
         shots: whole groups of images.
@@ -112,7 +115,7 @@ def described(
     """
     scene, group, chosen = campaign.scene, campaign.symmetries, find_device(device)
     computed, ligament = len(shots) // len(group), campaign.plate.ligament
-    dataset = to_dataset(
+    table = to_table(
         scene,
         shots,
         unfolded(outcomes, group),
@@ -151,7 +154,7 @@ def described(
         estimates=None if estimates is None else unfolded_estimates(estimates, group),
         double=is_double(campaign),
     )
-    return dataset if campaign.output.exit_state else dataset.drop_vars(v.EXIT_VARIABLES)
+    return table if campaign.output.exit_state else table.drop_vars(v.EXIT_VARIABLES)
 
 
 class HitMap:
@@ -167,7 +170,7 @@ class HitMap:
     measures: Sequence[str] = ()
     most_solid = 2**12
 
-    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> xarray.Dataset:
+    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> Table:
         """Compute some shots; the arguments are those of `compute`."""
         return compute(campaign, shots, **how)
 
@@ -175,7 +178,7 @@ class HitMap:
         """What a pilot of the campaign finds; None if the campaign fixes the resolution itself."""
         return promise_of(campaign, device, progress)
 
-    def promise_in(self, dataset: xarray.Dataset) -> Any:
+    def promise_in(self, dataset: Result) -> Any:
         """What was found by the pilot of a result."""
         return promise_in(dataset)
 
@@ -235,10 +238,11 @@ def _promised(promise: Promise) -> dict[str, Any]:
         attr.PROMISE_KEPT: int(promise.kept),
         attr.RESIDUAL_VELOCITY_ERROR_P90: promise.residual_velocity_error,
         attr.TILT_ERROR_P90: math.degrees(promise.tilt_error),
+        **({} if math.isnan(promise.depth_error) else {attr.DEPTH_ERROR_P90: promise.depth_error}),
     }
 
 
-def promise_in(dataset: xarray.Dataset) -> Promise | None:
+def promise_in(dataset: Result) -> Promise | None:
     """The promise that a result was computed with; None if its campaign fixed the resolution."""
     told = dataset.attrs
     if attr.RESOLUTION not in told:
@@ -248,13 +252,14 @@ def promise_in(dataset: xarray.Dataset) -> Promise | None:
         kept=bool(told[attr.PROMISE_KEPT]),
         residual_velocity_error=float(told[attr.RESIDUAL_VELOCITY_ERROR_P90]),
         tilt_error=math.radians(float(told[attr.TILT_ERROR_P90])),
+        depth_error=float(told.get(attr.DEPTH_ERROR_P90, math.nan)),
     )
 
 
 def _build(scene: Scene, shots: Shots, numerics: Numerics | Fidelity, device: str) -> None:
     """Build the kernels first, so that the measured time is that of computing alone."""
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
-        numerics = Numerics(precision=numerics.precision)
+        numerics = Numerics(precision=numerics.precision, layout=numerics.layout)
     build(scene, shots, numerics=numerics, device=device)
 
 

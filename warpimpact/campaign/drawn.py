@@ -142,7 +142,7 @@ def read_posterior(path: FilePath) -> Posterior:
 
 @lru_cache(maxsize=4)
 def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
-    tree = files.read(path)
+    tree = files.read(path, draws_alone=True)
     draws = tree["posterior"].to_dataset()
     values: dict[Path, Array] = {}
     for array in draws.data_vars.values():

@@ -21,13 +21,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import xarray
 from filelock import FileLock, Timeout
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
+from warpimpact.results.netcdf import attribute, read_table
+from warpimpact.results.table import Table
 
 _logger = logging.getLogger(__name__)
 
@@ -211,8 +212,7 @@ class Parts:
     def _is_complete(self) -> bool:
         """Whether the result file is that of this very campaign."""
         try:
-            with xarray.open_dataset(self.output, engine="netcdf4") as file:
-                return file.attrs.get(attr.FINGERPRINT) == self._fingerprint
+            return bool(attribute(self.output, attr.FINGERPRINT) == self._fingerprint)
         except (OSError, RuntimeError, ValueError):
             return False
 
@@ -261,7 +261,7 @@ class Parts:
         seal = hashlib.sha256(f"{self._fingerprint} {index} {bits}".encode()).hexdigest()[:16]
         return self.folder / f"{self._stem(index)}_{seal}.nc"
 
-    def save(self, index: int, dataset: xarray.Dataset) -> None:
+    def save(self, index: int, table: Table) -> None:
         """Put a shard on the disk.
 
         Raises:
@@ -272,23 +272,23 @@ class Parts:
         def named(written: Path) -> Path:
             return placed.setdefault(index, self._named(index, written))
 
-        files.write(dataset, self.folder / f"{self._stem(index)}.nc", named=named, compressed=False)
+        files.write_shard(table, self.folder / f"{self._stem(index)}.nc", named)
         self.saved |= placed
-        _logger.info("shard %d of %d saved: %d hits", index + 1, self.count, dataset.sizes["hit"])
+        _logger.info("shard %d of %d saved: %d hits", index + 1, self.count, table.sizes["hit"])
 
     def kept(self) -> int:
         """Shards on the disk, one included that an interrupt has kept from being counted."""
         return len(self._shards())
 
-    def load(self, index: int) -> xarray.Dataset:
+    def load(self, index: int) -> Table:
         """A shard that is there.
 
         Raises:
             OutputError: it is gone or damaged meanwhile.
         """
-        return files.read(self._path(index))
+        return read_table(self._path(index))
 
-    def finish(self, count: int, attributes: Callable[[xarray.Dataset], Mapping[str, Any]]) -> None:
+    def finish(self, count: int, attributes: Callable[[Table], Mapping[str, Any]]) -> None:
         """Join the first `count` shards into the result file, and remove them.
 
         Args:

@@ -11,10 +11,10 @@ from ..scene.units import brief, quoted
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problem as a sentence, and how many more there are."""
     problems = error.errors(include_url=False)
-    place, complaint = _place(problems[0], data), _complaint(problems[0])
+    place, told = _place(problems[0], data), complaint(problems[0])
     more = len(problems) - 1
     also = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
-    return f"{place}: {complaint}{also}" if place else f"{complaint}{also}"
+    return f"{place}: {told}{also}" if place else f"{told}{also}"
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:
@@ -30,7 +30,7 @@ def _place(problem: ErrorDetails, data: Any) -> str:
     return brief(place.removeprefix("."))
 
 
-def _complaint(problem: ErrorDetails) -> str:
+def complaint(problem: ErrorDetails) -> str:
     """What was got and what is allowed."""
     context = problem.get("ctx", {})
     match problem["type"]:

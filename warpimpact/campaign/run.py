@@ -9,10 +9,9 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import xarray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.parts import Parts, claimed, extent, manifest
@@ -24,8 +23,12 @@ from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.table import Table, joined
 from warpimpact.scene import Shots
 from warpimpact.statistics.stopping import looks
+
+if TYPE_CHECKING:
+    import xarray
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""
@@ -52,19 +55,8 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
     with local_team(campaign, device) as team:
         held = _Held(extent(total, campaign.at_a_plate))
         end = _fill(campaign, held, team, progress or (lambda standing: None))
-    shards = [held.load(index) for index in range(end.shards)]
-    dataset = shards[0]
-    if len(shards) > 1:
-        dataset = xarray.concat(
-            shards,
-            dim="hit",
-            data_vars="minimal",
-            coords="minimal",
-            compat="override",
-            join="override",
-            combine_attrs="override",
-        )
-    return dataset.assign_attrs(_attributes(dataset, end))
+    table = joined(held.load(index) for index in range(end.shards))
+    return table.assign_attrs(_attributes(table, end)).to_xarray()
 
 
 def run_to_file(
@@ -127,9 +119,9 @@ class _Store(Protocol):
     @property
     def saved(self) -> Mapping[int, object]: ...
 
-    def save(self, index: int, dataset: xarray.Dataset) -> None: ...
+    def save(self, index: int, table: Table) -> None: ...
 
-    def load(self, index: int) -> xarray.Dataset: ...
+    def load(self, index: int) -> Table: ...
 
 
 class _Held:
@@ -137,12 +129,12 @@ class _Held:
 
     def __init__(self, size: int) -> None:
         self.extent = size
-        self.saved: dict[int, xarray.Dataset] = {}
+        self.saved: dict[int, Table] = {}
 
-    def save(self, index: int, dataset: xarray.Dataset) -> None:
-        self.saved[index] = dataset
+    def save(self, index: int, table: Table) -> None:
+        self.saved[index] = table
 
-    def load(self, index: int) -> xarray.Dataset:
+    def load(self, index: int) -> Table:
         return self.saved[index]
 
 
@@ -169,7 +161,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     else:
         watch.promise = awaited(team.pilot(), _REPORT_EVERY, lambda: follow(watch.standing(0)))
     tasks = _tasks(store, len(sampler), team.task)
-    waiting: dict[Future[xarray.Dataset], range] = {}
+    waiting: dict[Future[Table], range] = {}
     try:
         while watch.end is None:
             width = team.width()
@@ -222,16 +214,16 @@ def _tasks(store: _Store, total: int, shots: int) -> Iterator[range]:
         yield task
 
 
-def _split(dataset: xarray.Dataset, task: range, size: int) -> Iterator[tuple[int, xarray.Dataset]]:
+def _split(table: Table, task: range, size: int) -> Iterator[tuple[int, Table]]:
     """The shards of a task, each with its share of the time and of what was computed; the first one of a campaign keeps
     what is said once."""
-    hits, of_the_campaign = dataset.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
+    hits, of_the_campaign = table.sizes["hit"], [name for names in v.GROUPS.values() for name in names]
     for place, index in enumerate(task):
-        shard = numbered(dataset.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
+        shard = numbered(table.isel(hit=slice(place * size, (place + 1) * size)), first=index * size)
         if index:
-            shard = shard.drop_vars(of_the_campaign, errors="ignore")
-        time = dataset.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
-        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | _computed(dataset, shard.sizes["hit"]))
+            shard = shard.drop_vars(of_the_campaign)
+        time = table.attrs[attr.COMPUTE_TIME] * shard.sizes["hit"] / hits
+        yield index, shard.assign_attrs({attr.COMPUTE_TIME: time} | _computed(table, shard.sizes["hit"]))
 
 
 class _Watch:
@@ -259,7 +251,7 @@ class _Watch:
         self.end: _End | None = None
         self.promise: Any = None
 
-    def add(self, index: int, shard: xarray.Dataset) -> None:
+    def add(self, index: int, shard: Table) -> None:
         """Take in a shard that the store has; one that comes before its turn is loaded when that is."""
         self.done += shard.sizes["hit"]
         self.failed += int(failed(shard).sum())
@@ -268,7 +260,7 @@ class _Watch:
             self._early.remove(self._next)
             self._advance(shard if self._next == index else self._load(self._next))
 
-    def _advance(self, shard: xarray.Dataset) -> None:
+    def _advance(self, shard: Table) -> None:
         self._next += 1
         self._hits += shard.sizes["hit"]
         self._time += shard.attrs[attr.COMPUTE_TIME]
@@ -309,17 +301,17 @@ class _Watch:
         return Standing(done, self._total, self.done, self.resumed, self.failed, estimates, self.promise)
 
 
-def _attributes(dataset: xarray.Dataset, end: _End) -> dict[str, Any]:
+def _attributes(table: Table, end: _End) -> dict[str, Any]:
     """Global attributes of a complete result over those of its first shard."""
     return {
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {dataset.attrs[attr.HISTORY].partition(' ')[2]}",
+        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {table.attrs[attr.HISTORY].partition(' ')[2]}",
         attr.COMPUTE_TIME: end.compute_time,
-        attr.HITS_PER_SECOND: end.hits / images(dataset) / end.compute_time,
-        **_computed(dataset, end.hits),
+        attr.HITS_PER_SECOND: end.hits / images(table) / end.compute_time,
+        **_computed(table, end.hits),
         **end.stop,
     }
 
 
-def _computed(dataset: xarray.Dataset, hits: int) -> dict[str, int]:
-    """How many of some hits of a Dataset were computed, if that is not all the same."""
-    return {attr.COMPUTED_HITS: hits // images(dataset)} if attr.COMPUTED_HITS in dataset.attrs else {}
+def _computed(table: Table, hits: int) -> dict[str, int]:
+    """How many of some hits of a Table were computed, if that is not all the same."""
+    return {attr.COMPUTED_HITS: hits // images(table)} if attr.COMPUTED_HITS in table.attrs else {}

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any
 
-import xarray
-
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.compute import HitMap, made_by
 from warpimpact.results import attributes as attr
 from warpimpact.results.interrupts import stop_if_asked
+from warpimpact.results.table import Table
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores, find_device
 from warpimpact.solver.refinement import Refining
@@ -43,7 +42,7 @@ class Team:
     Attributes:
         job: what is computed of every hit.
         pilot: finds the promise of the campaign in the background, None if it fixes the resolution itself.
-        submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Dataset
+        submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Table
             comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task.
@@ -54,7 +53,7 @@ class Team:
 
     job: HitMap
     pilot: Callable[[], Future[Any]]
-    submit: Callable[[Any, Shots, Shots | None], Future[xarray.Dataset]]
+    submit: Callable[[Any, Shots, Shots | None], Future[Table]]
     width: Callable[[], int]
     task: int
     made_by: dict[str, str]
@@ -92,7 +91,7 @@ def local_team(campaign: Campaign, device: str, job: HitMap = _HIT_MAP) -> Itera
             raise InterruptedError
         done[threading.get_ident()] = finished
 
-    def work(promise: Any, shots: Shots, solid: Shots | None) -> xarray.Dataset:
+    def work(promise: Any, shots: Shots, solid: Shots | None) -> Table:
         name = idle.get()
         try:
             return job.compute(
@@ -160,10 +159,13 @@ def cluster_team(
     """
     try:
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
+        from distributed.client import ClosedClientError
         from distributed.comm import CommClosedError
+        from distributed.utils import silence_logging_cmgr
     except ImportError:
         raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
     with ExitStack() as stack:
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler gets our sentence, no traceback
         threads = None
         if address is None:
             assert workers is not None
@@ -179,26 +181,39 @@ def cluster_team(
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
-        kind = client.submit(made_by, device, pure=False).result()
         executor = client.get_executor(pure=False)
+
+        def asked(request: Callable[..., Any], *arguments: Any) -> Any:
+            try:
+                return request(*arguments)
+            except (OSError, ClosedClientError) as error:  # of the client: here no file is written
+                raise _lost(address, error) from None
+
         try:
+            kind = asked(executor.submit, made_by, device).result()
             yield Team(
                 job=job,
-                pilot=lambda: executor.submit(job.promise_of, campaign, device),
-                submit=lambda *shots: executor.submit(_compute_alike, job, campaign, *shots, device, threads, kind),
-                width=lambda: 2 * max(1, sum(client.nthreads().values())),
+                pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
+                submit=lambda *shots: asked(
+                    executor.submit, _compute_alike, job, campaign, *shots, device, threads, kind
+                ),
+                width=lambda: 2 * max(1, sum(asked(client.nthreads).values())),
                 task=_task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
                 refining=lambda: None,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
-            raise ClusterError(
-                f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
-                "continue with --resume"
-            ) from None
+            raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+def _lost(address: str, error: BaseException) -> ClusterError:
+    return ClusterError(
+        f"scheduler: {address} was lost, perhaps killed ({type(error).__name__}); what is computed is saved, "
+        "continue with --resume"
+    )
 
 
 def _ignoring_interrupts(plugin: Any) -> Any:
@@ -220,7 +235,7 @@ def _compute_alike(
     device: str,
     threads: int | None,
     kind: dict[str, str],
-) -> xarray.Dataset:
+) -> Table:
     """Compute shots on a worker that gives the same bits as the others."""
     own = made_by(device)
     if own != kind:

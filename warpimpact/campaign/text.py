@@ -27,7 +27,7 @@ def parsed(text: str, name: str) -> dict[str, Any]:
             f"{name}: is not a campaign: at most {_MOST_TEXT} characters are read, with {_MOST_DOTS} dots in a key"
         )
     try:
-        data: dict[str, Any] = json.loads(text) if text.startswith("{") else tomllib.loads(text)
+        data: dict[str, Any] = _from_json(text) if text.startswith("{") else tomllib.loads(text)
     except ValueError as error:
         raise CampaignError(f"{name}: is not valid TOML: {brief(str(error))}") from None
     except RecursionError:
@@ -37,6 +37,17 @@ def parsed(text: str, name: str) -> dict[str, Any]:
         nested = _is_nested(data)
     if nested:
         raise CampaignError(f"{name}: is not a campaign: its tables and arrays are nested more than {_MOST_DEEP} deep")
+    return data
+
+
+def _from_json(text: str) -> Any:
+    """The tables of a JSON text. It may escape half a character, which is no text and cannot be told or written.
+
+    Raises:
+        ValueError: it is not JSON, or has such a half.
+    """
+    data = json.loads(text)
+    json.dumps(data, ensure_ascii=False).encode()
     return data
 
 

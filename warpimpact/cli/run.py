@@ -13,7 +13,7 @@ from .plain import say
 from .progress import show_standing, tell_tolerance, warn
 
 if TYPE_CHECKING:
-    import xarray
+    from warpimpact.results.table import Result
 
 
 def add_run(commands: Commands) -> None:
@@ -48,7 +48,7 @@ def _run(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.campaign.run import run_to_file
     from warpimpact.campaign.team import cluster_team
-    from warpimpact.results import files
+    from warpimpact.results.netcdf import open_table
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
@@ -69,7 +69,7 @@ def _run(arguments: argparse.Namespace) -> int:
             progress=progress,
             tell=warn,
         )
-    with files.opened(output) as dataset:
+    with open_table(output) as dataset:
         print(summary_text(dataset))
         if attr.BURST in dataset.attrs:
             print(orders_text(bursts(dataset)))
@@ -82,7 +82,7 @@ def _run(arguments: argparse.Namespace) -> int:
         return failure_code(dataset, output)
 
 
-def failure_code(dataset: "xarray.Dataset", path: Path) -> int:
+def failure_code(dataset: "Result", path: Path) -> int:
     """3 if more shots failed than the campaign allows, with a message; else 0."""
     from warpimpact.results.dataset import failed
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any, get_args, get_origin
 import numpy as np
 from pydantic import BeforeValidator, TypeAdapter, ValidationError
 
+from warpimpact.campaign.problems import complaint
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene import AnyCore, Interaction, Plate
 from warpimpact.scene.distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
@@ -94,8 +95,9 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
     except ValidationError as error:
         told = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in told["loc"] if part != given.get("distribution"))
-        complaint = str(told.get("ctx", {}).get("error", told["msg"]))
-        raise FitError(f"{place}{'.' if where else ''}{where}: got {quoted(dict(given))}, but: {complaint}") from None
+        said = complaint(told)
+        said = f"got {quoted(dict(given))}, but: {said}" if told["type"] == "value_error" else said
+        raise FitError(f"{place}{'.' if where else ''}{where}: {said}") from None
     except ValueError as error:
         raise FitError(f"{place}.{error}") from None
 
@@ -115,7 +117,7 @@ def is_distribution(value: Any) -> bool:
 
 
 def _distributions(node: Any, path: Path, name: str) -> Iterator[tuple[Path, Mapping[str, Any]]]:
-    if is_distribution(node):
+    if path and is_distribution(node):
         yield path, node
     elif isinstance(node, Mapping):
         for key, inner in node.items():
@@ -123,7 +125,7 @@ def _distributions(node: Any, path: Path, name: str) -> Iterator[tuple[Path, Map
     elif isinstance(node, list):
         for index, inner in enumerate(node):
             yield from _distributions(inner, (*path, index), name)
-    elif not isinstance(path[-1], int):  # in a list a fixed number may stand beside an unknown one
+    elif not path or not isinstance(path[-1], int):  # in a list a fixed number may stand beside an unknown one
         raise FitError(
             f"{name}: prior.{dotted(path)}: got {quoted(node)}, but a prior is a distribution such as "
             '{ distribution = "uniform", low = 1, high = 2 }; a known value belongs in the table of the scene'
@@ -183,10 +185,12 @@ def _models(annotation: Any) -> Iterator[type[Model]]:
 
 
 def _element(annotation: Any, index: int) -> Any:
-    """Type of an entry of a tuple."""
+    """Type of an entry of a tuple; None where it has no such entry."""
     if get_origin(annotation) is tuple:
         inner = get_args(annotation)
-        return inner[0] if len(inner) == 2 and inner[1] is Ellipsis else inner[min(index, len(inner) - 1)]
+        if len(inner) == 2 and inner[1] is Ellipsis:
+            return inner[0]
+        return inner[index] if index < len(inner) else None
     return next((found for one in get_args(annotation) if (found := _element(one, index)) is not None), None)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import combinations
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -37,6 +36,7 @@ from warpimpact.solver.limit import check_arrests
 _TABLES = ("core", "plate", "interaction")
 _KEYS = ("title", *_TABLES, "record", "numerics", "prior", "discrepancy", "selection", "sampling", "shot")
 _SHOT_KEYS = ("name", "hit", "impact", "measured", *_TABLES)
+_MOST_SHOTS = 256
 DISCREPANCY = {
     "velocity": (Speed, {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50}),
     "angle": (
@@ -65,21 +65,23 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     given, prior = data.get("shot"), data.get("prior", {})
     if not isinstance(given, list) or not given:
         raise FitError(f"{name}: shot: is missing, but a fit needs a table [[shot]] per measured shot")
+    if len(given) > _MOST_SHOTS:
+        raise FitError(f"{name}: shot: got {len(given)} shots, but a fit takes at most {_MOST_SHOTS}")
     if not isinstance(prior, dict) or not prior:
         raise FitError(f"{name}: prior: is missing, but a fit needs a prior of what it is to find")
-    tables = {table: data.get(table, {}) for table in _TABLES}
+    tables = {table: _table(data, table, name) for table in _TABLES}
     parameters = read_priors(prior, tables, name)
     tables = with_medians(tables, prior, parameters)
     record = _model(Record, data.get("record", {}), f"{name}: record")
-    numerics = _model(Numerics, {"fidelity": "draft"} | data.get("numerics", {}), f"{name}: numerics")
+    numerics = _model(Numerics, {"fidelity": "draft"} | _table(data, "numerics", name), f"{name}: numerics")
     if numerics.tolerance is not None:
         raise FitError(f"{name}: numerics.tolerance: a fit computes all hits with one resolution; name a fidelity")
     shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
-    selection = tuple(_condition(one, f"{name}: selection") for one in data.get("selection", ()))
+    selection = tuple(_condition(one, f"{name}: selection") for one in _selection(data, name))
     if any(one.variable == "bending_stress" for one in selection):
         record = record.model_copy(update={"bending": True})
     kinds = {one.kind for shot in shots for one in shot.observations}
-    scales, fixed = _discrepancy(data.get("discrepancy", {}), kinds, name)
+    scales, fixed = _discrepancy(_table(data, "discrepancy", name), kinds, name)
     fit = Fit(
         title=_model(_Titled, {"title": data.get("title", "")}, name).title,
         text=text,
@@ -101,10 +103,25 @@ class _Titled(Model):
     title: Title
 
 
-def _known(table: Any, allowed: tuple[str, ...], place: str) -> None:
+def _known(table: Mapping[str, Any], allowed: tuple[str, ...], place: str) -> None:
     unknown = [key for key in table if key not in allowed]
     if unknown:
         raise FitError(f"{place}: got the unknown key {quoted(unknown[0])}; allowed are {', '.join(allowed)}")
+
+
+def _table(data: Mapping[str, Any], key: str, place: str) -> dict[str, Any]:
+    """A table of a fit, empty where it is missing."""
+    table = data.get(key, {})
+    if not isinstance(table, dict):
+        raise FitError(f"{place}: {key}: got {quoted(table)}, but it must be a table")
+    return table
+
+
+def _selection(data: Mapping[str, Any], place: str) -> list[Any]:
+    conditions = data.get("selection", [])
+    if not isinstance(conditions, list):
+        raise FitError(f"{place}: selection: got {quoted(conditions)}, but it must be a list of conditions")
+    return conditions
 
 
 def _model(kind: Any, data: Any, place: str) -> Any:
@@ -118,7 +135,7 @@ def _shot(given: Any, tables: Mapping[str, Any], record: Record, place: str, par
     if not isinstance(given, dict):
         raise FitError(f"{place}: got {quoted(given)}, but it must be a table")
     _known(given, _SHOT_KEYS, place)
-    impact = dict(given.get("impact", {}))
+    impact = dict(_table(given, "impact", place))
     scattered = {key: value for key, value in impact.items() if isinstance(value, dict)}
     for key, value in scattered.items():
         if key not in QUANTITIES or QUANTITIES[key].table != "impact":
@@ -130,7 +147,7 @@ def _shot(given: Any, tables: Mapping[str, Any], record: Record, place: str, par
     limits = [one.value for one in observations if one.is_limit]
     if limits:  # at which its search begins
         impact.setdefault("velocity", limits[0])
-    own = {table: given[table] for table in _TABLES if table in given}
+    own = {table: _table(given, table, place) for table in _TABLES if table in given}
     return MeasuredShot(
         name=str(given.get("name", place.partition(": ")[2])),
         hit=read_hit(given.get("hit", "unknown"), f"{place}: hit"),
@@ -197,11 +214,14 @@ def _discrepancy(given: Any, kinds: set[str], name: str) -> tuple[list[Parameter
 
 def _doubts(shots: tuple[MeasuredShot, ...], parameters: list[Parameter]) -> list[str]:
     """Sentences about data that a fit can take, but that say less than they seem to."""
-    told = [
-        f'shots "{one.name}" and "{other.name}" are the same in every number: they count twice, as two measurements'
-        for one, other in combinations(shots, 2)
-        if one.content == other.content
-    ]
+    told, before = list[str](), dict[str, str]()
+    for shot in shots:
+        if (first := before.get(content := repr(shot.content))) is None:
+            before[content] = shot.name
+        else:
+            told.append(
+                f'shots "{first}" and "{shot.name}" are the same in every number: they count twice, as two measurements'
+            )
     numbers = sum(len(shot.observations) + (shot.status is not None) for shot in shots)
     if numbers < len(parameters):
         told.append(
@@ -213,6 +233,7 @@ def _doubts(shots: tuple[MeasuredShot, ...], parameters: list[Parameter]) -> lis
 
 def _check_scenes(fit: Fit, name: str) -> None:
     """Refuse priors that reach scenes which are not possible."""
+    checked = set[tuple[str, frozenset[Path], bool]]()
     for place, shot in enumerate(fit.shots):
         where = f"{name}: shot[{place}]"
         try:
@@ -225,6 +246,10 @@ def _check_scenes(fit: Fit, name: str) -> None:
         has_limit = any(one.is_limit for one in shot.observations)
         if has_limit and fit.record.bending:
             raise FitError(f"{where}: got limit_velocity beside a selection by bending_stress, which it does not have")
+        key = repr(shot.tables), shot.own, has_limit  # what the scenes below follow from
+        if key in checked:
+            continue
+        checked.add(key)
         for values in corners(fit.scene_parameters):
             try:
                 reached = fit.scene_of(shot, values)

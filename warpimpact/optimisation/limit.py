@@ -7,7 +7,7 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
@@ -22,6 +22,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.limits import solid_limits, with_limits, with_solid_limits
 from warpimpact.results.measures import dealing
+from warpimpact.results.table import Table
 from warpimpact.scene import Scene, Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
@@ -40,6 +41,9 @@ from warpimpact.solver.limit_promise import PILOT, LimitPromise, keep_limits
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import Fidelity
 from warpimpact.statistics.intervals import Estimate, estimate_of
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
@@ -102,7 +106,7 @@ class LimitMap(HitMap):
         """The running estimates: the mean limit."""
         return (f"mean({v.LIMITS[self.quantity].value})",)
 
-    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> xarray.Dataset:
+    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> Table:
         """Search the limits of some shots. The Dataset is that of the shots as they just perforate, with their limits.
 
         Args:
@@ -141,9 +145,9 @@ class LimitMap(HitMap):
         found = with_limits(dataset, self.quantity, limits, images)
         return found if how.get("solid") is None else self._beside_solid(campaign, found, **how)
 
-    def _beside_solid(self, campaign: Campaign, found: xarray.Dataset, **how: Any) -> xarray.Dataset:
+    def _beside_solid(self, campaign: Campaign, found: Table, **how: Any) -> Table:
         """The Dataset with the limits of some shots at the solid plate that is as heavy as the whole target."""
-        plate, promise, progress, hits = campaign.target.solid, how["promise"], how.get("progress"), len(found[v.HIT])
+        plate, promise, progress, hits = campaign.target.solid, how["promise"], how.get("progress"), found.sizes["hit"]
         scene = campaign.scene.model_copy(update={"target": plate})
         begin = time.perf_counter()
         limits = replace(self, layer=0)._search(
@@ -176,7 +180,7 @@ class LimitMap(HitMap):
 
         return keep_limits(search, campaign.numerics, squared=self.quantity == "thickness")
 
-    def promise_in(self, dataset: xarray.Dataset) -> LimitPromise | None:
+    def promise_in(self, dataset: Result) -> LimitPromise | None:
         """The promise with which a result was computed."""
         told = dataset.attrs
         if attr.LIMIT_RESOLUTION not in told:

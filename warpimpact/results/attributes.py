@@ -42,6 +42,8 @@ RESOLUTION = "resolution"
 PROMISE_KEPT = "promise_kept"
 RESIDUAL_VELOCITY_ERROR_P90 = "residual_velocity_error_p90"
 TILT_ERROR_P90 = "tilt_error_p90"
+DEPTH_ERROR_P90 = "depth_error_p90"
+"""Only where some shots of the pilot stop in a layer."""
 FINGERPRINT = "fingerprint"
 COMPUTE_TIME = "compute_time"
 HITS_PER_SECOND = "hits_per_second"
@@ -117,6 +119,7 @@ UNITS = {
     HITS_PER_SECOND: "s-1",
     RESIDUAL_VELOCITY_ERROR_P90: "m s-1",
     TILT_ERROR_P90: "degree",
+    DEPTH_ERROR_P90: "m",
     GRID_SPACING: "m",
     TIME_STEP: "s",
     TOLERANCE_RESIDUAL_VELOCITY: "m s-1",

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
-from typing import Any
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+
+if TYPE_CHECKING:
+    import xarray
 
 _LABELS = (v.AXIS, v.QUATERNION, v.SETTING, v.SCHEME, v.STUDY_LEVEL)
 """Variables that hold words."""
@@ -35,8 +37,9 @@ _NUMBERS = (
     *(attr.PLATE_THICKNESS, attr.FAILED_SHARE, attr.ESTIMATE, attr.CONFIDENCE, attr.HIT),
     *(attr.LIMIT_LAYER, attr.LIMIT_DENSITY, attr.LIMIT_ELSEWHERE, attr.LIMIT_TOLERANCE, attr.LIMIT_HIGHEST),
     *(attr.SOLID_LIMIT_TIME, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST),
-    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.GRID_SPACING),
-    *(attr.TIME_STEP, attr.TOLERANCE_RESIDUAL_VELOCITY, attr.TOLERANCE_TILT, attr.PATCHES_AXIAL, attr.PATCHES_AROUND),
+    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.DEPTH_ERROR_P90),
+    *(attr.GRID_SPACING, attr.TIME_STEP, attr.TOLERANCE_RESIDUAL_VELOCITY, attr.TOLERANCE_TILT),
+    *(attr.PATCHES_AXIAL, attr.PATCHES_AROUND),
 )
 _PAIRS = (attr.PLATE_PERIOD, attr.ESTIMATE_INTERVAL)
 _TOGETHER = (
@@ -52,6 +55,28 @@ _TOGETHER = (
 """Attributes of which the first needs the others."""
 
 
+_WHOLE = (
+    v.LAYER_VARIABLES + v.LAYER_FACES,
+    v.LAYER_COORDINATES + v.LAYER_STANDOFF_VARIABLES,
+    v.OUTLINE_VARIABLES,
+    tuple(v.SOLID_VARIABLES),
+)
+"""Variables of which a result has all or none."""
+_OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)
+"""Attributes of a study."""
+_DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
+_OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "posterior": {"hit_y": _DRAWS + _SHOTS, "hit_z": _DRAWS + _SHOTS},
+    "best": {"misfit": _SHOTS, "hit_y": _SHOTS, "hit_z": _SHOTS},
+    "observed_data": {"measured": _OBSERVED, "std": _OBSERVED},
+    "posterior_predictive": {"measured": _DRAWS + _OBSERVED, "fitted": _DRAWS + _OBSERVED},
+}
+"""Numbers of a posterior beside its parameters, by group, and what they are along."""
+_OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
+_NUMBERS_OF_A_POSTERIOR = (
+    *("effective_sample_size", "pareto_k", "hit_noise", "converged", "wanted_sample_size", "computed_sets"),
+)
+
 _SLICE = 2**22
 """Hits that are looked at together."""
 
@@ -66,6 +91,76 @@ def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
     return next(filter(None, found), None) or _map_fault(dataset, known) or _attribute_fault(dataset.attrs)
 
 
+def study_fault(dataset: xarray.Dataset) -> str | None:
+    """What keeps a Dataset from being a study, as a phrase; None if nothing does."""
+    if missing := [name for name in _OF_A_STUDY if name not in dataset.attrs]:
+        return f'it has no attribute "{missing[0]}"'
+    if not {0.5, 0.9} <= set(dataset[v.QUANTILE].values.ravel().tolist()):
+        return f'its variable "{v.QUANTILE}" lacks the median or the 90th percentile'
+    return fault(dataset, (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES))
+
+
+def history_fault(dataset: xarray.Dataset) -> str | None:
+    """What keeps a Dataset from being the history of a hit, as a phrase; None if nothing does."""
+    known = (*v.HISTORY_COORDINATES, *v.HISTORY_VARIABLES)
+    if missing := [name for name in known if name not in dataset.variables]:
+        return f'it has no variable "{missing[0]}"'
+    return fault(dataset, known)
+
+
+def posterior_fault(groups: Mapping[str, xarray.Dataset], told: Mapping[Any, Any]) -> str | None:
+    """What keeps the groups of a posterior from being one, as a phrase; None if nothing does.
+
+    Args:
+        told: global attributes.
+    """
+    parameters = [str(name) for name in groups["prior"].data_vars]
+    wanted = [(group, name, dims) for name in parameters for group, dims in _OF_A_PARAMETER.items()]
+    wanted += [(group, name, dims) for group, names in _OF_A_POSTERIOR.items() for name, dims in names.items()]
+    if not groups["observed_data"].data_vars:  # of limits and of how shots ended alone
+        wanted = [one for one in wanted if _OBSERVED[0] not in one[2]]
+    for group, name, dims in wanted:
+        array = groups[group].variables.get(name)
+        if array is None or array.dims != dims or array.dtype.kind not in "iuf" or not array.size:
+            return f'its group "{group}" has no numbers "{name}" along {dims}'
+        if set(dims) & {*_SHOTS, *_OBSERVED} - groups[group].coords.keys():
+            return f'its group "{group}" does not name what "{name}" is along'
+    for name in _NUMBERS_OF_A_POSTERIOR:
+        if not isinstance(told.get(name), int | float | np.number):
+            return f'its attribute "{name}" is no number'
+    shares = _json(told.get("row_probability"))
+    if not isinstance(shares, dict) or not all(isinstance(one, int | float) for one in shares.values()):
+        return 'its attribute "row_probability" is not what it should be'
+    return draws_fault(groups["posterior"][parameters], told)
+
+
+def draws_fault(draws: xarray.Dataset, told: Mapping[Any, Any]) -> str | None:
+    """What keeps the draws of parameters from being drawn from, as a phrase; None if nothing does.
+
+    Args:
+        told: global attributes of the posterior.
+    """
+    for name, array in draws.data_vars.items():
+        if array.dims != _DRAWS or array.dtype.kind not in "iuf" or not array.size:
+            return f'its group "posterior" has no numbers "{name}" along {_DRAWS}'
+        if not isinstance(_json(array.attrs.get("path")), list):
+            return f'its parameter "{name}" has no path as it should'
+    material = _json(told.get("material"))
+    tables = material if isinstance(material, dict) else {}
+    if not all(isinstance(tables.get(one), dict) for one in ("plate", "interaction")):
+        return 'its attribute "material" is not what it should be'
+    return None
+
+
+def packing_fault(dataset: xarray.Dataset) -> str | None:
+    """Numbers may be stored with a factor and an offset, which are read only when the numbers are."""
+    for name, array in dataset.variables.items():
+        for one in ("scale_factor", "add_offset"):
+            if one in array.encoding and not isinstance(array.encoding[one], int | float | np.number):
+                return f'its variable "{name}" has a {one} that is no number'
+    return None
+
+
 def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
     """What only a map of hits is held to."""
     if "hit" not in dataset.sizes:
@@ -76,6 +171,10 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
             continue
         if one in dataset.variables and dataset.variables[one].dims != one.dims:
             return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
+    for names in _WHOLE:
+        there = [name for name in names if name in dataset.variables]
+        if there and (missing := [name for name in names if name not in there]):
+            return f'it has no variable "{missing[0]}" beside "{there[0]}"'
     if dataset.sizes.get("standoff", 1) == 0:
         return "it has no stand-offs"
     status, codes = dataset[v.STATUS], [*Status]
@@ -135,7 +234,12 @@ def _is_allowed(name: str, value: Any) -> bool:
 
 
 def _is_table(text: str) -> bool:
+    return isinstance(_json(text), dict)
+
+
+def _json(text: Any) -> Any:
+    """What a text says as JSON; None if it is none."""
     try:
-        return isinstance(json.loads(text), dict)
-    except (ValueError, RecursionError):
-        return False
+        return json.loads(text)
+    except (TypeError, ValueError, RecursionError):
+        return None

@@ -3,6 +3,8 @@ hold.
 
 Inside the package everything is in SI and radians; angles become degrees here. The Dataset follows the CF conventions
 and opens with plain ``xarray.open_dataset``.
+
+Long because all that build and read a Dataset stands together.
 """
 
 from __future__ import annotations
@@ -11,17 +13,19 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.layers import fields, of_layers, sections
+from warpimpact.results.table import Table
 from warpimpact.scene import Plate
 
 if TYPE_CHECKING:
+    import xarray
     from numpy.typing import NDArray
 
+    from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
     from warpimpact.solver.refinement import Estimates
     from warpimpact.solver.simulate import Outcomes, Replay
@@ -42,7 +46,7 @@ _STATIONS, _SECTION_POINTS = 101, 1601
 """Points of a core's profile and of a section of the plate in a history."""
 
 
-def to_dataset(
+def to_table(
     scene: Scene,
     shots: Shots,
     outcomes: Outcomes,
@@ -51,8 +55,8 @@ def to_dataset(
     attributes: Mapping[str, Any],
     estimates: Estimates | None = None,
     double: bool = False,
-) -> xarray.Dataset:
-    """Gather shots and outcomes into the Dataset of the hit map.
+) -> Table:
+    """Gather shots and outcomes into the columns of the hit map.
 
     Hits are numbered from 0. The outlines of the holes are coordinates: no choice of hits spreads them over the hits.
 
@@ -99,11 +103,16 @@ def to_dataset(
     columns = described(variables, values)
     if not double:
         columns |= _in_single(columns, (*ended, *v.ESTIMATE_VARIABLES))
-    return xarray.Dataset(
+    return Table.of(
         columns,
         described(along, coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
+
+
+def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **told: Any) -> xarray.Dataset:
+    """The Dataset of the hit map; the arguments are those of `to_table`."""
+    return to_table(scene, shots, outcomes, **told).to_xarray()
 
 
 def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:
@@ -128,18 +137,18 @@ def _in_single(columns: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -> 
     }
 
 
-def numbered(dataset: xarray.Dataset, first: int = 0) -> xarray.Dataset:
-    """A Dataset whose hits have their numbers in the campaign, from `first` on."""
+def numbered(dataset: AResult, first: int = 0) -> AResult:
+    """A result whose hits have their numbers in the campaign, from `first` on."""
     numbers = np.arange(first, first + dataset.sizes["hit"], dtype=np.int32)
     return dataset.assign_coords(described((v.HIT,), {v.HIT: numbers}))
 
 
-def hit_numbers(dataset: xarray.Dataset) -> NDArray[np.int64]:
+def hit_numbers(dataset: Result) -> NDArray[np.int64]:
     """Numbers of the hits in their campaign, shape (hit,); those of a file without them count from 0."""
     return np.asarray(dataset[v.HIT].values)
 
 
-def is_choice(dataset: xarray.Dataset) -> bool:
+def is_choice(dataset: Result) -> bool:
     """Whether the hits are others than the first ones of the campaign in their order; of an open file, one slice at a
     time is in memory."""
     if v.HIT not in dataset.coords:
@@ -179,6 +188,8 @@ def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> x
         values: of every name in STUDY_VARIABLES and STUDY_COORDINATES, SI and radians.
         attributes: global attributes: title, history, campaign, versions, device, ...
     """
+    import xarray
+
     return xarray.Dataset(
         described(v.STUDY_VARIABLES, values),
         described(v.STUDY_COORDINATES, values),
@@ -274,28 +285,28 @@ def outlines_in(
     return {v.OUTLINE_Y: vertices[:, 0], v.OUTLINE_Z: vertices[:, 1]}
 
 
-def status_codes(dataset: xarray.Dataset) -> dict[str, int]:
+def status_codes(dataset: Result) -> dict[str, int]:
     """Meaning → code of ``status``, in the order of the codes."""
     attributes = dataset[v.STATUS].attrs
     return dict(zip(attributes["flag_meanings"].split(), attributes["flag_values"].tolist(), strict=True))
 
 
-def passed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+def passed(dataset: Result) -> NDArray[np.bool_]:
     """Whether each core passed the plate, shape (hit,): it perforated the plate or missed its material."""
     return np.isin(dataset[v.STATUS].values, [Status.PERFORATED, Status.MISSED])
 
 
-def failed(dataset: xarray.Dataset) -> NDArray[np.bool_]:
+def failed(dataset: Result) -> NDArray[np.bool_]:
     """Whether the computation of each shot failed, shape (hit,)."""
     return np.isin(dataset[v.STATUS].values, [status for status in Status if status.failed])
 
 
-def shots_at_a_plate(dataset: xarray.Dataset) -> int:
+def shots_at_a_plate(dataset: Result) -> int:
     """How many hits in a row are on one plate; 1 without bursts."""
     return int(dataset.attrs.get(attr.SHOTS_AT_A_PLATE, 1))
 
 
-def images(dataset: xarray.Dataset) -> int:
+def images(dataset: Result) -> int:
     """How many hits in a row are images of each other; 1 without `hits.irreducible`."""
     told = dataset.attrs
     if attr.IMAGES in told or attr.SYMMETRIES not in told:

@@ -9,16 +9,20 @@ import shutil
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import netCDF4
-import xarray
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.checks import fault, unusable
+from warpimpact.results.checks import fault, history_fault, packing_fault, study_fault, unusable
 from warpimpact.results.dataset import numbered
 from warpimpact.results.interrupts import uninterrupted
+from warpimpact.results.netcdf import read_table, write_table
+from warpimpact.results.table import Table
+
+if TYPE_CHECKING:
+    import xarray
 
 
 class OutputError(OSError):
@@ -29,30 +33,35 @@ class ResultError(ValueError):
     """A file that cannot be read as a warpimpact result; the message is one sentence for the user."""
 
 
-def write(
-    dataset: xarray.Dataset, path: Path, *, named: Callable[[Path], Path] | None = None, compressed: bool = True
-) -> None:
+def write(dataset: xarray.Dataset, path: Path) -> None:
     """Write the Dataset to a netCDF file, whole or not at all; an existing file is replaced.
-
-    Args:
-        named: gives the name of what was written, by its contents, in place of `path`.
-        compressed: smaller, at the cost of some time.
 
     Raises:
         OutputError: The file cannot be written; what was there before is untouched.
     """
+    with uninterrupted(), aside(path) as file:
+        _write(dataset, file)
+
+
+def write_shard(table: Table, path: Path, named: Callable[[Path], Path]) -> None:
+    """Write a part of a result to a netCDF file, whole or not at all, without compression, which costs time.
+
+    Args:
+        path: its name while it is written.
+        named: gives the name of what was written, by its contents.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
     with uninterrupted(), aside(path, named=named) as file:
-        _write(dataset, file, compressed=compressed)
+        write_table(table, file, compressed=False)
 
 
-def _write(
-    dataset: xarray.Dataset, file: Path, *, chunk: int | None = None, compressed: bool = True, **options: Any
-) -> None:
+def _write(dataset: xarray.Dataset, file: Path) -> None:
     """Write a Dataset, with the coordinates that have a group of their own in it."""
     groups = {group: [name for name in names if name in dataset.coords] for group, names in v.GROUPS.items()}
     hits = dataset.drop_vars([name for names in groups.values() for name in names])
-    options = {"format": "NETCDF4", "engine": "netcdf4"} | options
-    hits.to_netcdf(file, encoding=_encoding(hits, chunk=chunk, compressed=compressed), **options)
+    hits.to_netcdf(file, encoding=_encoding(hits), format="NETCDF4", engine="netcdf4")
     for group, names in groups.items():
         if names:
             inner = dataset[names].reset_coords(names).drop_attrs(deep=False)
@@ -80,9 +89,9 @@ def join(parts: Sequence[Path], path: Path, attributes: Mapping[str, Any]) -> No
             hits += len(source.dimensions["hit"])
     with aside(path, parts[0].parent) as file:
         with uninterrupted():
-            dataset = read(parts[0]).assign_attrs(attributes).drop_encoding()
-            _write(dataset, file, chunk=min(hits, CHUNK), unlimited_dims=["hit"])
-        at = dataset.sizes["hit"]
+            table = read_table(parts[0]).assign_attrs(attributes)
+            write_table(table, file, chunk=min(hits, CHUNK))
+        at = table.sizes["hit"]
         with netCDF4.Dataset(file, "a") as joined:
             joined.set_auto_maskandscale(False)
             for variable in joined.variables.values():
@@ -103,20 +112,15 @@ def _append(joined: Any, part: Path, at: int) -> int:
     return end
 
 
-def _encoding(
-    dataset: xarray.Dataset, *, chunk: int | None = None, compressed: bool = True
-) -> dict[str, dict[str, Any]]:
-    """How variables are stored: compressed, and with `chunk` hits per chunk if that is given."""
+def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:
+    """How variables are stored: compressed."""
     encoding: dict[str, dict[str, Any]] = {
         str(name): {"zlib": True, "complevel": 1}
         for name, array in dataset.variables.items()
-        if compressed and array.dtype.kind in "if"  # netCDF compresses no strings
+        if array.dtype.kind in "if"  # netCDF compresses no strings
     }
     for name in dataset.coords:
         encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
-    for name, array in dataset.variables.items():
-        if chunk and "hit" in array.dims:
-            encoding[str(name)]["chunksizes"] = (chunk, *array.shape[1:])
     return encoding
 
 
@@ -226,7 +230,10 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 f'{path}: not a warpimpact result, it has no attribute "{attr.PLATE_PERIOD}"; where it was chosen from '
                 "one, keep its attributes"
             )
-        if not is_history(dataset):
+        if is_history(dataset):
+            if found := history_fault(dataset):
+                raise ResultError(f"{path}: not the history of a hit, or damaged: {found}")
+        else:
             if found := unusable(dataset):
                 raise ResultError(f"{path}: {found}")
             optional = (
@@ -237,6 +244,7 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 *v.LAYER_VARIABLES,
                 *v.LAYER_STANDOFF_VARIABLES,
                 *v.LAYER_FACES,
+                *(name for names in v.GROUPS.values() for name in names),
             )
             _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
         yield dataset
@@ -265,7 +273,8 @@ def read_study(path: Path) -> xarray.Dataset:
         missing = {*v.STUDY_COORDINATES, *v.STUDY_VARIABLES} - dataset.variables.keys()
         if missing:
             raise ResultError(f'{path}: not a study of warpimpact, it has no variable "{min(missing)}"')
-        _check(dataset, path, (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES))
+        if found := study_fault(dataset):
+            raise ResultError(f"{path}: not a study of warpimpact, or damaged: {found}")
         return dataset.load()
 
 
@@ -293,6 +302,8 @@ def _netcdf(path: Path) -> Iterator[xarray.Dataset]:
             needed, size = dataset.nbytes, path.stat().st_size
             if needed > 2**20 + _MOST_PACKED * size:
                 raise ResultError(f"{path}: damaged: it has {size} bytes, but declares {needed} of data")
+            if found := packing_fault(dataset):
+                raise ResultError(f"{path}: damaged: {found}")
             yield dataset
     except RuntimeError as error:
         if not str(error).startswith("NetCDF"):
@@ -320,6 +331,8 @@ def _joined(path: Path) -> xarray.Dataset:
     Numbers of hits have no index, which would be in memory as a whole. Files of version 0.1.0 have no groups; theirs
     are variables of the root.
     """
+    import xarray
+
     root = xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False)
     with netCDF4.Dataset(path) as file:
         groups = [group for group in v.GROUPS if group in file.groups]

@@ -13,10 +13,11 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import described, hit_numbers
 
 if TYPE_CHECKING:
+    from warpimpact.results.table import AResult
     from warpimpact.solver.limit import Limits
 
 
-def with_limits(dataset: xarray.Dataset, quantity: str, limits: Limits, images: int) -> xarray.Dataset:
+def with_limits(dataset: AResult, quantity: str, limits: Limits, images: int) -> AResult:
     """The Dataset of shots that just perforate, with their limits.
 
     Args:
@@ -29,7 +30,7 @@ def with_limits(dataset: xarray.Dataset, quantity: str, limits: Limits, images: 
     return dataset.assign(described(names, values))
 
 
-def with_solid_limits(dataset: xarray.Dataset, quantity: str, limits: Limits) -> xarray.Dataset:
+def with_solid_limits(dataset: AResult, quantity: str, limits: Limits) -> AResult:
     """The Dataset with the limits of its first shots at the solid plate, as coordinates."""
     name = v.SOLID_LIMITS[quantity]
     return dataset.assign_coords(described((name,), {name: limits.value}))

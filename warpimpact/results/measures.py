@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
@@ -17,6 +16,9 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
+
+if TYPE_CHECKING:
+    from warpimpact.results.table import Result
 
 Array = NDArray[np.float64]
 
@@ -126,17 +128,17 @@ class Measure:
         """An SI value in the units of the Dataset."""
         return _shown(self.units, value)
 
-    def values(self, dataset: xarray.Dataset) -> Array:
+    def values(self, dataset: Result) -> Array:
         """The number of every shot, shape [hits]; NaN for a shot that does not count."""
         if self.kind == "share" and self.variable == v.BROKEN:
             return np.asarray(dataset[v.BROKEN].values, dtype=np.float64)  # NaN of a failed shot
         if self.kind == "share":
             return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
-        column = dataset[self.variable]
+        column = np.asarray(dataset[self.variable].values)
         if self.standoff is not None:
-            column = column.sel(standoff=self.standoff, method="nearest")
+            column = column[:, np.abs(dataset[v.STANDOFF].values - self.standoff).argmin()]
         counts = ~failed(dataset) if self.variable in v.LIMIT_VARIABLES else passed(dataset)
-        values = np.where(counts, column.values.astype(np.float64), np.nan)
+        values = np.where(counts, column.astype(np.float64), np.nan)
         if self.kind == "mean":
             return np.where(np.isinf(values), np.nan, values)  # a limit beyond the largest value tried
         if self.kind != "probability":
@@ -162,7 +164,7 @@ class Tally:
         kind = "share" if measure.is_binary else measure.kind
         self.measure, self._dealt = measure, Dealt(kind, share=measure.share, **dealt)
 
-    def add(self, dataset: xarray.Dataset) -> None:
+    def add(self, dataset: Result) -> None:
         """Add the next shots."""
         self._dealt.add(self.measure.values(dataset))
 
@@ -171,7 +173,7 @@ class Tally:
         return self._dealt.estimate()
 
 
-def dealing(dataset: xarray.Dataset) -> dict[str, Any]:
+def dealing(dataset: Result) -> dict[str, Any]:
     """Arguments of `Dealt` that fit the sampling of a result. The shots at one plate count as one, like images. Chosen
     hits are no longer dealt out in turn."""
     if is_choice(dataset):

@@ -12,13 +12,17 @@ best                      the set of smallest misfit
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import netCDF4
-import xarray
 
 from warpimpact.results import attributes as attr
+from warpimpact.results.checks import draws_fault, posterior_fault
 from warpimpact.results.files import ResultError, aside
 from warpimpact.results.interrupts import uninterrupted
+
+if TYPE_CHECKING:
+    import xarray
 
 GROUPS = (
     "posterior",
@@ -59,8 +63,11 @@ def write(tree: xarray.DataTree, path: Path) -> None:
         tree.to_netcdf(file, engine="netcdf4", format="NETCDF4")
 
 
-def read(path: Path) -> xarray.DataTree:
+def read(path: Path, *, draws_alone: bool = False) -> xarray.DataTree:
     """Read a posterior into memory.
+
+    Args:
+        draws_alone: whether its draws are all that is needed of it.
 
     Raises:
         ResultError: the file is missing, is not netCDF, or is no posterior.
@@ -77,6 +84,13 @@ def read(path: Path) -> xarray.DataTree:
     if missing or untold:
         what = f'group "{missing[0]}"' if missing else f'attribute "{untold[0]}"'
         raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
+    groups = {name: loaded[name].to_dataset() for name in GROUPS}
+    if draws_alone:
+        found = draws_fault(groups["posterior"].drop_vars(HITS, errors="ignore"), loaded.attrs)
+    else:
+        found = posterior_fault(groups, loaded.attrs)
+    if found:
+        raise ResultError(f"{path}: not a posterior of warpimpact identify, or damaged: {found}")
     return loaded
 
 
@@ -86,6 +100,8 @@ def _loaded(path: Path) -> xarray.DataTree:
     Each is closed before the next one opens. A tree that stays open is closed when Python collects it, in the middle of
     another access, which crashes netCDF.
     """
+    import xarray
+
     with netCDF4.Dataset(path) as file:
         names = list(file.groups)
     groups = {name: xarray.load_dataset(path, group=name, engine="netcdf4") for name in names}

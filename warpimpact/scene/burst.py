@@ -43,7 +43,7 @@ class Burst(Scattering):
 
     count: Annotated[int, Field(strict=True, ge=2, le=100)]
     spacing: Annotated[AnyDistribution | None, Field(json_schema_extra=_or_one_length)] = None
-    offsets: tuple[tuple[Length, Length], ...] | None = None
+    offsets: Annotated[tuple[tuple[Length, Length], ...], Field(fail_fast=True)] | None = None
     scatter: Annotated[
         tuple[_NonNegativeLength, _NonNegativeLength] | None, Field(json_schema_extra=_or_one_length)
     ] = None

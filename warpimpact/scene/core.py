@@ -162,7 +162,7 @@ class PolynomialCore(Core):
     """
 
     shape: Literal["polynomial"] = "polynomial"
-    coefficients: tuple[Number, ...] = Field(min_length=1, max_length=16)
+    coefficients: tuple[Number, ...] = Field(fail_fast=True, min_length=1, max_length=16)
     length: PositiveLength
 
     @model_validator(mode="after")
@@ -289,8 +289,8 @@ class ProfileCore(Core):
     """
 
     shape: Literal["profile"] = "profile"
-    s: tuple[Length, ...] = Field(min_length=2)
-    r: tuple[Length, ...] = Field(min_length=2)
+    s: tuple[Length, ...] = Field(fail_fast=True, min_length=2)
+    r: tuple[Length, ...] = Field(fail_fast=True, min_length=2)
 
     @model_validator(mode="before")
     @classmethod

@@ -47,6 +47,9 @@ class Numerics(_AsGiven):
             mirrored outcomes.
         grid_spacing: spacing of the plate grid [m].
         precision: of the arithmetic.
+        layout: of the work on a CUDA device. "simple" computes a shot per thread. "block" computes a shot per block of
+            32 threads, with its window of the plate in shared memory; no device has measured it yet. It computes single
+            plates in single precision, one hit each, without the bending moment.
         tolerance: replaces the fidelity: each hit is refined until its estimated error is within the tolerance.
     """
 
@@ -57,6 +60,7 @@ class Numerics(_AsGiven):
     patches_around: Annotated[int, Field(strict=True, ge=8, le=4096, multiple_of=4)] | None = None
     grid_spacing: PositiveLength | None = None
     precision: Literal["single", "double"] | None = None
+    layout: Literal["simple", "block"] = "simple"
     tolerance: Tolerance | None = None
 
     @property
@@ -68,7 +72,7 @@ class Numerics(_AsGiven):
 
     @model_validator(mode="after")
     def _tolerance_chooses(self) -> Self:
-        chosen = self.model_fields_set - {"tolerance", "precision"}
+        chosen = self.model_fields_set - {"tolerance", "precision", "layout"}
         if self.tolerance is not None and chosen:
             raise ValueError(f"got {min(chosen)} beside tolerance, but a tolerance sets the resolution itself")
         return self

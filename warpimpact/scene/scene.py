@@ -26,8 +26,8 @@ class Record(Model):
         bending: whether the largest bending moment and stress of each core are reported.
     """
 
-    standoffs: Annotated[tuple[PositiveLength, ...], Field(max_length=64)] = ()
-    layer_standoffs: Annotated[tuple[PositiveLength, ...], Field(max_length=64)] = ()
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = ()
+    layer_standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = ()
     standoff_point: Literal["centre_of_mass", "nose"] = "centre_of_mass"
     bending: Annotated[bool, Field(strict=True)] = False
 

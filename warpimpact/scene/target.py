@@ -44,7 +44,7 @@ class Target(Model):
     """
 
     plate: Plate
-    layers: Annotated[tuple[Layer, ...], Field(max_length=MOST_LAYERS)] = ()
+    layers: Annotated[tuple[Layer, ...], Field(fail_fast=True, max_length=MOST_LAYERS)] = ()
 
     @field_validator("plate")
     @classmethod

@@ -13,6 +13,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, Wi
 
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
+_LARGEST = 1e30
+"""Of a quantity in SI: what is computed of it, such as a volume, stays finite."""
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
 """Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
 _STRING = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$"
@@ -56,6 +58,8 @@ class _Quantity:
             raise self._error(value, f"which is not {self.name}")
         if not math.isfinite(number):
             raise self._error(value, "which is not finite")
+        if abs(number) > _LARGEST:
+            raise self._error(value, f"which is more than {_LARGEST:g}")
         return self.as_read(number)
 
     def as_read(self, number: float) -> float:

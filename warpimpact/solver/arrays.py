@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.bending import Sections, check_bending, sections_of
+from warpimpact.solver.blocks import SIMPLE_ONLY, check_layout, in_blocks
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
@@ -48,6 +49,11 @@ class Grid:
     half_size: tuple[float, float]
     spacing: float
     taps: Array
+
+    @property
+    def reach(self) -> int:
+        """Reach of the filter [nodes], at least 1."""
+        return max(1, len(self.taps) - 2)
 
 
 @dataclass(frozen=True)
@@ -114,7 +120,8 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         traced: leave room for the history of every shot.
 
     Raises:
-        ValueError: the numerics have no bending moment, which the scene records.
+        ValueError: the numerics have no bending moment, which the scene records, or the block layout does not compute
+            the scene.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
     core, target, record = scene.core, scene.target, scene.record
@@ -124,7 +131,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
     conditions = _conditions(scene, resolution, shots, materials)
-    return Arrays(
+    arrays = Arrays(
         resolution=resolution,
         variant=variant_of(resolution, scene, shots),
         core=core,
@@ -142,6 +149,10 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
         ahead=record.ahead(core),
     )
+    if resolution.block:
+        check_layout(**{name: getattr(arrays.variant, name) for name in SIMPLE_ONLY})
+        return in_blocks(arrays, shots)
+    return arrays
 
 
 def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:

@@ -81,6 +81,12 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def block_size(kernel: Any, device: Any) -> int:
+    """Threads of a block: on CUDA those of the layout, on a CPU 1 unless Warp is told to run blocks there."""
+    lanes: int = kernel.options.get("launch_bounds", (256,))[0]
+    return lanes if device.is_cuda or wp.config.enable_cpu_blocks else 1
+
+
 def load(kernel: Any, device: Any) -> None:
     """Load a kernel on a device for launches with Warp's own block size; compile it if it is not cached.
 
@@ -88,7 +94,7 @@ def load(kernel: Any, device: Any) -> None:
     compiles again at the launch.
     """
     begin = time.perf_counter()
-    kernel.module.load(device, 1 if device.is_cpu else 256)
+    kernel.module.load(device, block_size(kernel, device))
     _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)
 
 

@@ -108,21 +108,34 @@ class Inputs:
 
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
     """The Surface (kernels/core_surface.py) of a core in rings of patches."""
-    surface, area = struct(), np.hypot(rings.area_axial, rings.area_radial)
+    surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
+    azimuth = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
     values = {name: getattr(rings, name) for name in _OF_A_RING} | {
         "area": area,
         "normal_axial": rings.area_axial / area,
         "normal_radial": rings.area_radial / area,
-        "cosine": np.cos(azimuths),
-        "sine": np.sin(azimuths),
+        "cosine": np.cos(azimuth),
+        "sine": np.sin(azimuth),
     }
+    values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
     for name, array in values.items():
         setattr(surface, name, put(array))
-    surface.rings, surface.around = len(rings.station), len(azimuths) // 2
+    surface.rings, surface.around = len(area), around
     surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
     return surface
 
 
+_OF_A_PATCH = (
+    "station",
+    "radius",
+    "area",
+    "normal_axial",
+    "normal_radial",
+    "half_axial",
+    "half_radial",
+    "turn_axial",
+    "turn_radial",
+)
 _OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
 
 
@@ -134,7 +147,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.period_y, plate.period_z = grid.period
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
-    plate.taps, plate.reach = put(grid.taps), max(1, len(grid.taps) - 2)
+    plate.taps, plate.reach = put(grid.taps), grid.reach
     return plate
 
 

@@ -20,7 +20,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.refinement import picked, with_rows
-from warpimpact.solver.resolution import FIDELITIES, Fidelity
+from warpimpact.solver.resolution import FIDELITIES, Fidelity, computed_as
 from warpimpact.solver.simulate import Outcomes, simulate
 
 Array = NDArray[np.float64]
@@ -159,7 +159,7 @@ def _in_short_steps(numerics: Numerics | Fidelity | None) -> Numerics | Fidelity
     numerics = numerics or Numerics()
     if isinstance(numerics, Fidelity) or numerics.explicit is not None:
         return numerics
-    return replace(short_steps(FIDELITIES[numerics.fidelity]), double=numerics.precision == "double")
+    return computed_as(short_steps(FIDELITIES[numerics.fidelity]), numerics)
 
 
 def check_arrests(scene: Scene, shots: Shots | None = None) -> None:

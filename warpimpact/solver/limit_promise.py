@@ -58,10 +58,12 @@ def keep_limits(search: Callable[[Fidelity], Limits], numerics: Numerics, *, squ
     share, first = PROMISED[numerics.fidelity]
     known: dict[int, Limits] = {}
     for index in range(first, FINEST + 1):
-        for needed in (index, index + 1):
+        finer = min(index + 2, FINEST + 1)  # neighbours err alike
+        for needed in (index, finer):
             if needed not in known:
                 known[needed] = search(short_steps(level(needed, numerics)))
-        error, typical = _error(known[index], known[index + 1])
+        change, typical = _change(known[index], known[finer])
+        error = MARGIN[finer - index] * change
         kept = error <= (2.0 * share if squared else share) * typical
         if kept or index == FINEST:
             break
@@ -69,12 +71,12 @@ def keep_limits(search: Callable[[Fidelity], Limits], numerics: Numerics, *, squ
     return LimitPromise(short_steps(level(index, numerics)), bool(kept), error, shown)
 
 
-def _error(coarse: Limits, fine: Limits) -> tuple[float, float]:
-    """The change that 90 % of the limits stay within, but for `promise.RISK`, times its margin, and their median."""
+def _change(coarse: Limits, fine: Limits) -> tuple[float, float]:
+    """The change that 90 % of the limits stay within, but for `promise.RISK`, and their median."""
     same = (coarse.value == fine.value) | (np.isnan(coarse.value) & np.isnan(fine.value))
     with np.errstate(invalid="ignore"):
         change = np.where(same, 0.0, np.abs(coarse.value - fine.value))
     change[np.isnan(change)] = math.inf
     finite = fine.value[np.isfinite(fine.value)]
     place = upper_place(len(change)) - 1
-    return MARGIN[1] * float(np.sort(change)[place]), float(np.median(finite)) if len(finite) else 0.0
+    return float(np.sort(change)[place]), float(np.median(finite)) if len(finite) else 0.0

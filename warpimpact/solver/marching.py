@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
 from typing import Any
@@ -18,11 +19,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels import free_flight
+from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
-from warpimpact.solver.arrays import arrays_of
+from warpimpact.solver.arrays import Arrays, arrays_of
 from warpimpact.solver.bending import bending_columns
+from warpimpact.solver.blocks import first_window
 from warpimpact.solver.bursts import (
     bytes_of,
     check_bursts,
@@ -48,9 +51,6 @@ CPU_CHUNK = 64
 CPU_LAUNCH = 0.25
 """Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
 CUDA_CHUNK = 65536
-WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
-"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
-its fine grid, large windows cost more time than the repetition of some shots."""
 MAX_DOUBLINGS = 6
 """Largest number of times that the windows are doubled for the shots that left theirs."""
 MEMORY_SHARE = 0.5
@@ -75,17 +75,21 @@ class March:
         traced: bool = False,
     ) -> None:
         self.scene, self.shots, self.device = scene, shots, device
-        self.threads = threads or cores()
+        self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
         check_bursts(shots, numerics)
-        self.arrays = arrays_of(scene, numerics, shots, traced=traced)
-        self.inputs = Inputs(self.arrays, device)
-        self.variant, self.stage = self.arrays.variant, self.inputs.stage
+        self._take(arrays_of(scene, numerics, shots, traced=traced))
         self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
-        self.bending = wp.empty(len(shots) if self.variant.bends else 0, dtype=self.stage.Bending, device=device)
-        free = scene.record.flies_free(scene.core, scene.target)
-        self.passages = Passages(self.stage, len(shots), free, self.variant, device)
         self.cells = self._window_cells()
+
+    def _take(self, arrays: Arrays) -> None:
+        """Put the arrays on the device, with what their build of the kernels fills besides the outcomes."""
+        self.arrays, count = arrays, len(self.shots)
+        self.inputs = Inputs(arrays, self.device)
+        self.variant, self.stage = arrays.variant, self.inputs.stage
+        self.bending = wp.empty(count if self.variant.bends else 0, dtype=self.stage.Bending, device=self.device)
+        free = self.scene.record.flies_free(self.scene.core, self.scene.target)
+        self.passages = Passages(self.stage, count, free, self.variant, self.device)
 
     def march(self, progress: Progress | None = None) -> Any:
         """March all shots; repeat those that leave their window in wider windows."""
@@ -98,10 +102,16 @@ class March:
             pending = whole_plates(outcomes.status.numpy() == Status.LEFT_WINDOW, self.at_a_plate)
             if not len(pending) or not self._fits(2 * self.cells[0], 2 * self.cells[1]):
                 break
-            self.cells = (2 * self.cells[0], 2 * self.cells[1])
+            self._widen()
         outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
         progress(count, count)
         return outcomes
+
+    def _widen(self) -> None:
+        """Double the windows; those that do not fit a block are for the simple layout."""
+        self.cells = (2 * self.cells[0], 2 * self.cells[1])
+        if 0 < self.variant.window < math.prod(self.cells):
+            self._take(replace(self.arrays, variant=replace(self.variant, window=0)))
 
     def traces(self, contact: Any) -> list[Array]:
         """The trace of every shot of a traced march, with the state at its end."""
@@ -183,17 +193,8 @@ class March:
         return filled
 
     def _window_cells(self) -> tuple[int, int]:
-        """Cells of a window that holds the footprint of a core that keeps its attitude through the plate."""
-        shots, arrays = self.shots, self.arrays
-        slack = NODAL_SLACK if self.variant.nodal else WINDOW_SLACK
-        steepest = float(shots.obliquity.max())
-        turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
-        half = (
-            slack * arrays.core.max_radius / math.cos(steepest)
-            + float(arrays.shots["thickness"].max()) * math.tan(steepest)
-            + arrays.core.bounding_radius * turned
-        )
-        cells_y = cells_z = 2 * (math.ceil(half / arrays.grid.spacing) + 2 * self.inputs.plate.reach + 3)
+        """Cells of a first window, or what memory allows."""
+        cells_y = cells_z = first_window(self.arrays, self.shots)
         while not self._fits(cells_y, cells_z):  # a shot that leaves a smaller window ends as LEFT_WINDOW
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
@@ -218,6 +219,8 @@ class March:
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
+        if self.variant.window and self.device.is_cuda:  # the others are in shared memory
+            return ["filtered"] if self._keeps_fields else []
         return [name for name in self.stage.Fields.vars if name not in ("cells_y", "cells_z") and self._keeps_fields]
 
     @property
@@ -269,9 +272,11 @@ class March:
     ) -> int:
         """March `count` shots from order[first] on; returns `count`."""
         inputs = self.inputs
-        wp.launch(
+        launch = partial(wp.launch, dim=count)
+        if self.variant.window:
+            launch = partial(wp.launch_tiled, dim=[count], block_dim=LANES)
+        launch(
             self.stage.kernel,
-            count,
             inputs=[
                 first,
                 slots,

@@ -15,11 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.kernels.status import Status
 from warpimpact.scene import Numerics, Scene, Shots, Tolerance
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.refinement import Change
 from warpimpact.solver.resolution import LADDER, Fidelity, level
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
+
+Array = NDArray[np.float64]
 
 _logger = logging.getLogger(__name__)
 
@@ -29,6 +31,11 @@ are enough shots for that."""
 MARGIN = {1: 2.0, 2: 1.4}
 """Factor of an estimate by the number of levels to the finer one. In 40 random scenes, 83 to 98 % of the
 estimates are then at least the 90th percentile that other hits show (tests/benchmarks/random_scenes.py)."""
+
+
+SLOW = 0.25
+"""Share of the impact velocity below which an error counts less, in proportion to the speed. The energy is computed to
+some accuracy, E = m v²/2, so the error of a speed near 0 has no bound. As it counts, it is that of the energy."""
 
 
 class Named(NamedTuple):
@@ -56,18 +63,23 @@ class Promise:
         fidelity: the numerics to compute all shots with.
         kept: whether the errors are within what the name promises.
         residual_velocity_error, tilt_error: upper estimates of the errors of 90 % of the shots [m/s] and [rad];
-            infinite where the pilot could not tell.
+            infinite where the pilot could not tell. Those of slow cores count less (SLOW). The residual velocities
+            behind all layers count.
+        depth_error: likewise, of the depth of the shots that stop in a layer [m]; NaN where none does.
     """
 
     fidelity: Fidelity
     kept: bool
     residual_velocity_error: float
     tilt_error: float
+    depth_error: float = math.nan
 
     @property
     def phrase(self) -> str:
         """The errors, for a line of progress."""
         errors = f"{self.residual_velocity_error:.2g} m/s and {math.degrees(self.tilt_error):.2g} deg"
+        if math.isfinite(self.depth_error):
+            errors += f" and {1e3 * self.depth_error:.2g} mm of depth"
         return f"accuracy {errors} for 90 % of the hits{'' if self.kept else ', not as promised'}"
 
 
@@ -102,9 +114,9 @@ def keep(
                     )
         except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
             break
-        errors = MARGIN[finer - index] * _errors(known[index], known[finer])
+        errors = MARGIN[finer - index] * _errors(known[index], known[finer], pilot.velocity)
         kept = errors[0] <= tolerance.residual_velocity and errors[1] <= tolerance.tilt
-        found = Promise(level(index, numerics), bool(kept), float(errors[0]), float(errors[1]))
+        found = Promise(level(index, numerics), bool(kept), *(float(error) for error in errors))
         told = (index, float(errors[0]), math.degrees(errors[1]), "kept" if kept else "not kept")
         _logger.info("pilot at level %d: errors of %.2g m/s and %.2g deg, the promise is %s", *told)
         if kept:
@@ -112,12 +124,55 @@ def keep(
     return found
 
 
-def _errors(coarse: Outcomes, fine: Outcomes) -> NDArray[np.float64]:
-    """Changes of residual velocity [m/s] and last tilt [rad] that 90 % of all shots stay within, but for RISK."""
-    change = Change.between(coarse, fine)
-    last = change.tilt[:, -1] if change.tilt.shape[1] else np.zeros(len(change.tilt))
-    place = upper_place(len(last)) - 1
-    return np.array([np.sort(errors)[place] for errors in (change.residual_velocity, last)])
+def _errors(coarse: Outcomes, fine: Outcomes, impact: Array) -> Array:
+    """Changes of residual velocity [m/s], last tilt [rad] and depth [m] that 90 % of all shots stay within, but for
+    RISK. NaN if there is no depth."""
+    velocity, tilt, depth = changes(coarse, fine, impact)
+    depth = depth[np.isfinite(depth)]
+    return np.array([_upper(errors) if len(errors) else math.nan for errors in (velocity, tilt, depth)])
+
+
+def _upper(errors: Array) -> float:
+    return float(np.sort(errors)[upper_place(len(errors)) - 1])
+
+
+def changes(coarse: Outcomes, fine: Outcomes, impact: Array) -> tuple[Array, Array, Array]:
+    """What changes between the outcomes of the same shots as it counts, each of shape [shots]: the residual velocity
+    [m/s], or that behind a layer if it changes by more; the tilt at the last stand-off [rad]; and the depth [m].
+
+    A core that does not leave the target, or a layer, has the speed 0 there; one that comes back has a negative one. A
+    tilt that only one of both has counts as half a turn. The first two are infinite where the computation of one alone
+    failed. The depth is NaN where the core does not stop in the same layer.
+
+    Args:
+        impact: velocities [m/s], shape [shots].
+    """
+    before, after = _speed(coarse), _speed(fine)
+    weight = _weight(before, after, impact)
+    failed = [one.status >= Status.UNFINISHED for one in (coarse, fine)]
+    velocity, tilt = weight * np.abs(after - before), np.zeros(len(impact))
+    if coarse.tilt.shape[1]:
+        last = coarse.tilt[:, -1], fine.tilt[:, -1]
+        neither = np.isnan(last[0]) & np.isnan(last[1])
+        tilt = np.where(neither, 0.0, weight * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
+    depth = np.full(len(impact), math.nan)
+    if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
+        before, after = (np.nan_to_num(one.layer_residual_velocity) for one in (coarse, fine))
+        apart = _weight(before, after, impact[:, None]) * np.abs(after - before)
+        velocity = np.maximum(velocity, apart.max(axis=1))
+        depth = np.where(coarse.stopped_in == fine.stopped_in, np.abs(fine.depth - coarse.depth), math.nan)
+    one_failed = failed[0] != failed[1]
+    return np.where(one_failed, math.inf, velocity), np.where(one_failed, math.inf, tilt), depth
+
+
+def _speed(outcomes: Outcomes) -> Array:
+    back = outcomes.status == Status.RICOCHETED
+    return np.nan_to_num(np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity))
+
+
+def _weight(one: Array, other: Array, impact: Array) -> Array:
+    """What an error between two speeds counts."""
+    return np.asarray(np.minimum(1.0, 0.5 * (np.abs(one) + np.abs(other)) / (SLOW * impact)))
 
 
 def upper_place(count: int) -> int:

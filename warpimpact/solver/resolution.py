@@ -27,6 +27,8 @@ class Fidelity:
     """Way per time step at impact velocity, as a share of the thickness of the plate, or of SLENDER times the
     core's length where the plate is thicker than that."""
     double: bool = False
+    block: bool = False
+    """Whether a block of threads computes a shot (kernels/block.py)."""
 
     @property
     def patch_width(self) -> float:
@@ -85,8 +87,13 @@ ONE_PLATE = "the nodal scheme knows one plate and no layers behind it; the consi
 
 
 def level(index: int, numerics: Numerics) -> Fidelity:
-    """A level of the ladder, in the precision of the numerics."""
-    return replace(LADDER[index], double=numerics.precision == "double")
+    """A level of the ladder, in precision and layout of the numerics."""
+    return computed_as(LADDER[index], numerics)
+
+
+def computed_as(fidelity: Fidelity, numerics: Numerics) -> Fidelity:
+    """A fidelity in precision and layout of the numerics."""
+    return replace(fidelity, double=numerics.precision == "double", block=numerics.layout == "block")
 
 
 @dataclass(frozen=True)
@@ -114,6 +121,8 @@ class Resolution:
     grid_spacing: float
     """In the plate [m]; in a layer in proportion to its degradation length."""
     double: bool
+    block: bool
+    """Whether a block of threads computes a shot."""
     patch_width: float
     """No ring is wider than this radially [m]."""
 
@@ -191,6 +200,7 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
     return Resolution(
         nodal=numerics.scheme == "nodal",
         double=fidelity.double if numerics.precision is None else numerics.precision == "double",
+        block=fidelity.block or numerics.layout == "block",
         travel=fidelity.travel,
         slender=SLENDER * core.length,
         way_along=ALONG * fidelity.travel * finest,
@@ -218,6 +228,7 @@ def spelt_out(fidelity: Fidelity, scene: Scene, impact: Impact) -> Numerics:
         patches_around=fidelity.patches_around,
         grid_spacing=plate.degradation_length / fidelity.cells_per_length,
         precision="double" if fidelity.double else "single",
+        **({"layout": "block"} if fidelity.block else {}),
     )
 
 

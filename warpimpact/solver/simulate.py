@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight
 from warpimpact.kernels import march as marching
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.arrays import variant_of
+from warpimpact.solver.arrays import arrays_of, variant_of
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
 from warpimpact.solver.layering import Weakened
@@ -105,7 +105,8 @@ class LayeredOutcomes(Outcomes):
             [shots, layers, stand-offs]. NaN where the core does not get there, or where free flight ends at the next
             layer (`Record.flies_free`).
         layer_standoff_pitch, layer_standoff_yaw: projected angles of the axis there [rad], of that shape.
-        stopped_in: the deepest layer that the core rests in, −1 for a core that does not rest in one, shape [shots].
+        stopped_in: the deepest layer that the core rests in, shape [shots]; −1 for a core that does not rest in one,
+            such as one that stays between two of them.
         depth: how far behind the front face of this layer any point of the core came [m], shape [shots]; else NaN.
     """
 
@@ -190,6 +191,8 @@ def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = 
     """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
     resolution = resolve(numerics or Numerics(), scene, shots.columns)
     variant = variant_of(resolution, scene, shots)
+    if resolution.block:  # the window is a part of this variant
+        variant = arrays_of(scene, numerics or Numerics(), shots).variant
     for stage in (marching, free_flight):
         load(stage.build(variant).kernel, find_device(device))
 

@@ -40,10 +40,7 @@ class Tile:
     @cached_property
     def clearance(self) -> Array:
         """Lower bound of every cell's distance from the material of the whole lattice [m], shape of `material`."""
-        # The search runs over blocks of cells. A block with any material is a wall. One period is searched amid eight
-        # others: no hole is wider than the period, so they contain the nearest wall.
-        from scipy.ndimage import distance_transform_edt  # a quarter of a second to import
-
+        # The search runs over blocks of cells. A block with any material is a wall.
         rows, columns = self.material.shape
         block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
         starts = [np.arange(0, count, size) for count, size in zip(self.material.shape, block, strict=True)]
@@ -51,8 +48,7 @@ class Tile:
         if not wall.any():
             return np.full((rows, columns), math.inf)
         widths = (self.dy * rows / len(starts[0]), self.dz * columns / len(starts[1]))
-        free = distance_transform_edt(~np.tile(wall, (3, 3)), sampling=widths)
-        own = free[len(starts[0]) : 2 * len(starts[0]), len(starts[1]) : 2 * len(starts[1])]
+        own = nearest_wall(wall, widths)
         # Two blocks are subtracted, as distances are from centre to centre and the last block of a period may be
         # narrower.
         kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
@@ -112,11 +108,27 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
         y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
         part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
     if not sharp:  # no running sum: its rounding would leave material in the middle of a hole
-        from scipy.ndimage import correlate1d
-
         for axis in range(2):
-            material = correlate1d(material, np.full(BLUR, 1.0 / BLUR), axis, mode="wrap")
+            beside = sum(np.roll(material, k, axis) + np.roll(material, -k, axis) for k in range(1, BLUR // 2 + 1))
+            material = (1.0 / BLUR) * material + (1.0 / BLUR) * beside
     return Tile(material, dy, dz)
+
+
+def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
+    """Distance [m] of every block of one period from the nearest wall of the lattice, centre to centre, for blocks of
+    these widths: first along z, then over all rows. At least one block is a wall.
+
+    scipy.ndimage has this, too, but a run would wait a quarter of a second for its import.
+    """
+    rows, columns = wall.shape
+    number, walls = np.arange(3 * columns), np.tile(wall, 3)
+    before = np.maximum.accumulate(np.where(walls, number, -math.inf), axis=1)
+    behind = np.minimum.accumulate(np.where(walls, number, math.inf)[:, ::-1], axis=1)[:, ::-1]
+    along = np.minimum(number - before, behind - number)[:, columns : 2 * columns] * widths[1]
+    nearest = np.full((rows, columns), math.inf)
+    for shift in range(-(rows // 2), rows // 2 + 1):
+        nearest = np.minimum(nearest, np.square(shift * widths[0]) + np.square(np.roll(along, shift, axis=0)))
+    return np.asarray(np.sqrt(nearest))
 
 
 def tent_taps(length: float, cell: float) -> Array:

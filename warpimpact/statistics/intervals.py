@@ -12,10 +12,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from warpimpact.statistics.student import student_quantile
 
 Array = NDArray[np.float64]
 
@@ -110,10 +113,10 @@ class Dealt:
 
     def _independent(self, sample: _Sample) -> tuple[float, float]:
         """Interval for independent shots; images of each other count as one."""
-        from scipy import stats  # half a second to import
-
         count = math.ceil(sample.count / self._images)
         if self._kind == "quantile":
+            from scipy import stats  # half a second to import
+
             tail = 0.5 * (1.0 - self._confidence)
             ends = stats.binom.ppf([tail, 1.0 - tail], count, self._share).astype(int)
             ordered = np.sort(sample.values)[:: self._images]
@@ -123,9 +126,7 @@ class Dealt:
                 float(ordered[high]) if high < count else math.nan,
             )
         if self._kind == "share":
-            successes = round(sample.mean * count)
-            interval = stats.binomtest(successes, count).proportion_ci(self._confidence, method="wilson")
-            return float(interval.low), float(interval.high)
+            return _wilson(round(sample.mean * count), count, self._confidence)
         if self._kind == "difference":
             return _matched(sample, count, self._confidence)
         if count < 2:
@@ -137,9 +138,16 @@ class Dealt:
 
 def _student(confidence: float, count: int) -> float:
     """Half width of the interval of a mean of `count` numbers, in units of their standard deviation."""
-    from scipy.special import stdtrit
+    return student_quantile(0.5 * (1.0 + confidence), count - 1) / math.sqrt(count)
 
-    return -float(stdtrit(count - 1, 0.5 * (1.0 - confidence))) / math.sqrt(count)
+
+def _wilson(successes: int, count: int, confidence: float) -> tuple[float, float]:
+    """Wilson's interval of a share."""
+    quantile = NormalDist().inv_cdf(0.5 * (1.0 + confidence))
+    share, padded = successes / count, count + quantile**2
+    middle = (successes + 0.5 * quantile**2) / padded
+    half = quantile * math.sqrt(count * share * (1.0 - share) + 0.25 * quantile**2) / padded
+    return (middle - half if successes else 0.0), (middle + half if successes < count else 1.0)
 
 
 def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, float]:

@@ -230,7 +230,7 @@ def test_the_proxy_beside_the_limit_thickness() -> None:
     """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
     campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
     job = LimitMap.of(campaign, "thickness")
-    dataset = job.compute(campaign, campaign.sampler().shots(0, 7), promise=None, device="cpu")
+    dataset = job.compute(campaign, campaign.sampler().shots(0, 7), promise=None, device="cpu").to_xarray()
     thickness, found = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
     assert found is not None
     assert found.inclination == pytest.approx([0, 15, 30, 45, 60, 75, 85])

@@ -111,6 +111,10 @@ def test_what_a_burst_does_not_take_is_refused_in_one_sentence() -> None:
     for change, sentence in (
         (("seed = 1", "seed = 1\nirreducible = true"), "got hits.irreducible = true beside burst"),
         (('fidelity = "draft"', 'scheme = "nodal"'), 'got numerics.scheme = "nodal" beside burst'),
+        (
+            ('fidelity = "draft"', 'fidelity = "draft"\nlayout = "block"'),
+            'got numerics.layout = "block" beside several shots at one plate, but it must be "simple"',
+        ),
         (('scatter = "5 mm"', 'scatter = "30 m"'), "but they are exact up to"),
         (('scatter = "5 mm"', 'scatter = "5 kg"'), "burst.scatter"),
     ):

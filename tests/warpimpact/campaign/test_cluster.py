@@ -1,5 +1,7 @@
 """Runs on a cluster of worker processes: the bits of a local run, even if a worker is killed during the run."""
 
+import io
+import logging
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -23,6 +25,24 @@ SCATTERED = (
     .replace('thickness = "4 mm"', 'thickness = { distribution = "uniform", low = "3.8 mm", high = "4.2 mm" }')
     .replace('"4 g"  ', '{ distribution = "normal", mean = "4 g", std = "50 mg" }  ')
 )
+LAYERED_LIMIT = """\
+title = "limits"
+core = { shape = "ogive", diameter = "6.17 mm", length = "27 mm", crh = 3.0, mass = "5.25 g" }
+[plate]
+thickness = "2 mm"
+resistance = "2 GPa"
+pattern = { shape = "circle", diameter = "5 mm", spacing = ["8 mm", "8 mm"] }
+[[layer]]
+gap = "10 mm"
+thickness = "4 mm"
+resistance = "3 GPa"
+[impact]
+velocity = "500 m/s"
+[hits]
+count = 300
+[numerics]
+fidelity = "draft"
+"""
 
 pytestmark = pytest.mark.usefixtures("small_shards")
 
@@ -78,6 +98,18 @@ def test_the_command_starts_workers_and_a_local_run_resumes_them(
     assert_same_bits(output, local)
 
 
+def test_limits_on_workers_are_those_of_a_local_search(
+    tmp_path: Path, assert_same_bits: Callable[[Path, Path], None]
+) -> None:
+    # Workers search their shards apart. The promise of the pilot goes to all of them.
+    path, output, local = tmp_path / "campaign.toml", tmp_path / "a.nc", tmp_path / "local.nc"
+    path.write_text(LAYERED_LIMIT, encoding="utf-8")
+    command = ["limit", str(path), "--quantity", "thickness", "--layer", "1", "--device", "cpu"]
+    assert main([*command, "-o", str(output), "--workers", "2"]) == 0
+    assert main([*command, "-o", str(local)]) == 0
+    assert_same_bits(output, local)
+
+
 def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
     cluster: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -111,6 +143,41 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
     team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
     with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
         run_to_file(campaign, output, team=team, progress=lose_it)
+
+
+@pytest.mark.parametrize("lost", ["unreachable", "closed"])
+@pytest.mark.parametrize("request_", ["nthreads", "submit"])
+def test_a_scheduler_that_is_lost_between_tasks_is_told(
+    lost: str, request_: str, campaign: Campaign, cluster: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client that has lost its scheduler raises one of these where it asks for anything."""
+    error = {
+        "unreachable": OSError("Timed out trying to connect to tcp://127.0.0.1:1 after 20 s"),
+        "closed": distributed.client.ClosedClientError("Client is closed"),
+    }[lost]
+
+    def lose_it(*_: object, **__: object) -> None:
+        raise error
+
+    def lose_all(_: Standing) -> None:
+        monkeypatch.setattr(distributed.Client, request_, lose_it)
+
+    team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")
+    with pytest.raises(ClusterError, match=r"was lost, perhaps killed .* continue with --resume"):
+        run_to_file(campaign, tmp_path / "a.nc", team=team, progress=lose_all)
+
+
+def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(campaign: Campaign, cluster: object) -> None:
+    said = io.StringIO()
+    handler = logging.StreamHandler(said)
+    logging.getLogger("distributed").addHandler(handler)
+    try:
+        with cluster_team(campaign, address=cluster.scheduler_address, device="cpu"):
+            logging.getLogger("distributed.client").error("Traceback (most recent call last)")
+        logging.getLogger("distributed.client").error("printed again")
+    finally:
+        logging.getLogger("distributed").removeHandler(handler)
+    assert said.getvalue() == "printed again\n"
 
 
 def test_workers_of_this_machine_listen_on_the_loopback(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -65,7 +65,7 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
     for hit in range(0, 64, 9):
         alone = compute(campaign, campaign.sampler().shots(hit, 1), promise=promise_in(whole), device="cpu")
         for name in OUTCOME_VARIABLES:
-            assert np.array_equal(alone[name][0], whole[name][hit], equal_nan=True), name
+            assert np.array_equal(alone[name].values[0], whole[name][hit], equal_nan=True), name
 
 
 OWN = {

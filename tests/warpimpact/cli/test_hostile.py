@@ -324,3 +324,37 @@ def test_a_result_file_with_flipped_bits_is_read_or_refused(
     path.write_bytes(data[: draw.randrange(len(data))] if cut else data)
     with suppress(ResultError):
         files.read(path)
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("coefficients = [3.0e-4, 0.24, -5.29]", "coefficients = [{}]"),
+        ('standoffs = ["50 mm", "130 mm"]', "standoffs = [{}]"),
+        ("staggered = true", "holes = [{}]"),
+        ("[impact]", "[burst]\ncount = 2\noffsets = [{}]\n\n[impact]"),
+    ],
+)
+def test_a_list_is_read_up_to_its_first_mistake(before: str, after: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A unit that nobody knows takes a millisecond to find unknown, and a list has room for 100,000 of them."""
+    read: list[str] = []
+
+    def factor(unit: str, si_unit: str) -> float:
+        read.append(unit)
+        raise LookupError(unit)
+
+    monkeypatch.setattr("warpimpact.scene.units._by_pint", factor)
+    listed = [f'"1 u{k}"' for k in range(1000)]
+    if "holes" in after or "offsets" in after:
+        listed = [f'["1 mm", {one}]' for one in listed]
+    assert before in BASE
+    text = BASE.replace(before, after.format(", ".join(listed)), 1)
+    with pytest.raises(CampaignError):
+        Campaign.from_text(text, name="a.toml", folder=Path())
+    assert len(set(read)) < 10
+
+
+def test_sizes_beyond_all_plates_are_refused() -> None:
+    text = BASE.replace('length = "12 mm"', 'length = "1e300 m"', 1)
+    with pytest.raises(CampaignError, match="which is more than 1e\\+30"):
+        Campaign.from_text(text, name="a.toml", folder=Path())

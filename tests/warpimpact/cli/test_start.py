@@ -2,6 +2,8 @@
 
 import json
 import subprocess
+import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -96,3 +98,29 @@ def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys:
     shown = capsys.readouterr().err
     assert told in shown
     assert untold not in shown
+
+
+INTERRUPTED = """
+import signal, sys
+signal.signal({0}, signal.default_int_handler)
+class Raising:
+    def find_spec(self, name, *_):
+        if name == "warpimpact.cli":
+            signal.raise_signal({0})
+sys.meta_path.insert(0, Raising())
+from warpimpact.__main__ import command
+sys.argv = ["warpimpact", "examples"]
+command()
+"""
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
+def test_a_signal_while_the_command_is_loaded_ends_it_in_a_sentence(name: str) -> None:
+    code = INTERRUPTED.format(f"signal.{name}")
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "warpimpact: interrupted\n")
+
+
+def test_the_command_listens_before_it_loads() -> None:
+    project = tomllib.loads((CAMPAIGNS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["scripts"]["warpimpact"] == "warpimpact.__main__:command"

@@ -11,10 +11,23 @@ import pytest
 from warpimpact import Campaign, run
 from warpimpact.campaign.compute import promise_in
 from warpimpact.campaign.replay import replay
-from warpimpact.scene import CirclePattern, Hits, Impact, Numerics, OgiveCore, Plate, Record, Scene, make_shots
+from warpimpact.kernels.status import Status
+from warpimpact.scene import (
+    CirclePattern,
+    Hits,
+    Impact,
+    Layer,
+    Numerics,
+    OgiveCore,
+    Plate,
+    Record,
+    Scene,
+    Target,
+    make_shots,
+)
 from warpimpact.solver import promise
-from warpimpact.solver.promise import MARGIN, PROMISES, RISK, keep, upper_place
-from warpimpact.solver.refinement import Change
+from warpimpact.solver.promise import MARGIN, PROMISES, RISK, SLOW, changes, keep, upper_place
+from warpimpact.solver.refinement import Change, picked
 from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import Outcomes, simulate
 
@@ -128,6 +141,60 @@ def test_a_result_tells_its_promise_and_replays_on_its_level(hits: str) -> None:
 def test_a_single_setting_promises_nothing() -> None:
     campaign = Campaign.from_text(CAMPAIGN + "patches_axial = 20\n", name="t", folder=Path())
     assert not {"promise_kept", "resolution", "tilt_error_p90"} & run(campaign, device="cpu").attrs.keys()
+
+
+# Stops some of the cores, and lets others go on slowly.
+BASE = Layer(thickness=6.6e-3, resistance=5e9, gap=40e-3, shear_coefficient=0.08)
+STOPPING = SCENE.model_copy(update={"target": Target(plate=PLATE, layers=(BASE,))})
+
+
+def test_draft_tells_errors_that_other_hits_keep_where_a_base_stops_some_of_them() -> None:
+    pilot, others = (make_shots(IMPACT, Hits(count=64, seed=seed), PLATE) for seed in (5, 6))
+    found = keep(STOPPING, Numerics(fidelity="draft"), pilot, device="cpu")
+    coarse, fine = (simulate(STOPPING, others, numerics=one, device="cpu") for one in (found.fidelity, LADDER[7]))
+    assert 0.2 < (fine.status == Status.ARRESTED).mean() < 0.8
+    velocity, tilt, depth = changes(coarse, fine, others.velocity)
+    assert found.kept
+    assert LADDER.index(found.fidelity) <= 4
+    assert np.quantile(velocity, 0.9) <= found.residual_velocity_error
+    assert np.quantile(tilt, 0.9) <= found.tilt_error
+    assert np.nanquantile(depth, 0.9) <= found.depth_error < 2e-3
+    assert "mm of depth" in found.phrase
+
+
+def test_errors_of_slow_cores_are_those_of_their_energy(limit: Outcomes) -> None:
+    one, impact = picked(limit, np.arange(3)), np.full(3, 800.0)
+    speeds, back = np.array([600.0, 20.0, 20.0]), [Status.PERFORATED, Status.PERFORATED, Status.ARRESTED]
+    passed = replace(one, residual_velocity=speeds, status=np.zeros(3, dtype=np.int8))
+    stopped = np.where(np.array(back) == Status.ARRESTED, np.nan, one.tilt[:, -1])
+    slower = replace(
+        passed,
+        residual_velocity=np.array([599.0, 18.0, 0.0]),
+        tilt=np.stack([stopped + 0.01] * 2, axis=1),
+        status=np.array(back, dtype=np.int8),
+    )
+    velocity, tilt, depth = changes(replace(passed, tilt=np.stack([one.tilt[:, -1]] * 2, axis=1)), slower, impact)
+    energy = (speeds**2 - slower.residual_velocity**2)[1:] / (2.0 * SLOW * 800.0)
+    assert velocity == pytest.approx([1.0, *energy])
+    assert tilt == pytest.approx([0.01, 0.01 * 19.0 / 200.0, math.pi * 10.0 / 200.0])
+    assert np.isnan(depth).all()
+
+
+def test_fast_cores_count_as_they_are(limit: Outcomes) -> None:
+    coarse = simulate(SCENE, OTHERS, numerics=LADDER[1], device="cpu")
+    velocity, tilt, _ = changes(coarse, limit, OTHERS.velocity)
+    plain = Change.between(coarse, limit)
+    assert limit.residual_velocity.min() > SLOW * 820.0
+    np.testing.assert_array_equal(velocity, plain.residual_velocity)
+    np.testing.assert_array_equal(tilt, plain.tilt[:, -1])
+
+
+def test_a_failed_computation_has_no_bound(limit: Outcomes) -> None:
+    one = picked(limit, np.arange(2))
+    failed = replace(one, status=np.array([Status.UNFINISHED, one.status[1]], dtype=np.int8))
+    velocity, tilt, _ = changes(one, failed, np.full(2, 820.0))
+    assert np.isinf([velocity[0], tilt[0]]).all()
+    assert velocity[1] == tilt[1] == 0.0
 
 
 def test_an_estimate_is_rarely_below_the_percentile_that_it_stands_for() -> None:

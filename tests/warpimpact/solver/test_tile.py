@@ -14,7 +14,7 @@ from warpimpact.scene import (
     SlotPattern,
     TrianglePattern,
 )
-from warpimpact.solver.tile import BLUR, FINER, SUBSAMPLES, tent_taps, tile_of
+from warpimpact.solver.tile import BLUR, FINER, SUBSAMPLES, nearest_wall, tent_taps, tile_of
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 PATTERNS = [
@@ -79,6 +79,16 @@ def test_tile_tells_material_from_holes_by_area() -> None:
     assert (tile.material[distance > 2.5e-3 + diagonal] == 1).all()
     assert ((tile.material > 0) & (tile.material < 1)).sum() > 8
     np.testing.assert_array_equal(tile.material, tile.material[::-1, ::-1])  # the pattern's own symmetry
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 7), (12, 1), (5, 4), (40, 31)])
+@pytest.mark.parametrize("share", [0.01, 0.3])
+def test_distances_from_walls_are_those_of_scipy(shape: tuple[int, int], share: float) -> None:
+    wall = np.random.default_rng(1).random(shape) < share
+    wall[0, 0] = True
+    rows, columns = shape
+    exact = ndimage.distance_transform_edt(~np.tile(wall, (3, 3)), sampling=(1e-4, 1.3e-4))
+    assert np.array_equal(nearest_wall(wall, (1e-4, 1.3e-4)), exact[rows : 2 * rows, columns : 2 * columns])
 
 
 def test_sharp_tile_takes_the_cells_centres() -> None:

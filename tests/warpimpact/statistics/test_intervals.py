@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from warpimpact.statistics.intervals import Dealt, estimate_of
+from warpimpact.statistics.student import student_quantile
 
 TRIALS = 500
 LEAST = 460  # 95 % of 500 trials: 475 ± 4.9, three standard deviations below
@@ -52,3 +54,17 @@ def test_replicates_of_one_shot_each_are_independent_shots(kind: str) -> None:
     assert estimate_of(kind, values, replicates=16) == estimate_of(kind, values)
     images = np.repeat(values, 4)
     assert estimate_of(kind, images, replicates=16, images=4) == estimate_of(kind, images, images=4)
+
+
+@pytest.mark.parametrize("freedom", [*range(1, 20), 50, 999, 1000, 1001, 10**6])
+def test_quantiles_of_student_are_those_of_scipy(freedom: int) -> None:
+    shares = [0.5, 0.6, 0.9, 0.975, 0.995, 0.99999]
+    found = [student_quantile(share, freedom) for share in shares]
+    assert found == pytest.approx(stats.t.ppf(shares, freedom), rel=1e-11, abs=1e-14)
+
+
+@pytest.mark.parametrize(("successes", "count"), [(0, 1), (1, 1), (0, 40), (3, 40), (40, 40), (70_000, 100_000)])
+def test_the_interval_of_a_share_is_wilsons(successes: int, count: int) -> None:
+    found = estimate_of("share", np.repeat([1.0, 0.0], [successes, count - successes]), confidence=0.9)
+    wilson = stats.binomtest(successes, count).proportion_ci(0.9, method="wilson")
+    assert (found.low, found.high) == pytest.approx((wilson.low, wilson.high), rel=1e-12, abs=1e-15)

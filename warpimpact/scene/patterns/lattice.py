@@ -45,7 +45,7 @@ class LatticePattern(Pattern):
 
     spacing: tuple[PositiveLength, PositiveLength]
     staggered: Annotated[bool, Field(strict=True)] = False
-    holes: Annotated[tuple[Place, ...], Field(min_length=1, max_length=_MOST_HOLES)] | None = None
+    holes: Annotated[tuple[Place, ...], Field(fail_fast=True, min_length=1, max_length=_MOST_HOLES)] | None = None
     rotation: Angle = 0.0
     _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
     """Size and margin of the plate that bounds the pattern; None if it is unbounded."""

@@ -1,0 +1,82 @@
+"""Exposure gained in a step as whole numbers: their sum is the same in every order, so lanes may add in any."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import warp as wp
+
+from . import interaction, lanes, plate_grid
+from .variant import Variant
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of whole numbers in a field of float32."""
+    real = variant.real
+    one, sheet, tiny = real(1.0), real(2.0**24), real(1.0e-30)
+    laws, grid, split = interaction.build(variant), plate_grid.build(variant), lanes.split(variant)
+    Law, Window, Box = laws.Law, grid.Window, grid.Box
+
+    @wp.func
+    def units(law: Law, window: Window, coarsest: real, velocity: real, dt: real):
+        """Units per exposure [1/s]: 2^24 for what one advancing sheet, or the coarsest patch, gives to a node. So the
+        rounding is that of float32, and 128 times as much still fits: a node lies below a few sheets of a core."""
+        patches = wp.max(one, coarsest * window.per_cell * window.per_cell)
+        return sheet / (wp.max(laws.exposure_in(law, dt, velocity), tiny) * patches)
+
+    # Bits are copied, because a compiler takes numbers of different types for different numbers.
+    @wp.func_native("""
+    assert(index >= 0 && index + stride + 1 < field.shape[0]);
+    const float high = amount * y, low = amount - high;
+    const auto add = [](float* at, float share) {
+    #if defined(__CUDA_ARCH__)
+        atomicAdd(reinterpret_cast<int*>(at), __float2int_rn(share));
+    #else
+        int held;
+        __builtin_memcpy(&held, at, 4);
+        held += (int)__builtin_rintf(share);
+        __builtin_memcpy(at, &held, 4);
+    #endif
+    };
+    float* const at = field.data + index;
+    add(at, low - low * z);
+    add(at + 1, low * z);
+    add(at + stride, high - high * z);
+    add(at + stride + 1, high * z);
+    """)
+    def scatter(
+        field: wp.array(dtype=wp.float32),
+        stride: wp.int32,
+        index: wp.int32,
+        y: wp.float32,
+        z: wp.float32,
+        amount: wp.float32,
+    ):
+        """Distribute an amount over four nodes, as `exposure.scatter` does, in whole numbers."""
+        ...
+
+    @wp.func_native(
+        split("""
+    assert(start >= 0 && start + count <= field.shape[0]);
+    for (int j = 0; j < count; ++j) {
+    #if defined(__CUDA_ARCH__)
+        const int held = __float_as_int(field.data[start + j]);
+    #else
+        int held;
+        __builtin_memcpy(&held, field.data + start + j, 4);
+    #endif
+        field.data[start + j] = (float)held * unit;
+    }
+    """)
+    )
+    def convert(field: wp.array(dtype=wp.float32), start: wp.int32, count: wp.int32, unit: wp.float32):
+        """Whole numbers of a unit become numbers."""
+        ...
+
+    @wp.func
+    def measure(field: wp.array(dtype=wp.float32), window: Window, box: Box, units: real):
+        """The whole numbers in the rows of a box become exposure [s]."""
+        rows = box.y_high - box.y_low + 1
+        convert(field, window.first + box.y_low * window.cells_z, rows * window.cells_z, one / units)
+
+    return SimpleNamespace(units=units, scatter=scatter, measure=measure)

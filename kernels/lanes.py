@@ -1,0 +1,159 @@
+"""The lanes of a block: the threads of one CUDA warp, which compute one shot together (the block layout).
+
+Every lane holds the whole state of the shot, and moves it alike: the lanes share out only the patches, the rings and
+the nodes. A sum over the lanes is formed as a butterfly, which gives every lane the same bits. So every lane takes the
+same branches, and no lane waits at a barrier that another one does not reach.
+
+On a CPU a block has one lane, and nothing of this costs anything. With Warp's `enable_cpu_blocks` the lanes of a block
+run there one after another, from barrier to barrier, on one thread of the machine: for tests.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
+
+import warp as wp
+
+from .variant import Variant
+
+LANES = 32
+"""Lanes of a block on CUDA: one warp, so that a barrier stops nothing else."""
+BLOCKS = 12
+"""Blocks that a multiprocessor is to hold at least. More of them hide more of each other's latency, but leave fewer
+registers to a lane."""
+LANE = "WP_TILE_THREAD_IDX"
+"""Number of this lane in native code."""
+WAIT = "WP_TILE_SYNC();"
+"""A barrier in native code on a CPU: lanes that run one after another take turns there."""
+
+
+def split(variant: Variant) -> Callable[[str], str]:
+    """What makes a loop over all j < count, in native code, go over this lane's share of them in the block layout."""
+    share = f"int j = {LANE}; j < count; j += WP_TILE_BLOCK_DIM"
+    return lambda snippet: snippet.replace("int j = 0; j < count; ++j", share) if variant.window else snippet
+
+
+def _butterfly(kind: str, both: str) -> str:
+    """Native code that combines the x of all lanes by `both`, an expression of x and that of the `other` lane."""
+    return f"""
+#if defined(__CUDA_ARCH__)
+    static_assert(WP_TILE_BLOCK_DIM == {LANES}, "a block is one warp");
+    for (int apart = {LANES // 2}; apart > 0; apart /= 2) {{
+        const {kind} other = __shfl_xor_sync(0xffffffffu, x, apart);
+        x = {both};
+    }}
+#else
+    if constexpr (WP_TILE_BLOCK_DIM > 1) {{
+        static {kind} held[WP_TILE_BLOCK_DIM];
+        for (int apart = WP_TILE_BLOCK_DIM / 2; apart > 0; apart /= 2) {{
+            held[{LANE}] = x;
+            WP_TILE_SYNC();
+            const {kind} other = held[{LANE} ^ apart];
+            WP_TILE_SYNC();
+            x = {both};
+        }}
+    }}
+#endif
+    return x;
+    """
+
+
+@cache
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of the lanes for one variant."""
+    real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
+    kind = "double" if variant.double else "float"
+
+    @wp.func_native(f"return {LANE};")
+    def lane() -> wp.int32:
+        """Number of this lane."""
+        ...
+
+    @wp.func_native("return WP_TILE_BLOCK_DIM;")
+    def count() -> wp.int32:
+        """Number of lanes."""
+        ...
+
+    @wp.func_native(f"""
+    #if defined(__CUDA_ARCH__)
+        __syncwarp();
+    #else
+        {WAIT}
+    #endif
+    """)
+    def barrier():
+        """Wait for all lanes; each then sees what the others have written."""
+        ...
+
+    @wp.func_native(_butterfly(kind, "x + other"))
+    def total(x: real) -> real:
+        """Sum over the lanes: the same bits in each of them."""
+        ...
+
+    @wp.func_native(_butterfly("int", "other < x ? other : x"))
+    def least(x: wp.int32) -> wp.int32:
+        """Minimum over the lanes."""
+        ...
+
+    @wp.func_native(_butterfly("int", "other > x ? other : x"))
+    def most(x: wp.int32) -> wp.int32:
+        """Maximum over the lanes."""
+        ...
+
+    @wp.func
+    def total_pair(x: vec2):
+        return vec2(total(x[0]), total(x[1]))
+
+    @wp.func
+    def total_triple(x: vec3):
+        return vec3(total(x[0]), total(x[1]), total(x[2]))
+
+    @wp.func
+    def any_of(x: wp.bool):
+        """Whether it is true for any lane."""
+        return most(wp.where(x, 1, 0)) > 0
+
+    def own(name: str) -> Any:
+        """The function that gives a block its own nodes of a field: in its shared memory on CUDA, else those of its
+        slot."""
+
+        @wp.func_native(f"""
+        #if defined(__CUDA_ARCH__)
+            __shared__ {kind} {name}[{variant.window}];
+            return wp::array_t<{kind}>({name}, nodes);
+        #else
+            assert(nodes <= {variant.window} && (slot + 1) * nodes <= field.shape[0]);
+            return wp::array_t<{kind}>(field.data + slot * nodes, nodes);
+        #endif
+        """)
+        def place(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real):
+            """A block's own nodes of one field."""
+            ...
+
+        return place
+
+    @wp.func_native(
+        """
+    assert((slot + 1) * nodes <= field.shape[0]);
+    return wp::array_t<KIND>(field.data + slot * nodes, nodes);
+    """.replace("KIND", kind)
+    )
+    def own_room(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real):
+        """The part of a field in global memory that belongs to a slot."""
+        ...
+
+    return SimpleNamespace(
+        lane=lane,
+        count=count,
+        barrier=barrier,
+        total=total,
+        total_pair=total_pair,
+        total_triple=total_triple,
+        least=least,
+        most=most,
+        any_of=any_of,
+        own_exposure=own("exposure"),
+        own_gain=own("gain"),
+        own_room=own_room,
+    )

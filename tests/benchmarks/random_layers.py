@@ -1,0 +1,203 @@
+"""Layered targets and bursts drawn from a seed: is the error that a pilot tells at least the one that other hits show?
+
+A target is a plate of random_scenes.py with one to three layers behind it: laminated, close or far, thin or thick,
+patterned or solid, weakening or not. Together they take up to all of the core's energy, so that some stop a part or all
+of the hits. Every third scene is a burst of three shots at such a target or at one plate. The answer comes from a level
+of LADDER that no promise takes; the change from the level before is its uncertainty. Rows are kept in a folder, so that
+a run goes on where it ended. Run it as a script:
+python tests/benchmarks/random_layers.py --seed 1 --scenes 24 --cache FOLDER
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from random_scenes import Case, _pattern, draw, p90
+
+from warpimpact.scene import (
+    Burst,
+    BurstSampler,
+    Hits,
+    Interaction,
+    Layer,
+    NoPattern,
+    Numerics,
+    Pattern,
+    Record,
+    Scene,
+    Shots,
+    Target,
+    make_shots,
+)
+from warpimpact.solver.promise import PROMISES, changes, keep
+from warpimpact.solver.resolution import LADDER, Fidelity
+from warpimpact.solver.simulate import Outcomes, simulate
+
+Array = NDArray[np.float64]
+
+ANSWER = 8
+"""Level of LADDER behind the answer."""
+BURST = 3
+"""Shots of a burst."""
+NAMES = ("draft", "standard")
+QUANTITIES = ("velocity", "tilt", "depth")
+
+
+@dataclass(frozen=True)
+class Layered(Case):
+    """A case with layers, or one plate, and how the hits of a burst lie."""
+
+    burst: Burst | None = None
+
+    def shots(self, count: int, seed: int = 0) -> Shots:
+        """Some `count` hits; whole bursts."""
+        plate = self.scene.target.plate
+        if self.burst is None:
+            return make_shots(self.impact, Hits(count=count, seed=seed), plate)
+        hits = Hits(count=count // BURST, seed=seed)
+        return BurstSampler(self.impact, hits, plate, self.burst).shots(0, BURST * (count // BURST))
+
+
+def drawn(seed: int, index: int) -> Layered:
+    """The case of an index, a function of (seed, index) alone."""
+    front, rng = draw(seed, index), np.random.default_rng([seed, index, 1])
+    core, plate = front.scene.core, front.scene.target.plate
+    calibre, several = 2.0 * core.max_radius, index % 3 == 2
+    count = int(rng.integers(0 if several else 1, 4))
+    # A solid plate without friction takes Y h π R² of the core's energy.
+    energy = 0.5 * core.mass_properties.mass * front.impact.velocity**2 * rng.uniform(0.2, 1.2)
+    shares = rng.dirichlet(np.ones(count)) if count else np.empty(0)
+    layers = tuple(_layer(rng, calibre, share * energy / (math.pi * core.max_radius**2)) for share in shares)
+    path = {"degradation_interval": None, "degradation_distance": rng.uniform(0.5e-3, 1e-3)}
+    by_path: dict[str, Any] = path if rng.random() < 0.5 else {}
+    target = Target(plate=plate.model_copy(update=by_path), layers=layers)
+    spacing = float(rng.uniform(0.5, 3.0)) * calibre
+    scene = Scene(core=core, target=target, interaction=Interaction(), record=Record(standoffs=(0.13,)))
+    kinds = " + ".join("solid" if isinstance(one.pattern, NoPattern) else "holes" for one in layers)
+    name = f"{front.name}{' | ' if kinds else ''}{kinds}{' burst' if several else ''}"
+    return Layered(name, scene, front.impact, Burst(count=BURST, spacing=spacing) if several else None)
+
+
+def _layer(rng: np.random.Generator, calibre: float, work: float) -> Layer:
+    """A layer that takes about this energy over the cross section of the core [J/m²]."""
+    gap = float(rng.choice([0.0, rng.uniform(0.0, 0.02), rng.uniform(0.02, 0.15)]))
+    thickness = float(rng.uniform(0.2, 2.5)) * calibre
+    pattern: Pattern = _pattern(rng, calibre)[0] if rng.random() < 0.4 else NoPattern()
+    weakens, by_path = rng.random(2) < 0.5
+    return Layer(
+        gap=gap,
+        thickness=thickness,
+        resistance=min(work / thickness, 6e9),
+        shear_coefficient=float(rng.uniform(0.0, 0.15)),
+        degradation=float(rng.uniform(0.7, 1.0)) if weakens else 1.0,
+        degradation_length=float(rng.uniform(0.3e-3, 0.8e-3)),
+        degradation_distance=0.8e-3 if by_path else None,
+        pattern=pattern,
+        offset=tuple(rng.uniform(-0.5, 0.5, 2) * calibre),
+    )
+
+
+def computed(case: Layered, shots: Shots, fidelity: Fidelity) -> Outcomes:
+    return simulate(case.scene, shots, numerics=fidelity, device="cpu", threads=1)
+
+
+def errors(found: Outcomes, truth: Outcomes, impact: Array) -> list[float]:
+    """90th percentiles of the errors, as a promise counts them: of velocity [m/s], tilt [degree] and depth [mm]; NaN
+    where no core stops in a layer."""
+    velocity, tilt, depth = changes(found, truth, impact)
+    depth = depth[np.isfinite(depth)]
+    return [p90(velocity), math.degrees(p90(tilt)), 1e3 * p90(depth) if len(depth) else math.nan]
+
+
+def measured(case: Layered, hits: int) -> dict[str, Any]:
+    """What the promises come to on a scene."""
+    shots = case.shots(hits)
+    truth, before = (computed(case, shots, LADDER[level]) for level in (ANSWER, ANSWER - 1))
+    row: dict[str, Any] = {
+        "scene": case.name,
+        "statuses": np.bincount(truth.status, minlength=4)[:4].tolist(),
+        "uncertain": errors(before, truth, shots.velocity),
+    }
+    for name in NAMES:
+        begin = time.process_time()
+        promise = keep(case.scene, Numerics(fidelity=name), case.shots(PROMISES[name].pilot, seed=77), device="cpu")
+        row[name] = {
+            "pilot": time.process_time() - begin,
+            "level": LADDER.index(promise.fidelity),
+            "kept": promise.kept,
+            "told": [promise.residual_velocity_error, math.degrees(promise.tilt_error), 1e3 * promise.depth_error],
+            "found": errors(computed(case, shots, promise.fidelity), truth, shots.velocity),
+        }
+    return row
+
+
+def beyond(found: list[float], limits: list[float], uncertain: list[float]) -> list[str]:
+    """Quantities whose errors are beyond their limits, by more than the answer is uncertain by."""
+    triples = zip(QUANTITIES, found, limits, uncertain, strict=True)
+    return [name for name, error, limit, unsure in triples if error > limit + unsure]
+
+
+def untrue(row: dict[str, Any], name: str) -> list[str]:
+    """Quantities whose error is larger than told."""
+    return beyond(row[name]["found"], row[name]["told"], row["uncertain"])
+
+
+def broken(row: dict[str, Any], name: str) -> bool:
+    """Whether a promise that is said to be kept is not."""
+    allowed = PROMISES[name].tolerance
+    limits = [allowed.residual_velocity, math.degrees(allowed.tilt), math.inf]
+    return row[name]["kept"] and bool(beyond(row[name]["found"], limits, row["uncertain"]))
+
+
+def summed_up(rows: list[dict[str, Any]]) -> str:
+    """What the promises came to over the scenes."""
+    lines = [f"{len(rows)} scenes"]
+    for name in NAMES:
+        kept = np.mean([row[name]["kept"] for row in rows])
+        false = sum(broken(row, name) for row in rows)
+        low = [sum(quantity in untrue(row, name) for row in rows) for quantity in QUANTITIES]
+        found = np.array([row[name]["found"] for row in rows])
+        middle, worst = (np.nanquantile(found, q, axis=0, method="higher") for q in (0.5, 0.9))
+        told = ", ".join(f"{quantity} {count}" for quantity, count in zip(QUANTITIES, low, strict=True))
+        pilot = np.median([row[name]["pilot"] for row in rows])
+        lines.append(
+            f"{name:10} kept {kept:.0%}, kept but false {false}, told too low: {told}; median {np.round(middle, 2)}, "
+            f"worst tenth {np.round(worst, 2)}; pilot {pilot:.2g} s"
+        )
+    lines.append("m/s, degree and mm; 90 % of the hits")
+    return "\n".join(lines)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--scenes", type=int, default=24)
+    parser.add_argument("--hits", type=int, default=48)
+    parser.add_argument("--cache", type=Path, required=True)
+    given = parser.parse_args()
+    given.cache.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for index in range(given.scenes):
+        path = given.cache / f"layers-{given.seed}-{index}-{given.hits}.json"
+        if not path.exists():
+            path.write_text(json.dumps(measured(drawn(given.seed, index), given.hits)))
+        rows.append(json.loads(path.read_text()))
+        print(f"{index:3} {rows[-1]['scene']:60} {rows[-1]['statuses']}", flush=True)
+        for name in NAMES:
+            told = rows[-1][name]
+            numbers = [*told["told"], *told["found"], told["pilot"]]
+            marks = f"{name:10} level {told['level']} {'kept' if told['kept'] else 'NOT '}"
+            print(f"    {marks} {' '.join(f'{n:8.3g}' for n in numbers)} {untrue(rows[-1], name)}", flush=True)
+    print(summed_up(rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,262 @@
+"""The block layout: 32 lanes compute a shot as one thread does, in whatever order they run (kernels/block.py).
+
+Warp runs the lanes of a block on a CPU one after another, from barrier to barrier (`enable_cpu_blocks`). So a barrier
+that is missing shows as a wrong outcome, and so does a place that only another lane has written: scratch is poisoned.
+"""
+
+import ctypes
+from typing import Any
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from warpimpact.kernels import (
+    block,
+    contact,
+    core_surface,
+    exposure,
+    footprint,
+    interaction,
+    lanes,
+    plate_grid,
+    rigid_body,
+)
+from warpimpact.kernels.status import Status
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import (
+    CirclePattern,
+    Impact,
+    Interaction,
+    Numerics,
+    OgiveCore,
+    Plate,
+    PolynomialCore,
+    Record,
+    Scene,
+    Shots,
+    SlotPattern,
+)
+from warpimpact.solver import blocks, inputs, simulate
+from warpimpact.solver.rings import azimuths_of, rings_of
+
+from .probes import astride, plate_of, poisoned
+
+Array = NDArray[np.float64]
+
+CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+SHANK = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
+SLOTTED = Plate(
+    thickness=4e-3,
+    resistance=2.6e9,
+    shear_coefficient=0.05,
+    degradation=0.8,
+    degradation_interval=1e-6,
+    pattern=SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True),
+)
+ROUND = SLOTTED.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
+BY_PATH = SLOTTED.model_copy(update={"degradation_interval": None, "degradation_distance": 0.825e-3})
+SIMPLE, BLOCK = Numerics(), Numerics(layout="block")
+NORMAL, OBLIQUE = {}, {"obliquity": 0.35, "azimuth": 0.7, "yaw": 0.1, "pitch": 0.05}
+SCENES = {
+    "slots": (CORE, SLOTTED, NORMAL, {}),
+    "oblique and yawed": (CORE, SLOTTED, OBLIQUE, {}),
+    "a shank in round holes": (SHANK, ROUND, {"pitch": 0.015}, {}),
+    "degradation by path": (CORE, BY_PATH, {"velocity": 350.0}, {}),
+    "no degradation": (CORE, SLOTTED.model_copy(update={"degradation": 1.0}), NORMAL, {}),
+    "stress that depends on the rate": (CORE, SLOTTED, NORMAL, {"linear": 0.1, "quadratic": 0.5}),
+    "beside the rim": (CORE, SLOTTED.model_copy(update={"size": (9e-3, 30e-3)}), NORMAL, {}),
+}
+ROUNDING = {"residual_velocity": 0.1, "tilt": np.radians(0.5)}
+"""Largest difference by another order of summation [m/s, rad]: some hits near an edge multiply it."""
+ORDERS = {
+    "backwards": "(WP_TILE_BLOCK_DIM - 1 - WP_TILE_THREAD_IDX)",
+    "shuffled": "((5 * WP_TILE_THREAD_IDX + 3) % WP_TILE_BLOCK_DIM)",
+}
+
+
+@pytest.fixture
+def in_blocks(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Blocks of 32 lanes on the CPU, and scratch that is NaN until it is written."""
+    monkeypatch.setattr(wp.config, "enable_cpu_blocks", True)
+    empty = wp.empty
+
+    def nan_until_written(*args: Any, **kwargs: Any) -> wp.array:
+        array = empty(*args, **kwargs)
+        ctypes.memset(array.ptr, 0xFF, array.capacity)
+        return array
+
+    monkeypatch.setattr(wp, "empty", nan_until_written)
+    return monkeypatch
+
+
+def shots_of(count: int, **columns: float) -> Shots:
+    """Hits all over a unit cell, at 825 m/s except for the given columns."""
+    rng = np.random.default_rng(3)
+    values = dict.fromkeys(Impact.model_fields, 0.0) | {"velocity": 825.0} | columns
+    hits = {"hit_y": rng.uniform(-4e-3, 4e-3, count), "hit_z": rng.uniform(-8e-3, 8e-3, count)}
+    return Shots(**hits, **{name: np.full(count, value) for name, value in values.items()})
+
+
+def scene_of(name: str, count: int) -> tuple[Scene, Shots]:
+    core, plate, impact, interaction_of = SCENES[name]
+    scene = Scene(core=core, target=plate, interaction=Interaction(**interaction_of), record=Record(standoffs=(0.13,)))
+    return scene, shots_of(count, **impact)
+
+
+def assert_same(outcomes: Any, expected: Any) -> None:
+    """Nearly all equal to the rounding of single precision; no status differs, and no outcome by much."""
+    np.testing.assert_array_equal(outcomes.status, expected.status)
+    assert (expected.status < Status.UNFINISHED).all()
+    for name, most in ROUNDING.items():
+        difference = np.abs(getattr(outcomes, name) - getattr(expected, name))
+        assert np.nanmax(difference, initial=0.0) <= most, name
+        assert np.nanmedian(difference) <= 0.005 * most, name
+
+
+@pytest.mark.parametrize("name", list(SCENES))
+def test_block_computes_what_one_thread_computes(name: str, device: str) -> None:
+    scene, shots = scene_of(name, 48)
+    simple, by_block = (simulate.simulate(scene, shots, numerics=n, device=device) for n in (SIMPLE, BLOCK))
+    assert_same(by_block, simple)
+
+
+@pytest.mark.parametrize("name", ["slots", "oblique and yawed", "no degradation"])
+def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
+    name: str, in_blocks: pytest.MonkeyPatch
+) -> None:
+    scene, shots = scene_of(name, 12)
+    simple, by_block = (simulate.simulate(scene, shots, numerics=n, device="cpu") for n in (SIMPLE, BLOCK))
+    assert_same(by_block, simple)
+    again = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
+    for column, values in vars(by_block).items():
+        np.testing.assert_array_equal(getattr(again, column), values, err_msg=column)
+
+
+@pytest.mark.parametrize("order", list(ORDERS))
+def test_order_of_the_lanes_changes_no_outcome(order: str, in_blocks: pytest.MonkeyPatch) -> None:
+    scene, shots = scene_of("slots", 12)
+    first = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
+    in_blocks.setattr(lanes, "LANE", ORDERS[order])
+    in_blocks.setattr(blocks, "SIZES", (2080 + 32 * list(ORDERS).index(order),))  # so that kernels are built anew
+    assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)
+
+
+def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None:
+    scene, shots = scene_of("slots", 12)
+    simple = simulate.simulate(scene, shots, numerics=SIMPLE, device="cpu")
+    in_blocks.setattr(lanes, "WAIT", "")
+    in_blocks.setattr(blocks, "SIZES", (2144,))
+    without = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
+    with pytest.raises(AssertionError):
+        assert_same(without, simple)
+
+
+@pytest.mark.parametrize(("impact", "plate"), [(OBLIQUE, SLOTTED), ({"pitch": 0.6, "velocity": 300.0}, SLOTTED)])
+def test_energy_never_grows_in_a_block(impact: dict[str, float], plate: Plate) -> None:
+    shots, body = shots_of(6, **impact), CORE.mass_properties
+    for rows in simulate.trace(Scene(core=CORE, target=plate), shots, numerics=BLOCK):
+        axis, velocity, momentum = (
+            Rotation.from_quat(rows[:, 4:8]).apply([1.0, 0.0, 0.0]),
+            rows[:, 8:11],
+            rows[:, 11:14],
+        )
+        along, square = (momentum * axis).sum(axis=1) ** 2, (momentum**2).sum(axis=1)
+        energy = 0.5 * body.mass * (velocity**2).sum(axis=1)
+        energy += 0.5 * (along / body.inertia_axial + (square - along) / body.inertia_transverse)
+        assert (np.diff(energy) <= 8.0 * 2.0**-23 * energy[0]).all()
+
+
+# One step: its load, and what it does to the plate, node by node.
+CELL = 0.5e-3 / 1.5
+CELLS = 240  # of a window that holds any pose, which no block on CUDA would
+LAID = {"simple": Variant(), "block": Variant(window=CELLS**2)}
+
+
+def probe_of(variant: Variant) -> Any:
+    """A kernel that computes one step of every pose on its own plate, and what it needs."""
+    real, vec3, quat = variant.real, variant.vec3, variant.quat
+    surfaces, grid, memories, laws, motion, prints = (
+        part.build(variant) for part in (core_surface, plate_grid, exposure, interaction, rigid_body, footprint)
+    )
+    scheme = (block if variant.window else contact).build(variant)
+    Surface, Plate_, Fields, Law, Load = surfaces.Surface, grid.Plate, memories.Fields, laws.Law, motion.Load
+    Touches = contact.build(variant).Touches
+
+    def steps(
+        surface: Surface,
+        plate: Plate_,
+        thickness: real,
+        law: Law,
+        fields: Fields,
+        touches: Touches,
+        position: wp.array(dtype=vec3),
+        attitude: wp.array(dtype=quat),
+        velocity: wp.array(dtype=vec3),
+        omega: wp.array(dtype=vec3),
+        dt: real,
+        loads: wp.array(dtype=Load),
+    ) -> None:
+        """Two steps at the same pose: the second one finds the exposure of the first."""
+        i = wp.tid()
+        if wp.static(variant.window > 0):
+            fields = scheme.own_fields(fields, i)
+        window = scheme.open_window(plate, thickness, fields, i, wp.float64(0.0), wp.float64(0.0))
+        pose = surfaces.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
+        found = prints.footprint_of(surface, plate, window, pose, dt)
+        load = Load()
+        for _ in range(2):
+            load = scheme.load_on(surface, plate, law, fields, window, touches, i, found, pose, dt)
+        loads[i] = load
+
+    kernel = variant.kernel(steps, (lanes.LANES, 1) if variant.window else None)
+    return kernel, Surface, Plate_, Fields, Law, Load, Touches
+
+
+def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
+    """Loads of random poses, and the exposure of their plates."""
+    kernel, *structs = probe_of(variant)
+    Surface, Plate_, Fields, Law, Load, Touches = structs
+    put = inputs.Put("cpu", variant.real)
+    surface = inputs.surface_of(Surface, CORE, rings_of(CORE, 23, 32), azimuths_of(32), put)
+    plate = plate_of(Plate_, np.ones((1, 1)), np.array([CELL, CELL]), CELL, "cpu", real=variant.real)
+    law = Law()
+    law.a0, law.friction, law.onset, law.decay_rate = 2.6e9, 0.05, 2.0, np.log(0.8) / 1e-6
+    fields, touches = Fields(), Touches()
+    fields.cells_y = fields.cells_z = CELLS
+    for name in ("exposure", "gain", "filtered"):
+        setattr(fields, name, poisoned(count * CELLS**2, variant.real, "cpu"))
+    patches = count * surface.rings * surface.around
+    for name, variable in Touches.vars.items():
+        setattr(touches, name, poisoned(patches, variable.type.dtype, "cpu"))
+    poses = astride(count)
+    given = [
+        wp.array(poses[name], dtype=variant.quat if name == "attitude" else variant.vec3, device="cpu")
+        for name in ("position", "attitude", "velocity", "omega")
+    ]
+    loads = poisoned(count, Load, "cpu")
+    arguments = [surface, plate, 4e-3, law, fields, touches, *given, 1e-6]
+    if variant.window:
+        wp.launch_tiled(kernel, dim=[count], inputs=arguments, outputs=[loads], block_dim=lanes.LANES, device="cpu")
+    else:
+        wp.launch(kernel, count, inputs=arguments, outputs=[loads], device="cpu")
+    return loads.numpy(), fields.exposure.numpy().reshape(count, CELLS, CELLS)
+
+
+@pytest.mark.parametrize("lanes_of_a_block", [1, 32])
+def test_one_step_by_lanes_has_the_same_load_and_exposure(
+    lanes_of_a_block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(wp.config, "enable_cpu_blocks", lanes_of_a_block > 1)
+    (expected, spread), (found, by_lanes) = (stepped(variant, 40) for variant in LAID.values())
+    assert expected["touching"].sum() > 20
+    np.testing.assert_array_equal(found["touching"], expected["touching"])
+    np.testing.assert_array_equal(found["damped"], expected["damped"])
+    assert spread.max() > 0.5e-6
+    np.testing.assert_allclose(by_lanes, spread, rtol=1e-5, atol=1e-5 * spread.max())
+    for name in ("force", "moment", "damping_vv", "damping_vw", "damping_ww"):
+        values = expected[name].reshape(len(expected), -1)
+        size = np.abs(values).max(axis=1, keepdims=True)
+        assert (np.abs(found[name].reshape(values.shape) - values) <= 2e-5 * size).all(), name

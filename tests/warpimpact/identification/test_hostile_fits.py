@@ -1,0 +1,113 @@
+"""Hostile fits: one sentence, whatever a fit file or its posterior holds; no traceback, no hang."""
+
+import json
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray
+
+from warpimpact.cli import main
+from warpimpact.identification.fit import Fit
+from warpimpact.identification.identify import identify_to_file
+from warpimpact.identification.parameters import FitError
+from warpimpact.identification.reading import fit_from
+from warpimpact.results import posterior as files
+from warpimpact.results.files import ResultError
+
+TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
+DISTRIBUTION = {"distribution": ["1 mm"] * 5000, "low": 0, "high": 1}
+CASES: dict[str, tuple[tuple[Any, ...], Any, str]] = {
+    "no prior": (("prior",), "x", "prior: is missing"),
+    "a prior of a table": (("prior",), {"distribution": "uniform", "low": 1, "high": 2}, "prior"),
+    "a long distribution": (("prior", "plate", "resistance"), DISTRIBUTION, "but it must be one of"),
+    "too many spacings": (
+        ("prior", "plate", "pattern"),
+        {"spacing": [{"distribution": "uniform", "low": 1, "high": 2}] * 3},
+        "is no number",
+    ),
+    "an impact": (("shot", 0, "impact"), [1, 2], "shot[0]: impact: got [1, 2], but it must be a table"),
+    "a plate of a shot": (("shot", 0, "plate"), 7, "shot[0]: plate: got 7, but it must be a table"),
+    "a core": (("core",), 5, "core: got 5, but it must be a table"),
+    "numerics": (("numerics",), "fine", 'numerics: got "fine", but it must be a table'),
+    "a selection": (("selection",), 5, "selection: got 5, but it must be a list"),
+    "a discrepancy": (("discrepancy",), 0.5, "discrepancy: got 0.5, but it must be a table"),
+}
+
+
+def put(data: Any, place: tuple[Any, ...], value: Any) -> Any:
+    """The nested tables with one value replaced."""
+    if not place:
+        return value
+    copy = dict(data) if isinstance(data, dict) else list(data)
+    copy[place[0]] = put(copy[place[0]] if place[1:] else None, place[1:], value)
+    return copy
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_hostile_fit_is_refused_in_a_sentence(case: str) -> None:
+    place, value, expected = CASES[case]
+    text = json.dumps(put(tomllib.loads(TEXT), place, value))
+    with pytest.raises(FitError) as caught:
+        fit_from(text, "fit.json", Path())
+    assert expected in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+def test_many_shots_are_checked_in_proportion(monkeypatch: pytest.MonkeyPatch) -> None:
+    counted: list[None] = []
+    scene_of = Fit.scene_of
+    monkeypatch.setattr(Fit, "scene_of", lambda *given: counted.append(None) or scene_of(*given))
+    data = tomllib.loads(TEXT)
+    fit_from(json.dumps(data), "fit.json", Path())
+    one = len(counted)
+    many = data | {"shot": data["shot"] * 50}
+    fit = fit_from(json.dumps(many), "fit.json", Path())
+    assert len(counted) - one <= one + len(many["shot"])
+    assert len(fit.warnings) == 49 * len(data["shot"])  # one for each that repeats another
+    with pytest.raises(FitError, match="at most 256"):
+        fit_from(json.dumps(data | {"shot": data["shot"] * 200}), "fit.json", Path())
+
+
+def test_half_a_character_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"is not valid TOML: .* can.t encode character"):
+        fit_from(json.dumps(tomllib.loads(TEXT) | {"title": "\ud800"}), "fit.json", Path())
+
+
+@pytest.fixture(scope="module")
+def posterior(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    text = TEXT.replace("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 100\neffective = 60\nhits = 32")
+    path = tmp_path_factory.mktemp("fit") / "posterior.nc"
+    identify_to_file(fit_from(text, "fit.toml", Path()), path, device="cpu")
+    return path
+
+
+ALTERATIONS: dict[str, tuple[str, Callable[[xarray.Dataset], xarray.Dataset]]] = {
+    "a parameter that the best lacks": ("best", lambda d: d.drop_vars("resistance")),
+    "a parameter along nothing": ("posterior", lambda d: d.isel(draw=0)),
+    "no path": ("posterior", lambda d: d.assign(resistance=d["resistance"].drop_attrs())),
+    "no misfit": ("best", lambda d: d.rename(misfit="fit")),
+    "words for numbers": ("posterior_predictive", lambda d: d.assign(fitted=d["fitted"].astype(str))),
+    "unnamed observations": ("observed_data", lambda d: d.drop_vars("observation")),
+    "a size in words": ("/", lambda d: d.assign_attrs(effective_sample_size="large")),
+    "a material without tables": ("/", lambda d: d.assign_attrs(material="[1, 2]")),
+    "no rows": ("/", lambda d: d.assign_attrs(row_probability='{"a": "b"}')),
+}
+
+
+@pytest.mark.parametrize("case", ALTERATIONS)
+def test_an_altered_posterior_is_refused_in_a_sentence(
+    case: str, posterior: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    group, change = ALTERATIONS[case]
+    tree = files.read(posterior)
+    groups = {name: tree[name].to_dataset() for name in ("/", *tree.children)}
+    groups[group] = change(groups[group])
+    path = tmp_path / "altered.nc"
+    files.write(xarray.DataTree.from_dict(groups), path)
+    with pytest.raises(ResultError, match="not a posterior of warpimpact identify, or damaged"):
+        files.read(path)
+    assert main(["report", str(path), "-o", str(tmp_path / "a.html")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

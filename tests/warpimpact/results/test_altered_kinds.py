@@ -1,0 +1,79 @@
+"""Results with layers, studies and histories that somebody altered are refused in a sentence."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.replay import replay
+from warpimpact.campaign.run import run
+from warpimpact.results import checks, files
+from warpimpact.results import variables as v
+from warpimpact.results.files import ResultError
+
+LAYERED = (Path(__file__).parents[3] / "campaigns" / "layered_target.toml").read_text(encoding="utf-8")
+Change = Callable[[xarray.Dataset], xarray.Dataset]
+
+
+@pytest.fixture(scope="module")
+def layered() -> xarray.Dataset:
+    text = LAYERED.replace("count = 1024", "count = 16") + '\n[numerics]\nfidelity = "draft"\ntime_step = "2 us"\n'
+    return run(Campaign.from_text(text, name="a.toml", folder=Path()), device="cpu")
+
+
+MAPS: dict[str, tuple[Change, str]] = {
+    "a face without the other": (lambda d: d.drop_vars("layer_rear"), 'no variable "layer_rear" beside'),
+    "no depth": (lambda d: d.drop_vars("depth"), 'no variable "depth" beside'),
+    "half of the outlines": (lambda d: d.drop_vars("outline_z"), 'no variable "outline_z" beside "outline_y"'),
+    "the solid plate along another": (lambda d: d.rename(solid_hit="shot"), "is along"),
+}
+
+
+@pytest.mark.parametrize("case", MAPS)
+def test_an_altered_map_is_refused(case: str, layered: xarray.Dataset, tmp_path: Path) -> None:
+    change, expected = MAPS[case]
+    changed = change(layered)
+    assert expected in str(checks.fault(changed, tuple(map(_declared, changed.variables))))
+    files.write(changed, tmp_path / "a.nc")
+    with pytest.raises(ResultError, match="or damaged"):
+        files.read(tmp_path / "a.nc")
+
+
+def _declared(name: object) -> v.Variable:
+    known = (*v.VARIABLES, *v.COORDINATES, *v.LAYER_VARIABLES, *v.LAYER_FACES, *v.OUTLINE_VARIABLES, *v.SOLID_VARIABLES)
+    return next((one for one in known if one == name), v.STATUS)
+
+
+def test_a_factor_that_is_no_number_is_refused(layered: xarray.Dataset, tmp_path: Path) -> None:
+    layered.assign(tilt=layered["tilt"].assign_attrs(scale_factor="many")).to_netcdf(tmp_path / "a.nc")
+    with pytest.raises(ResultError, match="scale_factor that is no number"):
+        files.read(tmp_path / "a.nc")
+
+
+def test_an_altered_history_is_refused(layered: xarray.Dataset, tmp_path: Path) -> None:
+    history = replay(layered, 3, folder=Path())
+    assert checks.history_fault(history) is None
+    for change in (lambda d: d.drop_vars("plate_position"), lambda d: d.assign(force=d["force"].astype(str))):
+        files.write(change(history), tmp_path / "a.nc")
+        with (
+            pytest.raises(ResultError, match="not the history of a hit, or damaged"),
+            files.opened_either(tmp_path / "a.nc"),
+        ):
+            pass
+
+
+def test_an_altered_study_is_refused() -> None:
+    known = (*v.STUDY_COORDINATES, *v.STUDY_VARIABLES)
+    sizes = {"setting": 2, "quantile": 2, "level": 2, "standoff": 1, "hit": 3}
+    study = xarray.Dataset(
+        {str(one): (one.dims, np.zeros([sizes[dim] for dim in one.dims]), one.attributes) for one in known},
+        attrs={"title": "t", "history": "h", "device": "cpu"},
+    ).assign({v.QUANTILE: (("quantile",), np.array([0.5, 0.9]), v.QUANTILE.attributes)})
+    assert checks.study_fault(study) is None
+    for name in ("title", "history", "device"):
+        kept = {key: value for key, value in study.attrs.items() if key != name}
+        assert checks.study_fault(study.drop_attrs(deep=False).assign_attrs(kept)) == f'it has no attribute "{name}"'
+    assert "90th percentile" in str(checks.study_fault(study.isel(quantile=[0, 0])))

@@ -1,0 +1,73 @@
+"""The block layout on request: what it takes, what it refuses, and windows that do not fit a block."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact.scene import Impact, Layer, Numerics, Plate, PolynomialCore, Record, Scene, Shots, Target
+from warpimpact.solver import blocks, simulate
+from warpimpact.solver.arrays import arrays_of
+from warpimpact.solver.resolution import LADDER, level
+
+CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
+PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation=0.8, degradation_interval=1e-6)
+BLOCK = Numerics(layout="block")
+
+
+def shots_of(count: int = 3, at_a_plate: int = 1, **columns: float) -> Shots:
+    values = dict.fromkeys(("hit_y", "hit_z", *Impact.model_fields), 0.0) | {"velocity": 825.0} | columns
+    columns_of = {name: np.full(count, value) for name, value in values.items()}
+    if at_a_plate > 1:
+        columns_of |= {"sample": np.arange(count) // at_a_plate, "burst_order": np.arange(count) % at_a_plate}
+    return Shots(**columns_of)
+
+
+@pytest.mark.parametrize("index", [0, 2, 4])
+def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
+    arrays = arrays_of(Scene(core=CORE, target=PLATE), level(index, BLOCK), shots_of())
+    nodes = blocks.first_window(arrays, shots_of()) ** 2
+    assert arrays.variant.window == min(size for size in blocks.SIZES if size >= nodes)
+    assert 2 * 4 * max(blocks.SIZES) <= 48 * 1024
+
+
+def test_fidelities_of_a_pilot_keep_the_layout() -> None:
+    assert level(2, BLOCK).block
+    assert not level(2, Numerics()).block
+    assert arrays_of(Scene(core=CORE, target=PLATE), level(3, BLOCK), shots_of()).variant.window
+
+
+def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
+    shots = shots_of(obliquity=1.2)
+    assert not arrays_of(Scene(core=CORE, target=PLATE), BLOCK, shots).variant.window
+    assert not arrays_of(Scene(core=CORE, target=PLATE), level(len(LADDER) - 1, BLOCK), shots_of()).variant.window
+    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (None, BLOCK))
+    np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
+
+
+def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_layout(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(blocks, "WINDOW_SLACK", 1.02)
+    shots = shots_of(pitch=0.03)
+    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (None, BLOCK))
+    np.testing.assert_array_equal(block.status, simple.status)
+    np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
+
+
+@pytest.mark.parametrize(
+    ("scene", "numerics", "shots", "words"),
+    [
+        ({}, {"precision": "double"}, {}, "double precision"),
+        ({}, {"scheme": "nodal"}, {}, "the nodal scheme"),
+        ({"record": Record(bending=True)}, {}, {}, "the bending moment"),
+        ({"target": Target(plate=PLATE, layers=(Layer(**PLATE.model_dump()),))}, {}, {}, "layers"),
+        ({}, {}, {"count": 4, "at_a_plate": 2}, "several shots at one plate"),
+    ],
+)
+def test_what_a_block_does_not_compute_is_refused(
+    scene: dict[str, Any], numerics: dict[str, Any], shots: dict[str, int], words: str
+) -> None:
+    whole = Scene(**{"core": CORE, "target": PLATE} | scene)
+    with pytest.raises(ValueError, match=f'got numerics.layout = "block" beside {words}, but it must be "simple"'):
+        simulate.simulate(whole, shots_of(**shots), numerics=Numerics(layout="block", **numerics))

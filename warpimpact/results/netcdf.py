@@ -1,0 +1,104 @@
+"""Tables in netCDF files, which are those that xarray would write of their Datasets, to the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+
+from warpimpact.results import variables as v
+from warpimpact.results.table import Column, Table
+
+_PACKED = {"zlib": True, "complevel": 1}
+
+
+def write_table(table: Table, file: Path, *, chunk: int | None = None, compressed: bool = True) -> None:
+    """Write a Table, with the coordinates that have a group of their own in it.
+
+    Args:
+        chunk: hits per chunk; "hit" is unlimited then.
+        compressed: numbers of the root are compressed; those of the groups always are.
+    """
+    groups = {group: [name for name in names if name in table.coords] for group, names in v.GROUPS.items()}
+    root = table.drop_vars([name for names in groups.values() for name in names])
+    with netCDF4.Dataset(file, "w", format="NETCDF4") as target:
+        target.setncatts(root.attrs)
+        if chunk is not None:
+            target.createDimension(v.HIT, None)
+        _write(root.variables, root.coords, target, chunk=chunk, compressed=compressed)
+        for group, names in groups.items():
+            if names:
+                inner = {name: table[name] for name in names}
+                beside = {dim: table[dim] for one in inner.values() for dim in one.dims if dim in table.coords}
+                _write(inner | beside, frozenset(beside), target.createGroup(group))
+
+
+def _write(
+    variables: Mapping[str, Column],
+    coords: frozenset[str],
+    target: Any,
+    *,
+    chunk: int | None = None,
+    compressed: bool = True,
+) -> None:
+    """Write variables into a file or one of its groups."""
+    for column in variables.values():
+        for dim, size in zip(column.dims, column.shape, strict=True):
+            if dim not in target.dimensions and (target.parent is None or dim not in target.parent.dimensions):
+                target.createDimension(dim, size)
+    beside = sorted(name for name in coords if variables[name].dims != (name,))
+    for name, column in variables.items():
+        values, attributes = column.values, dict(column.attrs)
+        options: dict[str, Any] = dict(_PACKED) if compressed and values.dtype.kind in "if" else {}
+        if chunk is not None and v.HIT in column.dims:
+            options["chunksizes"] = (chunk, *column.shape[1:])
+        if name not in coords:  # CF: a coordinate has no missing values
+            options["fill_value"] = np.array(np.nan, values.dtype) if values.dtype.kind == "f" else None
+            near = " ".join(one for one in beside if {*variables[one].dims} <= {*column.dims})
+            attributes |= {"coordinates": near} if near else {}
+        kind = str if values.dtype.kind in "UO" else values.dtype
+        written = target.createVariable(name, kind, column.dims, **options)
+        written.setncatts(attributes)
+        written.set_auto_maskandscale(False)
+        written[:] = values.astype(object) if kind is str else values
+
+
+@contextmanager
+def open_table(path: Path) -> Iterator[Table]:
+    """A file that `write_table` wrote, of which only what is used is read."""
+    with netCDF4.Dataset(path) as source:
+        source.set_auto_maskandscale(False)
+        groups = [group for group in v.GROUPS if group in source.groups]
+        for group in groups:
+            source[group].set_auto_maskandscale(False)
+        own = {name: _column(variable) for name, variable in source.variables.items()}
+        grouped = {
+            name: _column(source[group][name])
+            for group in groups
+            for name in v.GROUPS[group]
+            if name in source[group].variables
+        }
+        named = {name for column in own.values() for name in column.attrs.pop("coordinates", "").split()}
+        coords = {*named, *grouped, *(name for name in own if own[name].dims == (name,))}
+        yield Table(own | grouped, frozenset(coords), {name: source.getncattr(name) for name in source.ncattrs()})
+
+
+def read_table(path: Path) -> Table:
+    """The same, in memory."""
+    with open_table(path) as table:
+        return table.load()
+
+
+def attribute(path: Path, name: str) -> Any:
+    """A global attribute of a netCDF file; None if it is not there."""
+    with netCDF4.Dataset(path) as source:
+        return source.getncattr(name) if name in source.ncattrs() else None
+
+
+def _column(variable: Any) -> Any:
+    told = {name: variable.getncattr(name) for name in variable.ncattrs() if name != "_FillValue"}
+    return Column(tuple(variable.dimensions), variable, told)

@@ -1,0 +1,156 @@
+"""A hit map as plain columns, with those methods of an xarray Dataset that a run needs.
+
+The first Dataset of a process takes xarray a good part of a second: it looks for pint, Dask and other kinds of arrays.
+So a run computes, gathers and writes a Table, and whoever asks for a Dataset gets it from `Table.to_xarray`. Functions
+that take a `Result` take either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import xarray
+
+    Result: TypeAlias = "Table | xarray.Dataset"
+    AResult = TypeVar("AResult", "Table", "xarray.Dataset")
+    """Either, the same that was given."""
+
+_HIT = "hit"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One variable.
+
+    Attributes:
+        dims: names of its dimensions.
+        data: its values, or a variable of an open netCDF file that has them, which is read when `values` are asked for.
+        attrs: its attributes.
+        first, stop: the hits of `data` that count; it has others, if it has any.
+    """
+
+    dims: tuple[str, ...]
+    data: Any
+    attrs: Mapping[str, Any]
+    first: int = 0
+    stop: int | None = None
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Extents along `dims`."""
+        if _HIT not in self.dims:
+            return tuple(self.data.shape)
+        return len(range(self.data.shape[0])[self.first : self.stop]), *self.data.shape[1:]
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """The values, in memory."""
+        return np.asarray(self.data[self.first : self.stop] if _HIT in self.dims else self.data[...])
+
+    def part(self, hits: slice) -> Column:
+        """The column of some of the hits."""
+        if _HIT not in self.dims:
+            return self
+        first, stop, _ = hits.indices(self.shape[0])
+        return replace(self, first=self.first + first, stop=self.first + stop)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Variables, coordinates among them, and global attributes.
+
+    Attributes:
+        variables: columns by their names; "hit" is the first dimension of those that have it.
+        coords: names of those that are coordinates.
+        attrs: global attributes.
+    """
+
+    variables: Mapping[str, Column]
+    coords: frozenset[str]
+    attrs: dict[str, Any]
+
+    @classmethod
+    def of(
+        cls, data: Mapping[str, tuple[Any, ...]], coordinates: Mapping[str, tuple[Any, ...]], attrs: Mapping[str, Any]
+    ) -> Table:
+        """From dimensions, values and attributes of every variable, as xarray takes them."""
+        return cls(_columns({**data, **coordinates}), frozenset(coordinates), dict(attrs))
+
+    @property
+    def sizes(self) -> dict[str, int]:
+        """Extents of the dimensions."""
+        return {name: size for one in self.variables.values() for name, size in zip(one.dims, one.shape, strict=True)}
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.variables
+
+    @overload
+    def __getitem__(self, name: str) -> Column: ...
+
+    @overload
+    def __getitem__(self, name: list[str]) -> Table: ...
+
+    def __getitem__(self, name: str | list[str]) -> Column | Table:
+        """A column, or those of some names with all coordinates."""
+        if isinstance(name, str):
+            return self.variables[name]
+        kept = {*name, *self.coords}
+        return replace(self, variables={key: one for key, one in self.variables.items() if key in kept})
+
+    def isel(self, *, hit: slice) -> Table:
+        """Some of the hits."""
+        return replace(self, variables={name: one.part(hit) for name, one in self.variables.items()})
+
+    def load(self) -> Table:
+        """The same, in memory."""
+        return self.assign({name: (one.dims, one.values, one.attrs) for name, one in self.variables.items()})
+
+    def assign(self, variables: Mapping[str, tuple[Any, ...]]) -> Table:
+        """With other values of these variables; new ones are no coordinates."""
+        return replace(self, variables={**self.variables, **_columns(variables)})
+
+    def assign_coords(self, variables: Mapping[str, tuple[Any, ...]]) -> Table:
+        """With these coordinates behind all others."""
+        kept = self.drop_vars(variables)
+        return replace(kept, variables={**kept.variables, **_columns(variables)}, coords=self.coords | {*variables})
+
+    def assign_attrs(self, attrs: Mapping[str, Any]) -> Table:
+        """With these global attributes over its own."""
+        return replace(self, attrs=self.attrs | dict(attrs))
+
+    def drop_vars(self, names: Collection[str]) -> Table:
+        """Without these variables, as far as they are there."""
+        kept = {name: one for name, one in self.variables.items() if name not in names}
+        return replace(self, variables=kept, coords=self.coords - {*names})
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The Dataset, in memory."""
+        import xarray
+
+        told = {name: (one.dims, one.values, dict(one.attrs)) for name, one in self.variables.items()}
+        data = {name: one for name, one in told.items() if name not in self.coords}
+        return xarray.Dataset(data, {name: one for name, one in told.items() if name in self.coords}, self.attrs)
+
+
+def joined(tables: Iterable[Table]) -> Table:
+    """Tables of the same variables, one behind the other; what has no hits, and the attributes, from the first."""
+    first, *others = tables
+    columns = {
+        name: (one.dims, np.concatenate([one.values, *(other[name].values for other in others)]), one.attrs)
+        for name, one in first.variables.items()
+        if _HIT in one.dims
+    }
+    return first.assign(columns)
+
+
+def _columns(variables: Mapping[str, tuple[Any, ...]]) -> dict[str, Column]:
+    return {
+        str(name): Column((dims,) if isinstance(dims, str) else tuple(dims), np.asarray(values), attrs)
+        for name, (dims, values, attrs) in variables.items()
+    }
