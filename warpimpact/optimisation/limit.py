@@ -147,7 +147,7 @@ class LimitMap(HitMap):
 
     def _beside_solid(self, campaign: Campaign, found: Table, **how: Any) -> Table:
         """The Dataset with the limits of some shots at the solid plate that is as heavy as the whole target."""
-        plate, promise, progress, hits = campaign.target.solid, how["promise"], how.get("progress"), found.sizes[v.HIT]
+        plate, promise, progress, hits = campaign.target.solid, how["promise"], how.get("progress"), found.sizes["hit"]
         scene = campaign.scene.model_copy(update={"target": plate})
         begin = time.perf_counter()
         limits = replace(self, layer=0)._search(

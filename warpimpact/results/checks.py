@@ -57,7 +57,9 @@ _TOGETHER = (
 
 _WHOLE = (
     v.LAYER_VARIABLES + v.LAYER_FACES,
-    *v.GROUPS.values(),
+    v.LAYER_COORDINATES + v.LAYER_STANDOFF_VARIABLES,
+    v.OUTLINE_VARIABLES,
+    tuple(v.SOLID_VARIABLES),
 )
 """Variables of which a result has all or none."""
 _OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)

@@ -40,6 +40,8 @@ def with_solid_limits(dataset: AResult, quantity: str, limits: Limits) -> AResul
 def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """The limits at the solid plate as a result of limits: along "hit", with the attributes of that plate. None if the
     result has none. One shot tells of all hits; else they are those of the first hits."""
+    import xarray
+
     quantity = dataset.attrs.get(attr.LIMIT)
     if quantity is None or (name := v.SOLID_LIMITS[quantity]) not in dataset.variables:
         return None
@@ -57,6 +59,4 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
         attr.LIMIT_DENSITY: dataset.attrs[attr.SOLID_LIMIT_DENSITY],
     }
     names = v.LIMITS[quantity].value, v.STATUS
-    import xarray
-
     return xarray.Dataset(described(names, dict(zip(names, (values, status), strict=True))), attrs=told)

@@ -76,7 +76,12 @@ def open_table(path: Path) -> Iterator[Table]:
         for group in groups:
             source[group].set_auto_maskandscale(False)
         own = {name: _column(variable) for name, variable in source.variables.items()}
-        grouped = {name: _column(source[group][name]) for group in groups for name in v.GROUPS[group]}
+        grouped = {
+            name: _column(source[group][name])
+            for group in groups
+            for name in v.GROUPS[group]
+            if name in source[group].variables
+        }
         named = {name for column in own.values() for name in column.attrs.pop("coordinates", "").split()}
         coords = {*named, *grouped, *(name for name in own if own[name].dims == (name,))}
         yield Table(own | grouped, frozenset(coords), {name: source.getncattr(name) for name in source.ncattrs()})
