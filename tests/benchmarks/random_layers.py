@@ -109,10 +109,10 @@ def computed(case: Layered, shots: Shots, fidelity: Fidelity) -> Outcomes:
     return simulate(case.scene, shots, numerics=fidelity, device="cpu", threads=1)
 
 
-def errors(found: Outcomes, truth: Outcomes, impact: Array) -> list[float]:
-    """90th percentiles of the errors, as a promise counts them: of velocity [m/s], tilt [degree] and depth [mm]; NaN
-    where no core stops in a layer."""
-    velocity, tilt, depth = changes(found, truth, impact)
+def errors(found: Outcomes, truth: Outcomes) -> list[float]:
+    """90th percentiles of the errors: of velocity [m/s], tilt [degree] and depth [mm]; NaN where no core stops in a
+    layer."""
+    velocity, tilt, depth = changes(found, truth)
     depth = depth[np.isfinite(depth)]
     return [p90(velocity), math.degrees(p90(tilt)), 1e3 * p90(depth) if len(depth) else math.nan]
 
@@ -124,7 +124,7 @@ def measured(case: Layered, hits: int) -> dict[str, Any]:
     row: dict[str, Any] = {
         "scene": case.name,
         "statuses": np.bincount(truth.status, minlength=4)[:4].tolist(),
-        "uncertain": errors(before, truth, shots.velocity),
+        "uncertain": errors(before, truth),
     }
     for name in NAMES:
         begin = time.process_time()
@@ -134,7 +134,7 @@ def measured(case: Layered, hits: int) -> dict[str, Any]:
             "level": LADDER.index(promise.fidelity),
             "kept": promise.kept,
             "told": [promise.residual_velocity_error, math.degrees(promise.tilt_error), 1e3 * promise.depth_error],
-            "found": errors(computed(case, shots, promise.fidelity), truth, shots.velocity),
+            "found": errors(computed(case, shots, promise.fidelity), truth),
         }
     return row
 
