@@ -60,7 +60,7 @@ ENDS = {
     "SIGTERM": {0, 130, -signal.SIGTERM},
     "SIGKILL": {0, -signal.SIGKILL},
     "disk limit": {0, 2},
-    "worker killed": {0},
+    "worker killed": {0, 2},  # 2 if Dask starts no other one
     "scheduler killed": {0, 2},
 }
 """Exit codes that a run may end with; before it listens to signals, the system ends it, and it may be done already."""

@@ -160,7 +160,12 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
     if store.saved:
         watch.promise = team.job.promise_in(store.load(min(store.saved)))
     else:
-        watch.promise = awaited(team.pilot(), _REPORT_EVERY, lambda: follow(watch.standing(0)))
+
+        def tick() -> None:
+            team.width()  # tells of a cluster that has lost its workers
+            follow(watch.standing(0))
+
+        watch.promise = awaited(team.pilot(), _REPORT_EVERY, tick)
     tasks = _tasks(store, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
     waiting: dict[Future[Table], range] = {}
     try:

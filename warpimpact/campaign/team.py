@@ -32,6 +32,8 @@ that. It is one shard at least, and one shard on the worker of a cluster."""
 _HIT_MAP = HitMap()
 
 
+LONELY = 120.0
+"""Seconds for which a scheduler may be without workers."""
 _PATIENCE = 1.0
 """Seconds for which a team waits for computations that nobody wants any more: what a thread of this machine computes
 can be broken off between two launches of a kernel only."""
@@ -185,7 +187,6 @@ def cluster_team(
     """
     try:
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
-        from distributed.client import ClosedClientError
         from distributed.comm import CommClosedError
         from distributed.utils import silence_logging_cmgr
     except ImportError:
@@ -208,16 +209,11 @@ def cluster_team(
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
         executor, levels = client.get_executor(pure=False), dict[str, Refining]()
-
-        def asked(request: Callable[..., Any], *arguments: Any) -> Any:
-            try:
-                return request(*arguments)
-            except (OSError, ClosedClientError) as error:  # of the client: here no file is written
-                raise _lost(address, error) from None
-
+        reached = _Reached(client, address)
+        asked = reached.asked
         try:
-            kind = asked(executor.submit, made_by, device).result()
-            campaign = awaited(asked(executor.submit, _looked_at, campaign), _LISTEN_EVERY, lambda: None)
+            kind = awaited(asked(executor.submit, made_by, device), _LISTEN_EVERY, reached.threads)
+            campaign = awaited(asked(executor.submit, _looked_at, campaign), _LISTEN_EVERY, reached.threads)
             how = _How(device, threads, kind, f"warpimpact-{uuid4().hex}" if campaign.numerics.tolerance else "")
             if how.topic:
                 asked(client.subscribe_topic, how.topic, lambda event: _hear(levels, event[1]))
@@ -225,7 +221,7 @@ def cluster_team(
                 job=job,
                 pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
                 submit=lambda *shots: asked(executor.submit, _compute_alike, job, campaign, *shots, how),
-                width=lambda: 2 * max(1, sum(asked(client.nthreads).values())),
+                width=lambda: 2 * max(1, reached.threads()),
                 task=lambda rate: _task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
@@ -235,6 +231,39 @@ def cluster_team(
             raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+class _Reached:
+    """A scheduler that may be lost, or all of its workers.
+
+    Raises:
+        ClusterError: the scheduler is lost, or has had no worker for LONELY seconds.
+    """
+
+    def __init__(self, client: Any, address: str) -> None:
+        self._client, self._address, self._seen = client, address, time.monotonic()
+
+    def asked(self, request: Callable[..., Any], *arguments: Any) -> Any:
+        """What a request to the scheduler returns."""
+        from distributed.client import ClosedClientError
+
+        try:
+            return request(*arguments)
+        except (OSError, ClosedClientError) as error:  # of the client: here no file is written
+            raise _lost(self._address, error) from None
+
+    def threads(self) -> int:
+        """Of all workers."""
+        count: int = sum(self.asked(self._client.nthreads).values())
+        now = time.monotonic()
+        if count:
+            self._seen = now
+        elif now - self._seen > LONELY:
+            raise ClusterError(
+                f"scheduler: {self._address} has had no worker for {LONELY:g} s; start some; what is computed is "
+                "saved, continue with --resume"
+            )
+        return count
 
 
 def _lost(address: str, error: BaseException) -> ClusterError:

@@ -214,6 +214,16 @@ def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(campaign: Campaign, c
     assert said.getvalue() == "printed again\n"
 
 
+def test_a_scheduler_without_workers_is_told(
+    campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("warpimpact.campaign.team.LONELY", 0.3)
+    with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty:
+        computing = cluster_team(campaign, address=empty.scheduler_address, device="cpu")
+        with pytest.raises(ClusterError, match=r"has had no worker for 0.3 s; start some; .* continue with --resume"):
+            run_to_file(campaign, tmp_path / "a.nc", team=computing)
+
+
 def test_workers_of_this_machine_listen_on_the_loopback(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
 
