@@ -22,6 +22,7 @@ def build(variant: Variant) -> SimpleNamespace:
     quarter, six, twelve, twenty, thirty, forty_two = (real(value) for value in (0.25, 6.0, 12.0, 20.0, 30.0, 42.0))
     gamma, two_gamma = real(1.0 - math.sqrt(0.5)), real(2.0 - math.sqrt(2.0))
     small_square = real(0.02**2)  # of half an angle [rad²]
+    faint = real(1.0e-8)  # square of a share of the change along the axis
     least_normal = real(
         math.ldexp(1.0, -1022 if variant.double else -126)
     )  # the inverse of a smaller number is infinite
@@ -227,10 +228,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def swings(body: Body, before: Change, last: Change):
-        """Whether a step has turned back the change across the axis that the one before it made."""
+        """Whether a step has turned back the change across the axis that the one before it made, by more than rounding
+        can: in a straight shot nothing else acts across the axis."""
         pushed = before.velocity[1] * last.velocity[1] + before.velocity[2] * last.velocity[2]
         turned = before.omega[1] * last.omega[1] + before.omega[2] * last.omega[2]
-        return body.mass * pushed + body.inertia_transverse * turned < zero
+        rounding = faint * wp.abs(before.velocity[0] * last.velocity[0])
+        return body.mass * (pushed + rounding) + body.inertia_transverse * turned < zero
 
     @wp.func
     def mean_load(body: Body, state: State, load: Load, dt: real):
