@@ -1,5 +1,7 @@
 """The load of one step in the block layout: the lanes of a block share out the patches (kernels/lanes.py).
 
+Lane k takes every 32nd patch, from the k-th on, of one list: the patches of all rings that may close in.
+
 The passes, the law and the filter are those of the simple layout (kernels/contact.py, kernels/exposure.py). Different
 are the place of the window, in the block's shared memory, and how exposure is added to it: as whole numbers, because
 their sum does not depend on the order of the lanes. So an outcome has the same bits in every run.
@@ -16,8 +18,8 @@ Where the barriers stand, and what would go wrong without each of them (E is the
 7. After the window is cleared (`open_window`), as after 6.
 
 Butterflies stand between the passes and 5, and between the steps. They make lanes wait, but order no memory: hence 5, 6
-and 7. Touches need no barrier: a patch belongs to one lane in both passes. Nor does `settle` need one before it for G:
-it goes over the same nodes, in the same lanes, as the second direction of the filter. All conditions around barriers
+and 7. Touches need no barrier: a patch belongs to the same lane in every loop. Nor does `settle` need one before it for
+G: it goes over the same nodes, in the same lanes, as the second direction of the filter. All conditions around barriers
 hold for all lanes alike, since they follow from sums over the lanes or from the state.
 """
 

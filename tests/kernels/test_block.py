@@ -123,7 +123,7 @@ def test_block_computes_what_one_thread_computes(name: str, device: str) -> None
     assert_same(by_block, simple)
 
 
-@pytest.mark.parametrize("name", ["slots", "oblique and yawed", "no degradation"])
+@pytest.mark.parametrize("name", ["slots", "oblique and yawed", "a shank in round holes", "no degradation"])
 def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
     name: str, in_blocks: pytest.MonkeyPatch
 ) -> None:
@@ -220,7 +220,8 @@ def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
     kernel, *structs = probe_of(variant)
     Surface, Plate_, Fields, Law, Load, Touches = structs
     put = inputs.Put("cpu", variant.real)
-    surface = inputs.surface_of(Surface, CORE, rings_of(CORE, 23, 32), azimuths_of(32), put)
+    around = 36  # so that a round of the lanes spans two rings
+    surface = inputs.surface_of(Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)
     plate = plate_of(Plate_, np.ones((1, 1)), np.array([CELL, CELL]), CELL, "cpu", real=variant.real)
     law = Law()
     law.a0, law.friction, law.onset, law.decay_rate = 2.6e9, 0.05, 2.0, np.log(0.8) / 1e-6
