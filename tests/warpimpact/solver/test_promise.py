@@ -83,13 +83,21 @@ def test_what_cannot_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     # With a ladder of two levels and a promise of nothing, the finest level that can be judged is taken.
     monkeypatch.setattr(promise, "LADDER", LADDER[:2])
     nothing = PROMISES["draft"].tolerance.model_copy(update={"residual_velocity": 1e-9})
-    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0, 8))
+    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0, 5, 8))
     found = keep(SCENE, Numerics(fidelity="draft"), PILOT[:8], device="cpu")
     assert not found.kept
     assert found.fidelity == LADDER[0]
     coarse, fine = (simulate(SCENE, PILOT[:8], numerics=level, device="cpu") for level in LADDER[:2])
     largest = np.abs(coarse.residual_velocity - fine.residual_velocity).max()
     assert found.residual_velocity_error == pytest.approx(MARGIN[1] * largest)
+
+
+def test_a_name_ends_at_its_finest_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing = PROMISES["draft"].tolerance.model_copy(update={"residual_velocity": 1e-9})
+    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0, 1, 4))
+    found = keep(SCENE, Numerics(fidelity="draft"), PILOT[:4], device="cpu")
+    assert not found.kept
+    assert found.fidelity == LADDER[1]
 
 
 def test_levels_that_do_not_fit_the_memory_end_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
