@@ -25,7 +25,7 @@ from warpimpact.analysis.summary import (
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, hit_numbers
+from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.statistics.intervals import Estimate
 
@@ -84,8 +84,12 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
-    """Means and quantiles of the cores that passed the plate, with intervals."""
-    yield f"{'passed the plate':<43}{'':>10}   95 % interval"
+    """Means and quantiles of the cores that passed the plate, or the target, with intervals."""
+    what = "target" if v.LAYER_STATUS in dataset else "plate"
+    if any(passed(part).any() for part in slices(dataset[[v.STATUS]])):
+        yield f"{f'passed the {what}':<43}{'':>10}   95 % interval"
+    else:
+        yield f"no core passed the {what}"
     shown = [name for name in v.shown_by("inspect") if name in dataset]
     for mean in means_of(shown, dataset[v.STANDOFF].values.tolist()):
         name = mean.text.removeprefix("mean(").removesuffix(")")
