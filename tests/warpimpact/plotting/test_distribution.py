@@ -142,6 +142,12 @@ def test_uniform_results_have_marginals_and_dispersion(make_result, status):
         figure.draw_without_rendering()
 
 
+def test_a_dispersion_without_cores_says_so(make_result):
+    _, centre, *_ = dispersion(make_result([Status.ARRESTED] * 100)).axes
+    assert [text.get_text() for text in centre.texts] == ["no core behind the plate"]
+    assert not len(centre.get_xticks())
+
+
 @pytest.mark.parametrize("count", [400, 12000])
 def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
     dataset = make_result(np.tile(MIXED, count // 4))
