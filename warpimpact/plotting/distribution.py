@@ -89,7 +89,10 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
     corner.remove()
     tilt, velocity = draw_dispersion(centre, dataset, standoff)
     for axes, values, orientation in ((above, tilt, "vertical"), (beside, velocity, "horizontal")):
-        axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
+        if len(values):
+            axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
+        else:
+            axes.set(xticks=[], yticks=[])
         axes.label_outer()
     above.set_ylabel("hits")
     beside.set_xlabel("hits")

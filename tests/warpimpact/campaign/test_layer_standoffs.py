@@ -8,12 +8,14 @@ import xarray
 from matplotlib.colors import to_hex
 
 from warpimpact import Campaign, hit_map, run, to_dataframe
+from warpimpact.analysis.inspect import inspect_text
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import LayerStatus
 from warpimpact.plotting import poses, trajectory
 from warpimpact.plotting.cell import GREY, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
+from warpimpact.report.words import told
 from warpimpact.results import files
 
 CAMPAIGN = """
@@ -122,7 +124,16 @@ def test_the_legend_of_layers_names_each_colour_once(result: xarray.Dataset) -> 
     assert colours["no value: arrested"] == to_hex(GREY).upper()
 
 
+def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:
+    tables = told("a", result)["tables"]
+    assert tables["layer 1"] == {"gap": "60 mm", "thickness": "2 mm", "resistance": "2600 MPa"}
+    assert tables["layer 2"]["gap"] == "80 mm"
+
+
 def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
+    weight = result.attrs["areal_density"]
+    assert f"areal density {weight:.1f} kg/m² of the whole target" in inspect_text(result)
+    assert f"the whole target weighs {weight:.3g} kg/m²" in told("a", result)["asked"]
     assert shown(result, "tilt").title.startswith("tilt, 50 mm behind the target")
     assert "on impact and behind the target" in trajectory.flight(replay(result, 3, snapshots=0)).get_suptitle()
 
