@@ -28,4 +28,17 @@ def hit_text(history: xarray.Dataset) -> str:
         for tilt in history[v.TILT]
         if tilt.notnull()
     ]
-    return "\n".join([*lines, _AGREEMENT[history.attrs[attr.AGREEMENT]]])
+    return "\n".join([*lines, *_broken(history), _AGREEMENT[history.attrs[attr.AGREEMENT]]])
+
+
+def _broken(history: xarray.Dataset) -> list[str]:
+    """Whether the core broke, and when and where, if it has a strength."""
+    if v.BROKEN not in history:
+        return []
+    if not history[v.BROKEN]:
+        return ["The bending stress stayed below the core's strength."]
+    time, section = float(history[v.BROKEN_TIME]) * 1e6, float(history[v.BROKEN_SECTION]) * 1e3
+    return [
+        f"The bending stress passed the core's strength after {time:.1f} µs, {section:.1f} mm behind the nose. The "
+        "computed core goes on as one body."
+    ]

@@ -25,7 +25,7 @@ from warpimpact.analysis.summary import (
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, hit_numbers
+from warpimpact.results.dataset import failed, hit_numbers, passed
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.statistics.intervals import Estimate
 
@@ -62,7 +62,8 @@ def _origin(dataset: xarray.Dataset) -> Iterator[str]:
         yield f"{'symmetry':<12}{symmetry_text(dataset)}"
     if attr.AREAL_DENSITY in told:
         numbers = plate_numbers(told[attr.OPEN_AREA], told.get(attr.LIGAMENT, math.inf), told[attr.AREAL_DENSITY])
-        yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}"
+        whole = " of the whole target" if v.LAYER_STATUS in dataset else ""
+        yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}{whole}"
     if (promise := promise_text(dataset)) is not None:
         yield f"{'accuracy':<12}{promise}"
     for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY):
@@ -84,8 +85,12 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
-    """Means and quantiles of the cores that passed the plate, with intervals."""
-    yield f"{'passed the plate':<43}{'':>10}   95 % interval"
+    """Means and quantiles of the cores that passed the plate, or the target, with intervals."""
+    what = "target" if v.LAYER_STATUS in dataset else "plate"
+    if any(passed(part).any() for part in slices(dataset[[v.STATUS]])):
+        yield f"{f'passed the {what}':<43}{'':>10}   95 % interval"
+    else:
+        yield f"no core passed the {what}"
     shown = [name for name in v.shown_by("inspect") if name in dataset]
     for mean in means_of(shown, dataset[v.STANDOFF].values.tolist()):
         name = mean.text.removeprefix("mean(").removesuffix(")")

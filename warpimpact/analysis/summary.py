@@ -16,7 +16,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
-from warpimpact.solver.promise import PROMISES
+from warpimpact.solver.promise import PROMISES, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
 if TYPE_CHECKING:
@@ -49,7 +49,8 @@ class Summary:
     """Outcome counts by status, and the spread of what left the rear face.
 
     Velocities are in m/s, angles in degrees; ``tilt`` is keyed by the stand-off [m]. ``base_depth`` [m] counts as
-    `analysis.base.base_depth`; None where no layer is behind the plate.
+    `analysis.base.base_depth`; None where no layer is behind the plate. ``broken`` counts the cores whose bending
+    stress passed their strength, whatever their status; None if cores have none.
     """
 
     counts: dict[str, int]
@@ -57,6 +58,7 @@ class Summary:
     deflection: Spread
     tilt: dict[float, Spread]
     base_depth: Spread | None = None
+    broken: int | None = None
 
 
 def promise_text(dataset: Result) -> str | None:
@@ -72,8 +74,7 @@ def promise_text(dataset: Result) -> str | None:
     tolerance = PROMISES[given["fidelity"]].tolerance
     stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
-    depth = f" and {1e3 * told[attr.DEPTH_ERROR_P90]:.2g} mm of depth" if attr.DEPTH_ERROR_P90 in told else ""
-    found = f"estimated errors: {velocity:.2g} m/s and {tilt:.2g} deg{depth}"
+    found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR_P90, math.nan))}"
     if told[attr.PROMISE_KEPT]:
         return f"{given['fidelity']} keeps its promise ({stated}); {found}"
     return f"{given['fidelity']} does not keep its promise ({stated}) at the level that it may use; {found}"
@@ -93,6 +94,7 @@ def summary(dataset: Result) -> Summary:
         deflection=Spread.of(estimates[deflection]),
         tilt={at: Spread.of(estimates[measure]) for at, measure in zip(standoffs, tilt, strict=True)},
         base_depth=_base_depth(dataset),
+        broken=_broken(dataset),
     )
 
 
@@ -102,6 +104,12 @@ def _base_depth(dataset: Result) -> Spread | None:
     needed = dataset[[name for name in base.NEEDED if name in dataset]]
     depths = np.concatenate([base.base_depth(part) for part in slices(needed)])
     return Spread.of(estimate_of("mean", depths, **dealing(dataset)))
+
+
+def _broken(dataset: Result) -> int | None:
+    if v.BROKEN not in dataset:
+        return None
+    return sum(int(part[v.BROKEN].values.sum()) for part in slices(dataset[[v.BROKEN]]))
 
 
 def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
@@ -151,6 +159,8 @@ def summary_text(dataset: Result) -> str:
     result = summary(dataset)
     hits = dataset.sizes["hit"]
     rows = [_count_row(meaning, count, hits) for meaning, count in result.counts.items() if count]
+    if result.broken is not None:
+        rows.append(_count_row("broken", result.broken, hits))
     rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<18}  spread")
     rows += [
         _spread_row("residual velocity", result.residual_velocity, "m/s"),

@@ -32,7 +32,7 @@ _OF_A_MAP = (
 )
 
 
-def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xarray.Dataset:
+def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapshots: int = 6) -> xarray.Dataset:
     """Compute one hit of a result again, on the CPU, from the campaign that the result contains.
 
     If symmetry unfolded the hit, the computed hit of its group is computed again and its history is unfolded.
@@ -41,6 +41,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xar
         result: the Dataset of `run`.
         hit: its number, which in a choice of the hits is still that of the whole result.
         folder: folder of the files that the campaign names, if it names any.
+        snapshots: number of instants at which the history shows what is left of the plate; 0 costs least.
 
     Returns:
         The Dataset of `results.history_dataset`. Its attribute `agreement` compares its end with the stored
@@ -69,7 +70,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".") -> xar
     computed, shot = images[: 1 + before], images[image + before :][:1]
     if campaign.drawn is not None:
         ((_, scene),) = campaign.drawn.scenes(scene, computed)
-    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place))
+    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place), snapshots=snapshots)
     home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
     period, double = campaign.hits.covered(campaign.plate), is_double(campaign)

@@ -90,7 +90,7 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
         variable.removeprefix("layer_").removeprefix("standoff_") if variable in v.LAYER_NUMBERS else variable
     )
     if "standoff" in array.coords:
-        title += f", {float(array[v.STANDOFF]) * _MM:g} mm behind the plate"
+        title += f", {float(array[v.STANDOFF]) * _MM:g} mm behind the {struck(dataset)}"
     if v.LAYER_STANDOFF in array.coords:
         title += f", {float(array[v.LAYER_STANDOFF]) * _MM:g} mm behind layer {_number(dataset, layer)}"
     elif variable in v.LAYER_NUMBERS:
@@ -111,6 +111,11 @@ def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None, la
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
     return chosen(dataset, variable, standoff, layer)
+
+
+def struck(dataset: xarray.Dataset) -> str:
+    """What the shots of a result or a history go through, in a word."""
+    return "target" if v.LAYER_STATUS in dataset else "plate"
 
 
 def words(name: str) -> str:
@@ -261,7 +266,7 @@ def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_], layer: in
     """Legend entry of the grey hits: their statuses."""
     status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
     found = set(status[~exists].tolist())
-    return fill(", ".join(words(code.name.lower()) for code in LayerStatus if code in found), 30)
+    return fill(f"no value: {', '.join(words(code.name.lower()) for code in LayerStatus if code in found)}", 30)
 
 
 def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist]) -> None:

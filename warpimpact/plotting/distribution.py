@@ -20,6 +20,7 @@ from warpimpact.plotting.cell import (
     scale_of,
     shots_text,
     shown,
+    struck,
     tree_of,
 )
 from warpimpact.results import attributes as attr
@@ -88,7 +89,10 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
     corner.remove()
     tilt, velocity = draw_dispersion(centre, dataset, standoff)
     for axes, values, orientation in ((above, tilt, "vertical"), (beside, velocity, "horizontal")):
-        axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
+        if len(values):
+            axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
+        else:
+            axes.set(xticks=[], yticks=[])
         axes.label_outer()
     above.set_ylabel("hits")
     beside.set_xlabel("hits")
@@ -110,6 +114,9 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
         axes.axvline(np.median(x), color=_VERMILION, lw=1.0, ls="--", label="medians")
         axes.axhline(np.median(y), color=_VERMILION, lw=1.0, ls="--")
         axes.legend(frameon=False, loc="best")
+    else:
+        axes.text(0.5, 0.5, "no core behind the " + struck(dataset), transform=axes.transAxes, ha="center", va="center")
+        axes.set(xticks=[], yticks=[])
     axes.set(xlabel=f"{tilt.title.partition(chr(10))[0]} [°]", ylabel=velocity.label)
     return x, y
 

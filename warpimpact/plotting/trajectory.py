@@ -19,7 +19,7 @@ from matplotlib.patheffects import Normal, Stroke
 
 from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.analysis.surface import pressed
-from warpimpact.plotting.cell import words
+from warpimpact.plotting.cell import struck, words
 from warpimpact.plotting.layers import layers
 from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
 from warpimpact.plotting.pressure import pressure
@@ -45,7 +45,7 @@ _ARC, _ARC_RADIUS = 300.0, 4.5  # angle [degree] and radius [mm] of the arc of a
 def passage(dataset: xarray.Dataset) -> Figure:
     """The core at equal intervals of its passage through the plate (the paper's figs. 7 and 9)."""
     poses = poses_in_plate(dataset)
-    figure, views = two_views(dataset, poses.values(), "passage through the plate", room=5.0)
+    figure, views = two_views(dataset, poses.values(), f"passage through the {struck(dataset)}", room=5.0)
     colours = colormaps["viridis"](np.linspace(0.0, 0.9, len(poses)))
     for view, axes in views.items():
         for (label, pose), colour in zip(poses.items(), colours, strict=True):
@@ -60,12 +60,13 @@ def passage(dataset: xarray.Dataset) -> Figure:
 def flight(dataset: xarray.Dataset) -> Figure:
     """The core on impact, and at the stand-offs if it passes the plate (the paper's figs. 8 and 10)."""
     poses = {"impact": pose_at_step(dataset, 0), **poses_behind(dataset)}
-    figure, views = two_views(dataset, poses.values(), "on impact and behind the plate", room=15.0)
+    figure, views = two_views(dataset, poses.values(), f"on impact and behind the {struck(dataset)}", room=15.0)
     for view, axes in views.items():
         for label, pose in poses.items():
             outline = silhouette(dataset, pose, view) * _MM
             axes.add_patch(Polygon(outline, facecolor="0.55", edgecolor="black"))
             angle = np.degrees(np.arctan2(pose.axis["xyz".index(view)], pose.axis[0]))
+            angle = round(float(angle), 1) + 0.0  # no "-0.0"
             axes.text(
                 outline[:, 0].mean(),
                 outline[:, 1].max() + 1.0,
@@ -133,7 +134,7 @@ def _draw_moment(axes: Axes, dataset: xarray.Dataset, step: int, view: str) -> N
 def course(dataset: xarray.Dataset) -> Figure:
     """Velocity, attitude, loads and energy against time."""
     figure = Figure(figsize=(10.0, 9.0), layout="constrained")
-    figure.suptitle(_title(dataset, "course through the plate"))
+    figure.suptitle(_title(dataset, f"course through the {struck(dataset)}"))
     panels = figure.subplots(3, 2, sharex=True)
     time, axis = dataset[v.TIME] * _US, dataset[v.CORE_AXIS]
     velocity = dataset[v.VELOCITY]

@@ -67,8 +67,9 @@ def write_report(
     followed = _followed(sum(map(len, chosen)), progress)
     data = page_data(shown)
     for name, hits, drawn in zip(datasets, chosen, data["results"], strict=True):
-        drawn["trajectories"] = {
-            hit: trajectory_data(replay(datasets[name], hit, folder=folders[name])) for hit in followed(hits)
+        drawn["trajectories"] = {  # the page does not show what is left of the plate
+            hit: trajectory_data(replay(datasets[name], hit, folder=folders[name], snapshots=0))
+            for hit in followed(hits)
         }
         drawn["first"] = telling(datasets[name], hits)
     page = _page(

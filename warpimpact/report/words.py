@@ -121,7 +121,10 @@ def _asked(dataset: xarray.Dataset) -> str:
     )
     if attr.AREAL_DENSITY in dataset.attrs:
         told = dataset.attrs
-        text += f" The plate has {told[attr.OPEN_AREA]:.1%} open area and weighs {told[attr.AREAL_DENSITY]:.3g} kg/m²."
+        weighs = "the whole target weighs" if v.LAYER_STATUS in dataset else "weighs"
+        text += (
+            f" The plate has {told[attr.OPEN_AREA]:.1%} open area and {weighs} {told[attr.AREAL_DENSITY]:.3g} kg/m²."
+        )
     return text
 
 
@@ -130,7 +133,7 @@ def _caveats(dataset: xarray.Dataset) -> list[str]:
     promise = promise_text(dataset)
     numerics = "The error of the numerics is not known." if promise is None else f"Numerics: {promise}."
     chance = "Intervals describe the hits that were drawn."
-    model = "The core is rigid: it neither breaks nor erodes, which overstates what comes through where cores break."
+    model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
     return [sentence for sentence in (chance, sampling_note(dataset), numerics, model) if sentence]
 
 
@@ -146,7 +149,9 @@ def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
 
 
 def _flat(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, dict[str, str]]]:
-    """A table and its inner tables, by dotted names."""
+    """A table and its inner tables, by dotted names; the layers by their numbers."""
+    layers = {f"layer {number}": layer for number, layer in enumerate(table.get("layer") or (), 1)}
+    table = {key: value for key, value in table.items() if key != "layer"} | layers
     plain = {key: _plain(value) for key, value in table.items() if not isinstance(value, dict) and value is not None}
     if name and plain:
         yield name, plain

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpimpact.scene import Numerics
 from warpimpact.solver.limit import Limits, short_steps
-from warpimpact.solver.promise import MARGIN, upper_place
+from warpimpact.solver.promise import MARGIN, upper_digits, upper_place
 from warpimpact.solver.resolution import Fidelity, level
 
 PILOT = 16
@@ -67,7 +67,7 @@ def keep_limits(search: Callable[[Fidelity], Limits], numerics: Numerics, *, squ
         kept = error <= (2.0 * share if squared else share) * typical
         if kept or index == FINEST:
             break
-    shown = f"{1e3 * error:.2g} mm" if squared else f"{error:.2g} m/s"
+    shown = f"{upper_digits(1e3 * error)} mm" if squared else f"{upper_digits(error)} m/s"
     return LimitPromise(short_steps(level(index, numerics)), bool(kept), error, shown)
 
 

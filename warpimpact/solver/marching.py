@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from queue import SimpleQueue
 from typing import Any
 
@@ -140,7 +140,7 @@ class March:
         if self.variant.degrades and self.arrays.materials[0].weakens:
             exposure = _host(scratch[0].exposure)[: exposure.size]
         decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure.reshape(self.cells))
-        return np.asarray(self._material() * decayed), self._behind(scratch)
+        return np.asarray(self._material * decayed), self._behind(scratch)
 
     def _behind(self, scratch: tuple[Any, ...]) -> dict[int, Weakened]:
         if not (self.variant.layered and self.variant.degrades):
@@ -158,6 +158,7 @@ class March:
         hit = float(self.shots.hit_y[-1]), float(self.shots.hit_z[-1])
         return nodes_about(hit, self.cells, self.arrays.grid.spacing)
 
+    @cached_property
     def _material(self) -> Array:
         """Share of material about every node of the last shot's window."""
         return material_about(self.scene.target.plate, *self.nodes(), self.arrays.grid.spacing)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
 from typing import NamedTuple
 
 import numpy as np
@@ -79,10 +80,20 @@ class Promise:
     @property
     def phrase(self) -> str:
         """The errors, for a line of progress."""
-        errors = f"{self.residual_velocity_error:.2g} m/s and {math.degrees(self.tilt_error):.2g} deg"
-        if math.isfinite(self.depth_error):
-            errors += f" and {1e3 * self.depth_error:.2g} mm of depth"
+        errors = errors_text(self.residual_velocity_error, math.degrees(self.tilt_error), self.depth_error)
         return f"accuracy {errors} for 90 % of the hits{'' if self.kept else ', not as promised'}"
+
+
+def errors_text(velocity: float, tilt: float, depth: float = math.nan) -> str:
+    """Errors of residual velocity [m/s], tilt [degree] and depth [m], where there is one."""
+    errors = f"{upper_digits(velocity)} m/s and {upper_digits(tilt)} deg"
+    return errors if math.isnan(depth) else f"{errors} and {upper_digits(1e3 * depth)} mm of depth"
+
+
+def upper_digits(error: float) -> str:
+    """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
+    up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count
+    return f"{float(up):g}"
 
 
 def keep(

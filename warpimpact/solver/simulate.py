@@ -222,7 +222,8 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None =
 
     Args:
         shots: the shot, after those that hit the same plate before it; the numerics as in `simulate`.
-        snapshots: number of instants at which the plate is shown, evenly from the first touch to the end.
+        snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. Each computes
+            the shot again up to there; 0 computes no field of any layer.
     """
     march = _traced(scene, shots, numerics)
     contact = march.march()
@@ -235,10 +236,10 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None =
         outcomes=replace(outcomes, **{name: values[-1:] for name, values in vars(outcomes).items()}),
         history=History.from_trace(trace, march.body()),
         plate_time=trace[steps, 0] - 0.5 * time_step if march.variant.layered else steps * time_step,
-        resistance_share=np.stack([share for share, _ in left]),
+        resistance_share=np.array([share for share, _ in left]).reshape(-1, len(cell_y), len(cell_z)),
         cell_y=cell_y,
         cell_z=cell_z,
-        behind={number: _over_time(number, [behind for _, behind in left]) for number in left[-1][1]},
+        behind={number: _over_time(number, [behind for _, behind in left]) for number in (left[-1][1] if left else ())},
     )
 
 

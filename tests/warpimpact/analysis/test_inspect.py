@@ -120,3 +120,11 @@ def test_hits_that_miss_their_tolerance_are_counted_and_the_worst_are_named() ->
     assert lines[place + 5].startswith("  hit ")
     assert not lines[place + 6].startswith("  hit ")
     assert "accuracy    promises nothing, as numerics.tolerance is given" in lines
+
+
+def test_it_says_that_no_core_passed() -> None:
+    text = DRAFT.replace('resistance = "2600 MPa"', 'resistance = "200 GPa"').replace("count = 512", "count = 8")
+    assert text != DRAFT
+    told = inspect_text(run(Campaign.from_text(text, name="t", folder=Path()), device="cpu"))
+    assert "\nno core passed the plate\n" in told
+    assert "\npassed the plate" not in told

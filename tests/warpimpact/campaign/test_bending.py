@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact import Campaign
+from warpimpact.analysis.hit import hit_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.replay import replay
 from warpimpact.cli import main
@@ -77,3 +78,19 @@ def test_what_has_no_bending_is_refused(
     with pytest.raises(CampaignError, match=r"^\S+campaign.toml: ") as caught:
         Campaign.from_toml(written(tmp_path, tail, *changes))
     assert sentence in str(caught.value)
+
+
+def test_run_and_replay_tell_which_cores_break(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    weak = 'mass = "4 g"\nstrength = "2 GPa"'
+    path, output = written(tmp_path, "bending = true\n", ('mass = "4 g"', weak)), tmp_path / "a.nc"
+    assert main(["run", str(path), "-o", str(output), "--device", "cpu", "--count", "64"]) == 0
+    dataset = files.read(output)
+    broken = dataset["broken"].values
+    assert 0 < broken.sum() < 64
+    row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("broken"))
+    assert row.split() == ["broken", f"{broken.sum():.0f}", f"{broken.mean():.1%}"]
+    hit = int(broken.argmax())
+    time, section = (float(dataset[name][hit]) for name in ("broken_time", "broken_section"))
+    told = hit_text(replay(dataset, hit))
+    assert f"passed the core's strength after {1e6 * time:.1f} µs, {1e3 * section:.1f} mm behind the nose." in told
+    assert "stayed below the core's strength" in hit_text(replay(dataset, int(broken.argmin())))

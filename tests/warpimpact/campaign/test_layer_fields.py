@@ -48,10 +48,10 @@ degradation = 0.8
 SLOTS = '{ shape = "slot", length = "12 mm", width = "4 mm", spacing = ["8 mm", "16 mm"], staggered = true }'
 
 
-def history(hit: int, **given: object) -> xarray.Dataset:
+def history(hit: int, snapshots: int = 6, **given: object) -> xarray.Dataset:
     text = CAMPAIGN.format(**{"front": 2600, "degradation": 0.8, "layer": BEHIND, "irreducible": "false"} | given)
     campaign = Campaign.from_text(text, name="test", folder=Path())
-    found = replay(run(campaign, device="cpu"), hit)
+    found = replay(run(campaign, device="cpu"), hit, snapshots=snapshots)
     assert found.attrs["agreement"] == "bit-identical"
     return found
 
@@ -123,3 +123,11 @@ def test_layers_that_do_not_weaken_have_no_field() -> None:
     found = history(3, layer=solid)
     assert fields_behind(found) == []
     assert "layer_resistance_share" not in found
+
+
+def test_without_snapshots_all_but_the_fields_is_the_same(hit: xarray.Dataset) -> None:
+    bare = history(3, snapshots=0)
+    assert bare["resistance_share"].shape[0] == 0
+    assert fields_behind(bare) == []
+    fields = [name for name in hit.variables if "snapshot" in hit[name].dims or name.startswith("layer_cell")]
+    xarray.testing.assert_identical(bare.drop_dims("snapshot").drop_attrs(), hit.drop_vars(fields).drop_attrs())

@@ -5,13 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray
+from matplotlib.colors import to_hex
 
 from warpimpact import Campaign, hit_map, run, to_dataframe
+from warpimpact.analysis.inspect import inspect_text
 from warpimpact.campaign.replay import replay
 from warpimpact.campaign.text import CampaignError
-from warpimpact.plotting import poses
-from warpimpact.plotting.cell import shown
+from warpimpact.kernels.status import LayerStatus
+from warpimpact.plotting import poses, trajectory
+from warpimpact.plotting.cell import GREY, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
+from warpimpact.report.words import told
 from warpimpact.results import files
 
 CAMPAIGN = """
@@ -105,6 +109,33 @@ def test_the_figure_of_layers_has_a_row_for_each(result: xarray.Dataset) -> None
     assert [title.splitlines()[0] for title in titles[1::3]] == [f"residual velocity, layer {k}" for k in range(3)]
     behind = [f"tilt, {at} mm behind layer {k}" for k, at in enumerate((40, 50, 50))]
     assert [title.splitlines()[0] for title in titles[2::3]] == behind
+
+
+def test_the_legend_of_layers_names_each_colour_once(result: xarray.Dataset) -> None:
+    stopped = result.copy(deep=True)
+    stopped["layer_status"][:, 2] = LayerStatus.ARRESTED
+    stopped["layer_standoff_tilt"][:, 2] = stopped["layer_tilt"][:, 2] = np.nan
+    stopped["layer_residual_velocity"][:, 2] = np.nan
+    (legend,) = layers_figure(stopped).legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert sorted(texts) == ["arrested", "edge of hole", "no value: arrested", "perforated"]
+    colours = {patch.get_label(): to_hex(patch.get_facecolor()).upper() for patch in legend.get_patches()}
+    assert colours["arrested"] == STATUS_COLOURS[LayerStatus.ARRESTED]
+    assert colours["no value: arrested"] == to_hex(GREY).upper()
+
+
+def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:
+    tables = told("a", result)["tables"]
+    assert tables["layer 1"] == {"gap": "60 mm", "thickness": "2 mm", "resistance": "2600 MPa"}
+    assert tables["layer 2"]["gap"] == "80 mm"
+
+
+def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
+    weight = result.attrs["areal_density"]
+    assert f"areal density {weight:.1f} kg/m² of the whole target" in inspect_text(result)
+    assert f"the whole target weighs {weight:.3g} kg/m²" in told("a", result)["asked"]
+    assert shown(result, "tilt").title.startswith("tilt, 50 mm behind the target")
+    assert "on impact and behind the target" in trajectory.flight(replay(result, 3, snapshots=0)).get_suptitle()
 
 
 def test_a_replay_shows_the_core_between_the_layers(result: xarray.Dataset) -> None:

@@ -142,6 +142,13 @@ def test_uniform_results_have_marginals_and_dispersion(make_result, status):
         figure.draw_without_rendering()
 
 
+def test_a_dispersion_without_cores_says_so(make_result):
+    panels = dispersion(make_result([Status.ARRESTED] * 100)).axes
+    centre = panels[1]
+    assert not any(len(ticks) for axes in panels for ticks in (axes.get_xticks(), axes.get_yticks()))
+    assert [text.get_text() for text in centre.texts] == ["no core behind the plate"]
+
+
 @pytest.mark.parametrize("count", [400, 12000])
 def test_dispersion_shows_each_core_behind_the_plate(make_result, count):
     dataset = make_result(np.tile(MIXED, count // 4))

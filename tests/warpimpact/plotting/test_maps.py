@@ -92,7 +92,7 @@ def test_hits_that_did_not_pass_the_plate_are_grey(covered, variable):
     grey = [np.allclose(picture.colour(y * 1e3, z * 1e3), GREY, atol=0.01) for y, z in points]
     stopped = np.isin(status, [Status.ARRESTED, Status.RICOCHETED])
     assert np.mean(grey == stopped) >= 0.9
-    assert legend_texts(figure.axes[0]) == ["arrested, ricocheted", "edge of hole"]
+    assert legend_texts(figure.axes[0]) == ["no value: arrested, ricocheted", "edge of hole"]
 
 
 def test_no_grey_entry_when_every_hit_has_a_value(perforated):
@@ -253,7 +253,7 @@ def test_overview_shows_four_aligned_maps(covered):
     (legend,) = figure.legends
     entries = [text.get_text() for text in legend.get_texts()]
     statuses = [f"{name} 25.0%" for name in ("perforated", "arrested", "ricocheted", "missed")]
-    assert sorted(entries) == sorted(["arrested, ricocheted", "edge of hole", *statuses])
+    assert sorted(entries) == sorted(["no value: arrested, ricocheted", "edge of hole", *statuses])
 
 
 def test_overview_has_no_map_of_one_colour(perforated):

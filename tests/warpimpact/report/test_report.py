@@ -25,6 +25,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.plotting.poses import poses_behind, poses_in_plate, silhouette
 from warpimpact.report import hits, report
 from warpimpact.results import files
+from warpimpact.solver.marching import March
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 TRAJECTORIES = 6
@@ -339,3 +340,17 @@ def test_browser_changes_the_map_and_keeps_one_scale(browser: Browser, folder: P
         if key == "pitch at 50 mm":
             assert scales[0][0] == -scales[0][1]
     assert browser.errors() == []
+
+
+def test_a_page_computes_each_trajectory_once(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise AssertionError("what is left of the plate was computed")
+
+    marches = []
+    march = March.march
+    monkeypatch.setattr(March, "plate_after", refused)
+    monkeypatch.setattr(March, "march", lambda *given: marches.append(1) or march(*given))
+    with files.opened(folder / "narrow.nc") as narrow:
+        report.write_report({"narrow": narrow}, tmp_path / "a.html", folders={"narrow": folder}, trajectories=5)
+    assert len(marches) == 5
+    assert len(data_of(tmp_path / "a.html")["results"][0]["trajectories"]) == 5

@@ -26,7 +26,17 @@ from warpimpact.scene import (
     make_shots,
 )
 from warpimpact.solver import promise
-from warpimpact.solver.promise import MARGIN, PROMISES, RISK, SLOW, changes, keep, upper_place
+from warpimpact.solver.promise import (
+    MARGIN,
+    PROMISES,
+    RISK,
+    SLOW,
+    changes,
+    errors_text,
+    keep,
+    upper_digits,
+    upper_place,
+)
 from warpimpact.solver.refinement import Change, picked
 from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import Outcomes, simulate
@@ -216,3 +226,13 @@ def test_an_estimate_is_rarely_below_the_percentile_that_it_stands_for() -> None
     errors = np.random.default_rng(3).exponential(size=(20000, 64))
     below = np.sort(errors)[:, upper_place(64) - 1] < -np.log(0.1)
     assert 0.08 < below.mean() < RISK
+
+
+@pytest.mark.parametrize("bound", [5.0, 1.0, 0.2])
+def test_errors_above_a_bound_never_read_as_if_they_kept_it(bound: float) -> None:
+    for error in bound * np.array([1.00001, 1.004, 1.04, 1.4, 30.0]):
+        assert float(upper_digits(error)) > bound
+    for error in bound * np.array([1.0, 0.99999, 0.996, 0.5, 0.0]):
+        assert error <= float(upper_digits(error)) <= bound
+    assert errors_text(1.04, 0.3, 1.23e-4) == "1.1 m/s and 0.3 deg and 0.13 mm of depth"
+    assert errors_text(math.inf, 123.0) == "inf m/s and 130 deg"
