@@ -26,7 +26,6 @@ from warpimpact.results.table import Table
 from warpimpact.scene import Scene, Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
-    MOST_RUNS,
     THICKEST,
     THICKNESS_TOLERANCE,
     VELOCITY_TOLERANCE,
@@ -38,6 +37,7 @@ from warpimpact.solver.limit import (
     with_velocity,
 )
 from warpimpact.solver.limit_promise import PILOT, LimitPromise, keep_limits
+from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import Fidelity
 from warpimpact.statistics.intervals import Estimate, estimate_of

@@ -17,7 +17,8 @@ from warpimpact.optimisation.limit import LimitMap, limits_text, quantiles, told
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
 from warpimpact.scene import make_shots
-from warpimpact.solver.limit import MOST_RUNS, limit_velocity
+from warpimpact.solver.limit import limit_velocity
+from warpimpact.solver.limit_search import MOST_RUNS
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\

@@ -1,12 +1,20 @@
 """The search for limits: its cost, its ends, shots with parameters of their own, and what it refuses."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
+from warpimpact.kernels.status import Status
 from warpimpact.scene import CirclePattern, Layer, OgiveCore, Plate, Scene, Shots, Target
-from warpimpact.solver.limit import MOST_RUNS, limit_thickness, limit_velocity
+from warpimpact.solver import limit
+from warpimpact.solver.limit import limit_thickness, limit_velocity
+from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.simulate import Outcomes, simulate
+
+Array = NDArray[np.float64]
 
 CORE = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05)
@@ -133,3 +141,59 @@ def test_progress_counts_the_searches_that_have_ended_and_may_end_the_computatio
 
     with pytest.raises(InterruptedError):
         limit_velocity(Scene(core=CORE, target=PLATE), shots(3), device="cpu", progress=end)
+
+
+def outcomes_by(end: Callable[[Shots], tuple[Array, Array]]) -> Callable[..., Outcomes]:
+    """A `simulate` with status and residual velocity [m/s] by a formula."""
+    base = simulate(Scene(core=CORE, target=PLATE), shots(1), device="cpu")
+
+    def ended(scene: Scene, some: Shots, **_: object) -> Outcomes:
+        status, speed = end(some)
+        columns = {name: np.repeat(column, len(some), axis=0) for name, column in vars(base).items()}
+        return Outcomes(**columns | {"status": status.astype(np.int8), "residual_velocity": speed})
+
+    return ended
+
+
+def test_a_run_that_fails_far_from_the_limit_spoils_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    # A slow core that flies back from the base, and leaves the largest window between the layers.
+    def end(some: Shots) -> tuple[Array, Array]:
+        passes, lost = some.velocity > 775.0, some.velocity < 430.0
+        status = np.where(passes, Status.PERFORATED, np.where(lost, Status.LEFT_WINDOW, Status.ARRESTED))
+        speed = np.sqrt(0.77 * np.maximum(some.velocity**2 - 775.0**2, 0.0))
+        speed[lost] = np.nan
+        return status, speed
+
+    monkeypatch.setattr(limit, "simulate", outcomes_by(end))
+    found = limit_velocity(Scene(core=CORE, target=PLATE), shots(2, 825.0))
+    assert found.converged.all()
+    assert found.value == pytest.approx([775.0] * 2, abs=1.0)
+    assert (found.outcomes.status == Status.PERFORATED).all()
+
+
+def test_a_run_that_fails_beside_the_limit_leaves_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    def end(some: Shots) -> tuple[Array, Array]:
+        passes = some.velocity > 775.0
+        status = np.where(passes, Status.PERFORATED, np.where(some.velocity > 700.0, Status.NOT_FINITE, 1))
+        return status, np.where(passes, 100.0, 0.0)
+
+    monkeypatch.setattr(limit, "simulate", outcomes_by(end))
+    found = limit_velocity(Scene(core=CORE, target=PLATE), shots(1))
+    assert np.isnan(found.value.item())
+    assert not found.converged.item()
+    assert found.outcomes.status.item() == Status.NOT_FINITE
+    assert 700.0 < found.shots.velocity.item() <= 775.0
+
+
+def test_a_speed_that_grows_with_the_thickness_does_not_creep(monkeypatch: pytest.MonkeyPatch) -> None:
+    # Behind a thicker plate the core turns less, up to 40 mm: the energy tells nothing of the limit.
+    def end(some: Shots) -> tuple[Array, Array]:
+        assert some.thickness is not None
+        passes = some.thickness < 40e-3
+        speed = np.where(passes, 150.0 * (some.thickness / 4e-3) ** 0.5, 0.0)
+        return np.where(passes, Status.PERFORATED, Status.ARRESTED), speed
+
+    monkeypatch.setattr(limit, "simulate", outcomes_by(end))
+    found = limit_thickness(Scene(core=CORE, target=PLATE), shots(1), tolerance=0.1e-3)
+    assert found.converged.item()
+    assert found.value.item() == pytest.approx(40e-3, abs=0.1e-3)

@@ -1,9 +1,11 @@
 """The error that is told of limits: levels that err alike do not make a promise."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from warpimpact.scene import Numerics
 from warpimpact.solver.limit import Limits, short_steps
@@ -12,8 +14,8 @@ from warpimpact.solver.promise import MARGIN
 from warpimpact.solver.resolution import LADDER, Fidelity
 
 
-def search(values: dict[int, float]) -> Any:
-    """A search that finds the same limit [m/s] for all hits on a level."""
+def search(values: Mapping[int, ArrayLike]) -> Any:
+    """A search that finds limits [m/s] on a level: the same for all hits, or one for each."""
 
     def found(fidelity: Fidelity) -> Limits:
         level = next(k for k, one in enumerate(LADDER) if short_steps(one) == fidelity)
@@ -47,3 +49,30 @@ def test_the_finest_level_that_is_taken_has_one_finer_beside_it() -> None:
     assert not found.kept
     assert found.fidelity == short_steps(LADDER[FINEST])
     assert found.error == pytest.approx(MARGIN[1] * (values[FINEST] - values[FINEST + 1]))
+
+
+def test_limits_that_come_and_go_end_the_climb() -> None:
+    # Most limits err by less than the promise; one in eight exists on every second pair of levels.
+    values = {k: np.full(PILOT, 100.0 + 1.0 / 2**k) for k in range(FINEST + 2)}
+    for level, value in values.items():
+        value[:2] = np.inf if level // 2 % 2 else 100.0
+    asked: list[Fidelity] = []
+
+    def counted(fidelity: Fidelity) -> Limits:
+        asked.append(fidelity)
+        return search(values)(fidelity)
+
+    found = keep_limits(counted, Numerics(fidelity="draft"), squared=False)
+    assert not found.kept
+    assert found.error == np.inf  # told as it is
+    assert found.fidelity == short_steps(LADDER[0])
+    assert short_steps(LADDER[FINEST]) not in asked
+
+
+def test_errors_that_halve_are_followed_to_the_promise() -> None:
+    # One in eight errs three times as much as the others: two levels on, they are within the promise, too.
+    share, _ = PROMISED["draft"]
+    values = {k: 100.0 * (1.0 + np.where(np.arange(PILOT) < 2, 3.0, 1.0) * share / 2**k) for k in range(FINEST + 2)}
+    found = keep_limits(search(values), Numerics(fidelity="draft"), squared=False)
+    assert found.kept
+    assert found.fidelity == short_steps(LADDER[2])
