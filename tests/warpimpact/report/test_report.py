@@ -126,7 +126,7 @@ def test_page_says_what_was_compared_and_leads_to_its_parts(folder: Path) -> Non
     assert len(anchors) == len(set(anchors)) >= 8
     assert anchors == re.findall(r'<h2 id="(\w+)">', text)
     assert text.count("Intervals describe the hits that were drawn.") == 4  # beside both tables of both plates
-    assert text.count("The core is rigid: it neither") == 4
+    assert text.count("The core stays one rigid body") == 4
     assert len(text) < 3e6
 
 
