@@ -11,11 +11,12 @@ if TYPE_CHECKING:
     from .analysis.comparison import Comparison, compare
     from .analysis.hit_map import hit_map
     from .campaign.campaign import Campaign, Output
+    from .campaign.cluster import cluster_team
     from .campaign.plates import read_plates
     from .campaign.replay import replay
     from .campaign.run import run, run_to_file
     from .campaign.stop import Stop
-    from .campaign.team import ClusterError, cluster_team
+    from .campaign.team import ClusterError
     from .campaign.text import CampaignError
     from .export.table import to_dataframe
     from .results.files import OutputError, ResultError, open_result
@@ -116,7 +117,7 @@ _HOMES = {
     "OutputError": ".results.files",
     "ResultError": ".results.files",
     "Stop": ".campaign.stop",
-    "cluster_team": ".campaign.team",
+    "cluster_team": ".campaign.cluster",
     "compare": ".analysis.comparison",
     "limit_thickness": ".solver.limit",
     "limit_velocity": ".solver.limit",

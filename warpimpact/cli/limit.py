@@ -53,8 +53,9 @@ def add_limit(commands: Commands) -> None:
 
 def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.campaign import Campaign
+    from warpimpact.campaign.cluster import cluster_team
     from warpimpact.campaign.run import run_to_file
-    from warpimpact.campaign.team import cluster_team, local_team
+    from warpimpact.campaign.team import local_team
     from warpimpact.optimisation.limit import LimitMap, limits_text, told_of
     from warpimpact.plotting.limit import limit_figure
     from warpimpact.results import files

@@ -46,8 +46,8 @@ def _run(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.bursts import bursts, orders_text
     from warpimpact.analysis.summary import promise_text, summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
+    from warpimpact.campaign.cluster import cluster_team
     from warpimpact.campaign.run import run_to_file
-    from warpimpact.campaign.team import cluster_team
     from warpimpact.results.netcdf import open_table
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
