@@ -60,8 +60,8 @@ def cluster_team(
         job: what to compute of every hit.
 
     Raises:
-        ClusterError: dask is not installed, the scheduler cannot be reached or is lost, or shots kill one worker after
-            another.
+        ClusterError: dask is not installed, the scheduler cannot be reached, is lost or has no worker for LONELY
+            seconds, or shots kill one worker after another.
         DeviceError: the workers lack the device, or compute other bits than the first one asked.
     """
     try:
