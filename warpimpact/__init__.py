@@ -11,15 +11,15 @@ if TYPE_CHECKING:
     from .analysis.comparison import Comparison, compare
     from .analysis.hit_map import hit_map
     from .campaign.campaign import Campaign, Output
-    from .campaign.cluster import cluster_team
     from .campaign.plates import read_plates
-    from .campaign.replay import replay
-    from .campaign.run import run, run_to_file
     from .campaign.stop import Stop
-    from .campaign.team import ClusterError
     from .campaign.text import CampaignError
     from .export.table import to_dataframe
     from .results.files import OutputError, ResultError, open_result
+    from .runs.cluster import cluster_team
+    from .runs.replay import replay
+    from .runs.run import run, run_to_file
+    from .runs.team import ClusterError
     from .scene import (
         CirclePattern,
         ConeCore,
@@ -109,7 +109,7 @@ __all__ = [
 _HOMES = {
     "Campaign": ".campaign.campaign",
     "CampaignError": ".campaign.text",
-    "ClusterError": ".campaign.team",
+    "ClusterError": ".runs.team",
     "Comparison": ".analysis.comparison",
     "DeviceError": ".solver.device",
     "Outcomes": ".solver.simulate",
@@ -117,16 +117,16 @@ _HOMES = {
     "OutputError": ".results.files",
     "ResultError": ".results.files",
     "Stop": ".campaign.stop",
-    "cluster_team": ".campaign.cluster",
+    "cluster_team": ".runs.cluster",
     "compare": ".analysis.comparison",
     "limit_thickness": ".solver.limit",
     "limit_velocity": ".solver.limit",
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
-    "replay": ".campaign.replay",
+    "replay": ".runs.replay",
     "hit_map": ".analysis.hit_map",
-    "run": ".campaign.run",
-    "run_to_file": ".campaign.run",
+    "run": ".runs.run",
+    "run_to_file": ".runs.run",
     "simulate": ".solver.simulate",
     "to_dataframe": ".export.table",
 }

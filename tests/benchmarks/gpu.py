@@ -25,7 +25,7 @@ from floor import work_of
 from matplotlib.figure import Figure
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.run import run_to_file
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, Record, Scene, Shots
 from warpimpact.solver.device import DeviceError, find_device
 from warpimpact.solver.simulate import Outcomes, simulate

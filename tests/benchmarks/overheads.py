@@ -35,7 +35,7 @@ IMPORTS = [sys.executable, "-c", "import warp, numpy, netCDF4, xarray; warp.init
 SIMULATE = """
 import sys, time
 from warpimpact import Campaign, simulate
-from warpimpact.campaign.compute import promise_of
+from warpimpact.runs.compute import promise_of
 campaign = Campaign.from_toml(sys.argv[1], count=int(sys.argv[2]))
 fidelity, shots = promise_of(campaign, "cpu").fidelity, campaign.sampler().shots(0, int(sys.argv[2]))
 simulate(campaign.scene, shots[:64], numerics=fidelity, device="cpu")

@@ -31,9 +31,9 @@ FIGURES = Path(__file__).parent / "results" / "soak.json"
 SCENE = (TOP / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 COMMAND = """
 import resource, signal, sys
-from warpimpact.campaign import parts
-parts.FEWEST = 256
-parts.HELD = 0.1
+from warpimpact.runs import shards
+shards.FEWEST = 256
+shards.HELD = 0.1
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if int(sys.argv[1]):
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from warpimpact import Campaign, Hits, Numerics, make_shots
-from warpimpact.analysis.study import QUOTED, study
 from warpimpact.scene import Tolerance
 from warpimpact.solver.refinement import simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import simulate
+from warpimpact.studies.accuracy import QUOTED, study
 
 ROUNDS = 3
 

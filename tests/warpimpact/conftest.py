@@ -11,10 +11,10 @@ import pytest
 import xarray
 
 from warpimpact import ConeCore, Plate, Record, Scene, SquarePattern
-from warpimpact.campaign import parts
 from warpimpact.kernels.status import Status
 from warpimpact.results.dataset import to_dataset
 from warpimpact.results.variables import SHOT_VARIABLES
+from warpimpact.runs import shards
 from warpimpact.scene import AnyPattern, Shots
 
 STANDOFFS = np.array([0.05, 0.13])
@@ -150,8 +150,8 @@ def _assert_same_bits(one: Path, other: Path) -> None:
 def small_shards() -> Iterator[None]:
     """Shards as in small_shards.py."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(parts, "FEWEST", 256)
-        patched.setattr(parts, "HELD", 0.0)
+        patched.setattr(shards, "FEWEST", 256)
+        patched.setattr(shards, "HELD", 0.0)
         yield
 
 

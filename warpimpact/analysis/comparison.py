@@ -28,11 +28,11 @@ from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_no
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.summary import sampling_note
 from warpimpact.analysis.survival import Survival, survival_of, why_not_by_draws
-from warpimpact.campaign.parts import first_difference
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import dealing
+from warpimpact.runs.shards import first_difference
 from warpimpact.statistics.comparisons import (
     Ratio,
     confidence_of_each,

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.parts import first_difference
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
+from warpimpact.runs.shards import first_difference
 
 
 class Row(NamedTuple):

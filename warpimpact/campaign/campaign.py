@@ -42,10 +42,10 @@ from ..scene.units import Number, PositiveLength, Title
 from ..solver.bending import check_bending
 from ..solver.blocks import check_layout
 from ..solver.resolution import ONE_PLATE
-from .apart import with_scatter_apart
-from .drawn import DrawnSampler, Posterior, read_posterior
 from .plausible import warn_of
+from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
+from .scatter_tables import with_scatter_apart
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
 

@@ -33,11 +33,11 @@ def add_study(commands: Commands) -> None:
 
 
 def _study(arguments: argparse.Namespace) -> None:
-    from warpimpact.analysis.study import study
-    from warpimpact.analysis.study_text import study_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting import study_figure
     from warpimpact.results import files
+    from warpimpact.studies.accuracy import study
+    from warpimpact.studies.accuracy_text import study_text
 
     campaign = Campaign.from_toml(arguments.campaign)
     output = arguments.output or Path(arguments.campaign.stem + "_study.nc")
@@ -76,7 +76,7 @@ def add_validate(commands: Commands) -> None:
 def _validate(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.paper import check_scene, paper_campaign, validation_table
     from warpimpact.campaign.campaign import Campaign
-    from warpimpact.campaign.run import run
+    from warpimpact.runs.run import run
 
     path = arguments.campaign or paper_campaign()
     campaign = Campaign.from_toml(path)

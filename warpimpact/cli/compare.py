@@ -109,8 +109,8 @@ def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
 def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     """Result files of a campaign's plates by name; computes those that do not exist."""
     from warpimpact.campaign.plates import read_plates
-    from warpimpact.campaign.run import run_to_file
     from warpimpact.campaign.text import CampaignError
+    from warpimpact.runs.run import run_to_file
 
     if len(arguments.files) > 1:
         raise CampaignError(

@@ -53,12 +53,12 @@ def add_limit(commands: Commands) -> None:
 
 def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.campaign import Campaign
-    from warpimpact.campaign.cluster import cluster_team
-    from warpimpact.campaign.run import run_to_file
-    from warpimpact.campaign.team import local_team
-    from warpimpact.optimisation.limit import LimitMap, limits_text, told_of
     from warpimpact.plotting.limit import limit_figure
     from warpimpact.results import files
+    from warpimpact.runs.cluster import cluster_team
+    from warpimpact.runs.run import run_to_file
+    from warpimpact.runs.team import local_team
+    from warpimpact.studies.limit import LimitMap, limits_text, told_of
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")

@@ -43,9 +43,9 @@ def bug_report(error: Exception) -> str:
 
 def mistakes() -> tuple[type[Exception], ...]:
     """Classes of errors whose message is for the user."""
-    from warpimpact.campaign.team import ClusterError
     from warpimpact.campaign.text import CampaignError
     from warpimpact.results.files import OutputError, ResultError
+    from warpimpact.runs.team import ClusterError
     from warpimpact.solver.device import DeviceError
 
     return CampaignError, ClusterError, OutputError, ResultError, DeviceError

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from .plain import Plain, say
 
 if TYPE_CHECKING:
-    from warpimpact.campaign.standing import Standing
     from warpimpact.results.measures import Measure
+    from warpimpact.runs.progress import Standing
     from warpimpact.scene import Numerics
     from warpimpact.solver.refinement import Refining
     from warpimpact.statistics.intervals import Estimate

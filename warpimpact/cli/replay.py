@@ -33,11 +33,11 @@ def add_replay(commands: Commands) -> None:
 
 def _replay(arguments: argparse.Namespace) -> None:
     from warpimpact.analysis.hit import hit_text
-    from warpimpact.campaign.replay import replay
     from warpimpact.plotting.animation import save_animation, writer_for
     from warpimpact.plotting.layers import layers
     from warpimpact.plotting.trajectory import FIGURES, save_figures
     from warpimpact.results import files
+    from warpimpact.runs.replay import replay
 
     result, path, film = files.read(arguments.result), arguments.result, arguments.animation
     output = arguments.output or path.with_name(f"{path.stem}_hit{arguments.hit}.nc")

@@ -46,9 +46,9 @@ def _run(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.bursts import bursts, orders_text
     from warpimpact.analysis.summary import promise_text, summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
-    from warpimpact.campaign.cluster import cluster_team
-    from warpimpact.campaign.run import run_to_file
     from warpimpact.results.netcdf import open_table
+    from warpimpact.runs.cluster import cluster_team
+    from warpimpact.runs.run import run_to_file
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")

@@ -31,9 +31,9 @@ def add_sweep(commands: Commands) -> None:
 
 
 def _sweep(arguments: argparse.Namespace) -> None:
-    from warpimpact.optimisation.sweep import folder_of, read_sweep, run_sweep
     from warpimpact.plotting.sweep import sweep_figure
     from warpimpact.results import files
+    from warpimpact.studies.sweep import folder_of, read_sweep, run_sweep
 
     sweep = read_sweep(arguments.campaign, count=arguments.count)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")

@@ -9,9 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.campaign.compute import made_by
-from warpimpact.campaign.parts import claimed
-from warpimpact.campaign.run import Interrupted
 from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit, Sampling
 from warpimpact.identification.likelihood import Score
@@ -20,6 +17,9 @@ from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.identification.store import Store
 from warpimpact.results import posterior as files
 from warpimpact.results.files import OutputError
+from warpimpact.runs.compute import made_by
+from warpimpact.runs.run import Interrupted
+from warpimpact.runs.shards import claimed
 from warpimpact.statistics.importance import LARGEST_K, Sampler
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from warpimpact.campaign.drawn import OF_THE_MATERIAL
+from warpimpact.campaign.posterior import OF_THE_MATERIAL
 from warpimpact.identification.evaluate import data_of, discrepancies
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import KEPT, Score

@@ -16,9 +16,9 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.campaign.parts import difference, fingerprint, folder_of
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
+from warpimpact.runs.shards import difference, fingerprint, folder_of
 
 _MANIFEST = "manifest.json"
 

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.proxy import inclination
-from warpimpact.optimisation.limit import QUANTILES, promise_line, quantiles
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
+from warpimpact.studies.limit import QUANTILES, promise_line, quantiles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,10 +8,10 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.study import QUOTED
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.solver.resolution import FIDELITIES
+from warpimpact.studies.accuracy import QUOTED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

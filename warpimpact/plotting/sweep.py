@@ -32,7 +32,7 @@ def sweep_figure(sweep: xarray.Dataset) -> Figure:
     intervals, against the first input that is a number; a line for every combination of the others.
 
     Args:
-        sweep: a Dataset of `optimisation.sweep.joined`.
+        sweep: a Dataset of `studies.sweep.joined`.
     """
     inputs = list(json.loads(sweep.attrs[attr.SWEEP]))
     along = next((name for name in inputs if sweep[name].dtype.kind == "f"), inputs[0])

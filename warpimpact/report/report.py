@@ -22,12 +22,12 @@ from plotly.offline import get_plotlyjs
 import warpimpact
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
 from warpimpact.analysis.numbers import interval_text, number_text
-from warpimpact.campaign.replay import replay
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import compared, study_table, told
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
+from warpimpact.runs.replay import replay
 
 Progress = Callable[[int, int], None]
 _PLATE_WIDTH = 240.0  # of the widest plate on the page [px]

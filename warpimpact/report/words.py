@@ -16,8 +16,6 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import depth_note, effectiveness
 from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.study import QUANTITIES
-from warpimpact.analysis.study_text import study_text
 from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
@@ -26,6 +24,8 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import outlines
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.studies.accuracy import QUANTITIES
+from warpimpact.studies.accuracy_text import study_text
 
 _MM = 1e3
 _PROVENANCE = (

@@ -15,12 +15,12 @@ from warpimpact.analysis.summary import summary, summary_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.kernels.status import Status
-from warpimpact.optimisation.limit import LimitMap, limits_text
 from warpimpact.plotting import comparison_figure, weight_figure
 from warpimpact.results.files import ResultError
 from warpimpact.results.limits import with_limits
 from warpimpact.results.variables import STATUS
 from warpimpact.solver.limit import Limits
+from warpimpact.studies.limit import LimitMap, limits_text
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 

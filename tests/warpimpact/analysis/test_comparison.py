@@ -17,12 +17,12 @@ from warpimpact.analysis.comparison_text import comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import Standing
 from warpimpact.cli import main
 from warpimpact.plotting import comparison_figure
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import Standing
 
 pytestmark = pytest.mark.usefixtures("small_shards")
 TWO_PLATES = Path(__file__).parents[3] / "campaigns" / "two_plates.toml"

@@ -10,8 +10,8 @@ import xarray
 
 import warpimpact
 from warpimpact import Campaign
-from warpimpact.campaign.run import run
 from warpimpact.kernels.status import Status
+from warpimpact.runs.run import run
 
 mpl.use("Agg")
 PERIOD = np.array([16e-3, 8e-3])

@@ -7,10 +7,10 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.analysis.inspect import failures, inspect_text
-from warpimpact.campaign.run import run_to_file
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
+from warpimpact.runs.run import run_to_file
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 512")

@@ -9,9 +9,9 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection
 
 from warpimpact import Campaign
 from warpimpact.analysis.surface import pressed
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.plotting.pressure import pressure
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 RESISTANCE = 2.6e9

@@ -7,11 +7,11 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.analysis.hit import hit_text
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.replay import replay
 from warpimpact.cli import main
 from warpimpact.plotting.maps import hit_map
 from warpimpact.results import files
 from warpimpact.results.variables import BENDING_VARIABLES, HIT_NUMBERS
+from warpimpact.runs.replay import replay
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 STOP = """

@@ -8,13 +8,13 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.campaign import parts
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.compute import promise_of
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally, dealing
+from warpimpact.runs import shards
+from warpimpact.runs.compute import promise_of
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
 from warpimpact.scene.plausible import Implausible
 
 TEXT = (Path(__file__).parents[3] / "campaigns" / "burst_of_five.toml").read_text(encoding="utf-8")
@@ -61,7 +61,7 @@ def test_a_run_is_resumed_with_the_same_bits(
     tmp_path: Path, small_shards: None, assert_same_bits: Callable[[Path, Path], None]
 ) -> None:
     campaign = campaign_of(150)
-    assert parts.extent(750, 5) == 160  # 32 bursts
+    assert shards.extent(750, 5) == 160  # 32 bursts
 
     def interrupt(standing: Standing) -> None:
         assert standing.total == 750
@@ -99,7 +99,7 @@ def test_the_pilot_takes_whole_bursts(monkeypatch: pytest.MonkeyPatch) -> None:
     def kept(scene: object, numerics: object, pilot: object, **rest: object) -> None:
         seen.append(pilot)
 
-    monkeypatch.setattr("warpimpact.campaign.compute.keep", kept)
+    monkeypatch.setattr("warpimpact.runs.compute.keep", kept)
     for sampling in ("sobol", "grid"):
         promise_of(campaign_of(60, ('sampling = "sobol"', f'sampling = "{sampling}"')), "cpu")
     for pilot in seen:

@@ -10,9 +10,9 @@ import xarray
 
 from warpimpact import Campaign, run
 from warpimpact.campaign.plates import read_plates
-from warpimpact.campaign.replay import replay
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import LayerStatus
+from warpimpact.runs.replay import replay
 from warpimpact.scene import Layer
 
 CAMPAIGN = """
@@ -139,7 +139,7 @@ def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:
 
 
 def test_solid_reference_is_as_heavy_as_all_layers(monkeypatch: pytest.MonkeyPatch) -> None:
-    from warpimpact.campaign import compute
+    from warpimpact.runs import compute
 
     seen: list[Any] = []
     simulate = compute.simulate

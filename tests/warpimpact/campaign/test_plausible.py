@@ -8,8 +8,8 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
-from warpimpact.optimisation.sweep import read_sweep
 from warpimpact.scene.plausible import Implausible
+from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\

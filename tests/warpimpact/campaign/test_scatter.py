@@ -10,12 +10,12 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.compute import compute, promise_in
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.variables import OUTCOME_VARIABLES
+from warpimpact.runs.compute import compute, promise_in
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
 from warpimpact.scene import Numerics
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")

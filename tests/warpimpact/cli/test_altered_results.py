@@ -11,8 +11,8 @@ import pytest
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.run import run
 from warpimpact.cli import main
+from warpimpact.runs.run import run
 
 SCENE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 SMALL = SCENE.replace('"standard"', '"draft"').replace("count = 4096", "count = 64")

@@ -118,7 +118,7 @@ def test_memory_that_cannot_be_had_is_told(
     def no_memory(*_: object, **__: object) -> None:
         raise MemoryError("Unable to allocate 8 TiB")
 
-    monkeypatch.setattr("warpimpact.campaign.run.run_to_file", no_memory)
+    monkeypatch.setattr("warpimpact.runs.run.run_to_file", no_memory)
     assert _refusal(["run", str(SLOTTED_PLATE)], capsys) == f"{SLOTTED_PLATE}: Unable to allocate 8 TiB"
     assert not list(folder.iterdir())
 

@@ -162,7 +162,7 @@ def test_a_drawing_of_many_subpaths_takes_time_in_proportion(tmp_path: Path) -> 
 LIMITED = """
 import resource, sys
 from warpimpact.cli import main
-from warpimpact.campaign.run import run_to_file  # its imports take memory of their own
+from warpimpact.runs.run import run_to_file  # its imports take memory of their own
 from warpimpact.solver.device import find_device
 resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
 sys.exit(main(sys.argv[1:]))

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from warpimpact.campaign.run import Standing
 from warpimpact.cli.progress import show_standing
 from warpimpact.results.measures import Estimate, Measure
+from warpimpact.runs.run import Standing
 from warpimpact.solver.promise import Promise
 from warpimpact.solver.refinement import Refining
 from warpimpact.solver.resolution import LADDER

@@ -12,14 +12,14 @@ import xarray
 
 from warpimpact import Campaign, to_dataframe
 from warpimpact.analysis import summary
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.export.paraview import AROUND, write_vtk
 from warpimpact.export.table import write_csv
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.variables import SHOT_VARIABLES
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 from warpimpact.scene import Hits
 from warpimpact.scene.shots import EXPORTED
 

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.campaign.run import Interrupted
 from warpimpact.cli import main
 from warpimpact.identification import identify
 from warpimpact.identification.calibration import calibrate
@@ -19,6 +18,7 @@ from warpimpact.identification.text import posterior_text
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior as files
 from warpimpact.results.files import OutputError, ResultError
+from warpimpact.runs.run import Interrupted
 
 FitMaker = Callable[..., Fit]
 SMALL = ("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 100\neffective = 60\nhits = 32")

@@ -11,11 +11,11 @@ from matplotlib.patches import Polygon
 from PIL import Image
 
 from warpimpact import Campaign
-from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.plotting import animation as film
 from warpimpact.plotting import trajectory
 from warpimpact.results import files
+from warpimpact.runs.run import run
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 

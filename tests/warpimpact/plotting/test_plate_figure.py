@@ -11,10 +11,10 @@ from matplotlib.colors import to_rgb
 from warpimpact import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
-from warpimpact.optimisation.sweep import read_sweep
 from warpimpact.plotting import plate_figure
 from warpimpact.plotting.dimensions import hole_dimensions, smallest_ligament
 from warpimpact.scene import ConeCore, MaskPattern, NoPattern, Plate, SlotPattern
+from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 MM = 1e-3

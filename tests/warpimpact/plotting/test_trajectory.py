@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from warpimpact import Campaign, CirclePattern, Hits, Impact, Numerics, Plate, PolynomialCore
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.plotting import trajectory
 from warpimpact.plotting.poses import INSTANTS, Pose, silhouette
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 
 LENGTH, CENTRE = 27.86e-3, 18.05e-3
 THICKNESS = 4e-3

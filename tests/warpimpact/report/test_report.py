@@ -18,13 +18,13 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import effectiveness, number_text
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.poses import poses_behind, poses_in_plate, silhouette
 from warpimpact.report import hits, report
 from warpimpact.results import files
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 from warpimpact.solver.marching import March
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"

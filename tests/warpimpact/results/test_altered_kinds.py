@@ -8,11 +8,11 @@ import pytest
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.results import checks, files
 from warpimpact.results import variables as v
 from warpimpact.results.files import ResultError
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 
 LAYERED = (Path(__file__).parents[3] / "campaigns" / "layered_target.toml").read_text(encoding="utf-8")
 Change = Callable[[xarray.Dataset], xarray.Dataset]

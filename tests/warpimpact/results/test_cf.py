@@ -8,8 +8,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.campaign.run import run
 from warpimpact.results import files
+from warpimpact.runs.run import run
 
 pytest.importorskip("compliance_checker")
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")

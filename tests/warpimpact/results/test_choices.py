@@ -9,13 +9,13 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.effectiveness import effectiveness
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, outlines, solid_reference
 from warpimpact.results.measures import dealing
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 TEXT = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("4096", "128")

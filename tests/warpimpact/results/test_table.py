@@ -11,12 +11,12 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.analysis.summary import summary_text
-from warpimpact.campaign.compute import compute
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import numbered
 from warpimpact.results.netcdf import open_table, read_table, write_table
 from warpimpact.results.table import Table, joined
+from warpimpact.runs.compute import compute
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 

@@ -24,10 +24,10 @@ from warpimpact import (
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.former import in_present_terms
 from warpimpact.campaign.plates import read_plates
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run_to_file
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Hits, NoPattern, Tolerance
 from warpimpact.scene.model import Model
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, run
-from warpimpact.campaign.compute import promise_in
-from warpimpact.campaign.replay import replay
 from warpimpact.kernels.status import Status
+from warpimpact.runs.compute import promise_in
+from warpimpact.runs.replay import replay
 from warpimpact.scene import (
     CirclePattern,
     Hits,

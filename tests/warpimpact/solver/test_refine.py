@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, run
-from warpimpact.campaign.replay import replay
+from warpimpact.runs.replay import replay
 from warpimpact.scene import (
     Hits,
     Impact,

@@ -15,7 +15,6 @@ import xarray
 from warpimpact.analysis.numbers import interval_text
 from warpimpact.analysis.proxy import proxy
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import HitMap, at_solid, described, pilot_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -23,6 +22,7 @@ from warpimpact.results.dataset import failed
 from warpimpact.results.limits import solid_limits, with_limits, with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
+from warpimpact.runs.compute import HitMap, at_solid, described, pilot_of
 from warpimpact.scene import Scene, Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,

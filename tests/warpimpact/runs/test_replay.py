@@ -10,13 +10,13 @@ import xarray
 
 from warpimpact import Campaign, CirclePattern, Hits, Impact, NoPattern, Numerics, Plate, PolynomialCore
 from warpimpact.campaign.campaign import CampaignError, Output
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
 from warpimpact.results.variables import EXIT_VARIABLES, HISTORY_COORDINATES, HISTORY_VARIABLES, OUTCOME_VARIABLES
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 from warpimpact.scene import Interaction
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.drawn import Posterior
+from warpimpact.campaign.posterior import Posterior
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_table

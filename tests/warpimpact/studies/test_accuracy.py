@@ -11,17 +11,6 @@ import pytest
 import xarray
 from PIL import Image
 
-from warpimpact.analysis import study as studies
-from warpimpact.analysis.study import (
-    Answer,
-    converged,
-    default_settings,
-    extrapolated,
-    front,
-    label,
-    study,
-)
-from warpimpact.analysis.study_text import advantage, study_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
@@ -30,6 +19,17 @@ from warpimpact.results.files import write
 from warpimpact.results.variables import STUDY_COORDINATES, STUDY_VARIABLES
 from warpimpact.scene import Numerics, Shots
 from warpimpact.solver.resolution import FIDELITIES, Fidelity, resolve, spelt_out
+from warpimpact.studies import accuracy as studies
+from warpimpact.studies.accuracy import (
+    Answer,
+    converged,
+    default_settings,
+    extrapolated,
+    front,
+    label,
+    study,
+)
+from warpimpact.studies.accuracy_text import advantage, study_text
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 LADDER = {"coarse": Fidelity(8, 16, 1.0, 0.8), "middle": Fidelity(16, 32, 2.0, 0.4), "fine": Fidelity(32, 64, 4.0, 0.2)}
@@ -223,8 +223,8 @@ def test_variables_have_units_names_and_the_campaign(small: xarray.Dataset, camp
 
 
 def test_file_gives_back_what_was_measured(small: xarray.Dataset, tmp_path: Path) -> None:
-    write(small, tmp_path / "study.nc")
-    with xarray.open_dataset(tmp_path / "study.nc") as file:
+    write(small, tmp_path / "accuracy.nc")
+    with xarray.open_dataset(tmp_path / "accuracy.nc") as file:
         xarray.testing.assert_identical(file.load().drop_encoding(), small)
 
 
@@ -254,9 +254,11 @@ def test_report_holds_the_study(
     small: xarray.Dataset, make_result: Callable[..., xarray.Dataset], tmp_path: Path
 ) -> None:
     write(make_result(100), tmp_path / "a.nc")
-    write(small, tmp_path / "study.nc")
+    write(small, tmp_path / "accuracy.nc")
     page = tmp_path / "a.html"
-    assert main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "study.nc"), "--trajectories", "0"]) == 0
+    assert (
+        main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "accuracy.nc"), "--trajectories", "0"]) == 0
+    )
     text = html.unescape(page.read_text())
     for setting in small["setting"].values:
         one = small.sel(setting=setting).isel(standoff=-1)

@@ -8,10 +8,10 @@ import xarray
 
 from warpimpact import Campaign, run
 from warpimpact.analysis.slabs import LayerField, fields_behind
-from warpimpact.campaign.replay import replay
 from warpimpact.export.paraview import write_vtk
 from warpimpact.plotting.layers import layers
 from warpimpact.results import files
+from warpimpact.runs.replay import replay
 
 CAMPAIGN = """
 title = "two plates that weaken"

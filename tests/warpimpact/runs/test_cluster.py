@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, Numerics
-from warpimpact.campaign.cluster import _compute_alike, _How, _looked_at, cluster_team
-from warpimpact.campaign.compute import HitMap
-from warpimpact.campaign.run import Standing, run_to_file
-from warpimpact.campaign.team import ClusterError
 from warpimpact.cli import main
+from warpimpact.runs.cluster import _compute_alike, _How, _looked_at, cluster_team
+from warpimpact.runs.compute import HitMap
+from warpimpact.runs.run import Standing, run_to_file
+from warpimpact.runs.team import ClusterError
 from warpimpact.solver.device import DeviceError
 
 distributed = pytest.importorskip("distributed")
@@ -218,7 +218,7 @@ def test_what_dask_logs_of_a_lost_scheduler_is_not_printed(campaign: Campaign, c
 def test_a_scheduler_without_workers_is_told(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpimpact.campaign.cluster.LONELY", 0.3)
+    monkeypatch.setattr("warpimpact.runs.cluster.LONELY", 0.3)
     with distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as empty:
         computing = cluster_team(campaign, address=empty.scheduler_address, device="cpu")
         with pytest.raises(ClusterError, match=r"has had no worker for 0.3 s; start some; .* continue with --resume"):

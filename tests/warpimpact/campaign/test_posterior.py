@@ -8,12 +8,12 @@ import pytest
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import run
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import posterior as files
 from warpimpact.results.files import read
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
 from warpimpact.scene import Interaction, Plate, Shots
 from warpimpact.solver.simulate import simulate
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign
-from warpimpact.campaign.run import run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver import device, marching, simulate
 from warpimpact.solver.simulate import Outcomes
@@ -40,9 +40,9 @@ def at_once(scene: Scene, shots: Shots, **_: object) -> Outcomes:
 def test_memory_does_not_grow_with_the_count(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpimpact.campaign.compute.simulate", at_once)
+    monkeypatch.setattr("warpimpact.runs.compute.simulate", at_once)
     run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
-    monkeypatch.setattr("warpimpact.campaign.parts.SHARDS", 48)  # 32 shards of 16384, which is quicker than 128
+    monkeypatch.setattr("warpimpact.runs.shards.SHARDS", 48)  # 32 shards of 16384, which is quicker than 128
     count = 2**19
     many = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})})
     output = tmp_path / "a.nc"

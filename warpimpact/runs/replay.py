@@ -10,12 +10,12 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import is_double, promise_in
 from warpimpact.campaign.former import in_present_terms
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
 from warpimpact.results.files import ResultError
+from warpimpact.runs.compute import is_double, promise_in
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver import simulate
 from warpimpact.solver.limit import with_thickness, with_velocity

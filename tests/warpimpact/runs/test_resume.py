@@ -19,12 +19,12 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.campaign import parts
-from warpimpact.campaign.parts import folder_of
-from warpimpact.campaign.run import Interrupted, Standing, run, run_to_file
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
+from warpimpact.runs import shards
+from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
+from warpimpact.runs.shards import folder_of
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -75,7 +75,7 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
 
     monkeypatch.syspath_prepend(HERE)
     processes = multiprocessing.get_context("forkserver")
-    processes.set_forkserver_preload(["small_shards", "warpimpact.campaign.run", "scipy.stats"])
+    processes.set_forkserver_preload(["small_shards", "warpimpact.runs.run", "scipy.stats"])
     moments, output, kills, completed = random.Random(1), tmp_path / "a.nc", 0, 0
 
     def saved() -> int:
@@ -160,7 +160,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
         with monkeypatch.context() as patched:
             for name in ("replace", "rmdir", "unlink"):
                 patched.setattr(os, name, dying(getattr(os, name)))
-            patched.setattr("warpimpact.campaign.run._kept", lambda _: "")  # a killed process cleans nothing up
+            patched.setattr("warpimpact.runs.run._kept", lambda _: "")  # a killed process cleans nothing up
             try:
                 run_to_file(small, output, device="cpu", resume=True)
             except Killed:
@@ -266,10 +266,10 @@ def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "campaign.toml").write_text(text, encoding="utf-8")
         (tmp_path / folder / "hits.csv").write_text(f"hit_y,hit_z\n{row}\n", encoding="utf-8")
-    a, b, c = (parts.manifest(Campaign.from_toml(tmp_path / f / "campaign.toml"), {"device": "cpu"}) for f in "abc")
-    assert parts.difference(a, b) is None
-    assert parts.difference(a, c).startswith("hits.file was ")
-    assert parts.difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
+    a, b, c = (shards.manifest(Campaign.from_toml(tmp_path / f / "campaign.toml"), {"device": "cpu"}) for f in "abc")
+    assert shards.difference(a, b) is None
+    assert shards.difference(a, c).startswith("hits.file was ")
+    assert shards.difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
 
 
 def _shards(output: Path) -> list[Path]:
@@ -495,7 +495,7 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
 
 HOST_WORK = """
 import sys, time
-from warpimpact.campaign.compute import HitMap
+from warpimpact.runs.compute import HitMap
 from warpimpact.cli import command
 
 def host_work(*_, **__):  # a ligament, or the compilation of a kernel: one call, which nothing can break off
@@ -539,7 +539,7 @@ def test_a_signal_that_is_lost_on_the_way_still_ends_the_run(
         with suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGTERM)
 
-    monkeypatch.setattr("warpimpact.campaign.run.manifest", lambda *given: (deaf(), parts.manifest(*given))[1])
+    monkeypatch.setattr("warpimpact.runs.run.manifest", lambda *given: (deaf(), shards.manifest(*given))[1])
     assert main(["run", str(campaign_file), "-o", str(tmp_path / "a.nc"), "--device", "cpu"]) == 130
     assert "interrupted" in capsys.readouterr().err
     assert not (tmp_path / "a.nc").exists()

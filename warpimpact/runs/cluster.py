@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 from uuid import uuid4
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import HitMap, made_by
-from warpimpact.campaign.team import HIT_MAP, ClusterError, Team, awaited, longest, task_size
 from warpimpact.results.table import Table
+from warpimpact.runs.compute import HitMap, made_by
+from warpimpact.runs.team import HIT_MAP, ClusterError, Team, awaited, longest, task_size
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores
 from warpimpact.solver.refinement import Refining

@@ -7,18 +7,18 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import Interrupted, Standing, run_to_file
-from warpimpact.campaign.team import local_team
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
-from warpimpact.optimisation.limit import LimitMap, limits_text, quantiles, told_of
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import Interrupted, Standing, run_to_file
+from warpimpact.runs.team import local_team
 from warpimpact.scene import make_shots
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.studies.limit import LimitMap, limits_text, quantiles, told_of
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\
@@ -104,7 +104,7 @@ class StopsAfter:
 
 
 def test_a_resumed_search_has_the_bits_of_a_straight_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.campaign.parts.FEWEST", 16)
+    monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 16)
     text = TEXT.replace('[numerics]\nfidelity = "draft"\n', GIVEN)
     straight = search(campaign(text), tmp_path / "straight.nc")
     with pytest.raises(Interrupted, match=r"shards are saved in .*--resume"):
@@ -115,7 +115,7 @@ def test_a_resumed_search_has_the_bits_of_a_straight_one(tmp_path: Path, monkeyp
 
 
 def test_another_quantity_is_not_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.campaign.parts.FEWEST", 16)
+    monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 16)
     text = TEXT.replace('[numerics]\nfidelity = "draft"\n', GIVEN)
     with pytest.raises(Interrupted):
         search(campaign(text), tmp_path / "broken.nc", progress=StopsAfter(16))

@@ -14,9 +14,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.parts import Parts, claimed, extent, manifest
-from warpimpact.campaign.standing import Follow, Standing
-from warpimpact.campaign.team import Team, awaited, local_team
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, numbered
@@ -24,6 +21,9 @@ from warpimpact.results.files import OutputError
 from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.table import Table, joined
+from warpimpact.runs.progress import Follow, Standing
+from warpimpact.runs.shards import Parts, claimed, extent, manifest
+from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
 from warpimpact.statistics.stopping import looks
 

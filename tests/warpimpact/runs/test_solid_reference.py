@@ -8,12 +8,12 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.campaign import team
-from warpimpact.campaign.compute import HitMap
-from warpimpact.campaign.run import run, run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.dataset import solid_reference
+from warpimpact.runs import team
+from warpimpact.runs.compute import HitMap
+from warpimpact.runs.run import run, run_to_file
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 SMALL = SLOTTED_PLATE.replace('"standard"', '"draft"').replace("count = 4096", "count = 600")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xarray
 
-from warpimpact.analysis.study import QUANTITIES, QUOTED
 from warpimpact.results import variables as v
+from warpimpact.studies.accuracy import QUANTITIES, QUOTED
 
 
 def advantage(dataset: xarray.Dataset, literal: str) -> tuple[str, float] | None:

@@ -1,5 +1,5 @@
 """Outer loops: one question that takes many computations of a campaign, such as the limit velocity of every hit.
 
-Change what is asked and how the answer is told here; the search itself belongs in solver, the shards in campaign. It
+Change what is asked and how the answer is told here; the search itself belongs in solver, the shards in runs. It
 imports analysis and the rooms below it.
 """

@@ -8,12 +8,12 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.run import run
 from warpimpact.cli import main
-from warpimpact.optimisation import sweep as module
-from warpimpact.optimisation.sweep import folder_of, read_sweep, run_sweep
 from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.results import files
+from warpimpact.runs.run import run
+from warpimpact.studies import sweep as module
+from warpimpact.studies.sweep import folder_of, read_sweep, run_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8").replace('"standard"', '"draft"')

@@ -11,11 +11,11 @@ import xarray
 from warpimpact import Campaign
 from warpimpact.analysis.summary import summary_text
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
 from warpimpact.statistics.intervals import estimate_of
 
 SameBits = Callable[[Path, Path], None]

@@ -11,10 +11,10 @@ from queue import SimpleQueue
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.compute import HitMap, made_by
 from warpimpact.results import attributes as attr
 from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.table import Table
+from warpimpact.runs.compute import HitMap, made_by
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, find_device
 from warpimpact.solver.refinement import Refining

@@ -19,11 +19,11 @@ from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.run import run_to_file
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
+from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Impact, Interaction, Plate
 from warpimpact.scene.units import quoted
 

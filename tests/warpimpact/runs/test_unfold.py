@@ -11,16 +11,16 @@ import xarray
 from warpimpact import Campaign, Hits, Impact, MaskPattern, Numerics, Plate, PolynomialCore, SlotPattern, run
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.summary import estimated
-from warpimpact.campaign import compute as computing
-from warpimpact.campaign import parts
 from warpimpact.campaign.campaign import Output
-from warpimpact.campaign.replay import replay
-from warpimpact.campaign.run import Interrupted, Standing, run_to_file
 from warpimpact.campaign.stop import Stop
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.variables import ESTIMATE_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
+from warpimpact.runs import compute as computing
+from warpimpact.runs import shards
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import Interrupted, Standing, run_to_file
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
@@ -212,7 +212,7 @@ def test_an_unfolded_run_is_streamed_resumed_and_replayed(
 
     def interrupt(standing: Standing) -> None:
         assert standing.total == 1096
-        if standing.saved >= parts.FEWEST:
+        if standing.saved >= shards.FEWEST:
             raise KeyboardInterrupt
 
     straight, resumed = tmp_path / "straight.nc", tmp_path / "resumed.nc"

@@ -9,7 +9,6 @@ from matplotlib.colors import to_hex
 
 from warpimpact import Campaign, hit_map, run, to_dataframe
 from warpimpact.analysis.inspect import inspect_text
-from warpimpact.campaign.replay import replay
 from warpimpact.campaign.text import CampaignError
 from warpimpact.kernels.status import LayerStatus
 from warpimpact.plotting import poses, trajectory
@@ -17,6 +16,7 @@ from warpimpact.plotting.cell import GREY, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
 from warpimpact.report.words import told
 from warpimpact.results import files
+from warpimpact.runs.replay import replay
 
 CAMPAIGN = """
 title = "two layers"

@@ -10,12 +10,12 @@ from warpimpact import Campaign
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.inspect import inspect_text
-from warpimpact.campaign.run import run_to_file
-from warpimpact.campaign.team import local_team
 from warpimpact.kernels.status import Status
-from warpimpact.optimisation.limit import LimitMap, limits_text
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
+from warpimpact.runs.run import run_to_file
+from warpimpact.runs.team import local_team
+from warpimpact.studies.limit import LimitMap, limits_text
 
 LAYER = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
 TEXT = """\
