@@ -223,8 +223,8 @@ def test_variables_have_units_names_and_the_campaign(small: xarray.Dataset, camp
 
 
 def test_file_gives_back_what_was_measured(small: xarray.Dataset, tmp_path: Path) -> None:
-    write(small, tmp_path / "accuracy.nc")
-    with xarray.open_dataset(tmp_path / "accuracy.nc") as file:
+    write(small, tmp_path / "study.nc")
+    with xarray.open_dataset(tmp_path / "study.nc") as file:
         xarray.testing.assert_identical(file.load().drop_encoding(), small)
 
 
@@ -254,10 +254,10 @@ def test_report_holds_the_study(
     small: xarray.Dataset, make_result: Callable[..., xarray.Dataset], tmp_path: Path
 ) -> None:
     write(make_result(100), tmp_path / "a.nc")
-    write(small, tmp_path / "accuracy.nc")
+    write(small, tmp_path / "study.nc")
     page = tmp_path / "a.html"
     assert (
-        main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "accuracy.nc"), "--trajectories", "0"]) == 0
+        main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "study.nc"), "--trajectories", "0"]) == 0
     )
     text = html.unescape(page.read_text())
     for setting in small["setting"].values:
