@@ -26,7 +26,7 @@ import xarray
 from warpimpact.analysis.base import base_thickness, has_base, solid_note
 from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
-from warpimpact.analysis.summary import sampling_note
+from warpimpact.analysis.summary import breaks_promise, sampling_note
 from warpimpact.analysis.survival import Survival, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -119,14 +119,28 @@ class Comparison:
     notes: tuple[str, ...]
 
     def ranks(self, measure: str) -> dict[str, int]:
-        """Name of each plate → one more than the number of plates that are better by more than can be chance."""
-        (up,) = {told.higher_is_better for told in self.plates[0].measures if told.name == measure}
-        worse = [
-            (pair.one if (pair.value > 0.0) != up else pair.other)
-            for pair in self.differences
-            if pair.measure == measure and pair.told_apart
-        ]
-        return {plate.name: 1 + worse.count(plate.name) for plate in self.plates}
+        """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
+        the rank of a group is one more than the number of plates before it."""
+        told = {(pair.one, pair.other) for pair in self.differences if pair.measure == measure and pair.told_apart}
+        group: list[str] = []
+        ranks: dict[str, int] = {}
+        for place, name in enumerate(self.ordered(measure), start=1):
+            if not group or any({(name, other), (other, name)} & told for other in group):
+                group, rank = [], place
+            group.append(name)
+            ranks[name] = rank
+        return ranks
+
+    def ordered(self, measure: str) -> list[str]:
+        """Names of the plates, the best value first: of the ratio to the solid plate where that counts."""
+        by_ratio = measure in (self.at_equal_weight or ())
+
+        def worse(plate: Contestant) -> float:
+            (told,) = (told for told in plate.measures if told.name == measure)
+            value = told.ratio if by_ratio else told.value
+            return math.inf if math.isnan(value) else -value if told.higher_is_better else value
+
+        return [plate.name for plate in sorted(self.plates, key=worse)]
 
 
 def compare(
@@ -328,6 +342,8 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
     differing = (first_difference(one, other) for one, other in pairwise(asked))
     if (found := next(filter(None, differing), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
+    if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
+        yield f"The numerics are less exact than the fidelity promises: {', '.join(broken)} (warpimpact inspect)."
     yield from dict.fromkeys(note for d in datasets for note in (solid_note(d), sampling_note(d)) if note)
 
 
