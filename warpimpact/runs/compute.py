@@ -24,7 +24,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_table
 from warpimpact.results.table import Table
 from warpimpact.scene import Burst, Numerics, Scene, Shots, Symmetry
-from warpimpact.scene.scatter import QUANTITIES
+from warpimpact.scene.quantities import BY_LAYER, QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PROMISES, Promise, keep
@@ -196,14 +196,14 @@ def is_double(campaign: Campaign) -> bool:
 def at_solid(campaign: Campaign, shots: Shots) -> Shots:
     """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
     target, plate = campaign.target, campaign.plate
-    own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}
-    if shots.thickness is None and shots.layer_thickness is None:
-        return replace(shots, **own)
-    thickness = shots.own("thickness", plate.thickness) * (plate.solid.thickness / plate.thickness)
-    for k, layer in enumerate(target.layers):
-        share = layer.areal_density / layer.thickness / plate.density
-        thickness = thickness + share * shots.own_of_layer("thickness", k, layer.thickness)
-    return replace(shots, **own, thickness=np.broadcast_to(thickness, len(shots)).copy())
+    own: dict[str, Any] = {name: shots.columns[name][:, :1] if shots.differs(name, 0) else None for name in BY_LAYER}
+    if shots.thickness is not None:
+        thickness = shots.own_of(target, "thickness", 0) * (plate.solid.thickness / plate.thickness)
+        for k, layer in enumerate(target.layers[1:], start=1):
+            share = layer.areal_density / layer.thickness / plate.density
+            thickness = thickness + share * shots.own_of(target, "thickness", k)
+        own["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
+    return replace(shots, **own)
 
 
 def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Promise | None:
@@ -319,10 +319,9 @@ def _joined(parts: Sequence[Any], order: NDArray[np.int64]) -> Any:
 
 def _impact(campaign: Campaign) -> str:
     """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
-    scatter = {name: given.model_dump() for name, given in campaign.scatter.given.items()}
-    return json.dumps(
-        dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
-    )
+    scatter = campaign.scatter.given.items()
+    given = {name: one.model_dump() for (name, _), one in scatter if not QUANTITIES[name].by_layer}
+    return json.dumps(dict(campaign.impact) | given)
 
 
 def _material(campaign: Campaign) -> str:
@@ -342,8 +341,9 @@ def _plate(campaign: Campaign) -> str:
 def _layers(campaign: Campaign) -> str:
     """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
     layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
-    for (name, k), given in campaign.scatter.of_layers.items():
-        layers[str(k + 1)][name] = given.model_dump()
+    for (name, k), given in campaign.scatter.given.items():
+        if k:
+            layers[str(k)][name] = given.model_dump()
     return json.dumps(layers)
 
 
@@ -375,7 +375,7 @@ def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -
             f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg, "
             f"at most {finest.patches_axial} by {finest.patches_around} patches"
         )
-    resolution = resolve(numerics, campaign.scene, shots.columns)
+    resolution = resolve(numerics, campaign.scene, shots)
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
@@ -393,7 +393,7 @@ def _numbers_of(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots)
             attr.TOLERANCE_RESIDUAL_VELOCITY: tolerance.residual_velocity,
             attr.TOLERANCE_TILT: math.degrees(tolerance.tilt),
         }
-    resolution = resolve(numerics, campaign.scene, shots.columns)
+    resolution = resolve(numerics, campaign.scene, shots)
     return precision | {
         attr.PATCHES_AXIAL: resolution.patches_axial,
         attr.PATCHES_AROUND: resolution.patches_around,

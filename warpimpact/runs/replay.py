@@ -15,6 +15,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
 from warpimpact.results.files import ResultError
+from warpimpact.results.layers import values_of
 from warpimpact.runs.compute import is_double, promise_in
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver import simulate
@@ -100,8 +101,8 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
     layer = int(result.attrs[attr.LIMIT_LAYER])
     if result.attrs[attr.LIMIT] == "velocity":
         return with_velocity(shots, np.full(len(shots), float(result[v.IMPACT_VELOCITY][place])))
-    stored = result[v.THICKNESS][place] if layer == 0 else result["layer_thickness"][place, layer]
-    return with_thickness(scene, layer, shots, np.full(len(shots), float(stored)))
+    stored = values_of(scene.target, result.isel(hit=place), "thickness")[layer]
+    return with_thickness(layer, shots, np.full(len(shots), stored))
 
 
 def _numerics(campaign: Campaign, result: xarray.Dataset, place: int) -> Numerics | Fidelity:
