@@ -306,7 +306,4 @@ def shots_at_a_plate(dataset: Result) -> int:
 
 def images(dataset: Result) -> int:
     """How many hits in a row are images of each other; 1 without `hits.irreducible`."""
-    told = dataset.attrs
-    if attr.IMAGES in told or attr.SYMMETRIES not in told:
-        return int(told.get(attr.IMAGES, 1))
-    return str(told[attr.SYMMETRIES]).count("(")  # files of version 0.1.0 name the symmetries, but not their number
+    return int(dataset.attrs.get(attr.IMAGES, 1))

@@ -123,7 +123,6 @@ def described(
             attr.TITLE: campaign.title,
             attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
             attr.CAMPAIGN: campaign.text,
-            attr.CAMPAIGN_ANGLES: "degree",
             **attr.versions(),
             **attr.machine(),
             attr.DEVICE: f"{chosen.alias} ({chosen.name})",
