@@ -28,7 +28,6 @@ def in_present_terms(text: str, name: str) -> str:
     _mark(pattern, "rotation")
     for hole in _inner(pattern, "holes") or ():
         hole[2:] = [_marked(turn) for turn in hole[2:]]
-    _mark(_inner(data, "numerics", "tolerance"), "tilt")
     stop = data.get("stop")
     if isinstance(stop, dict) and Measure.parse(stop["quantity"]).units == "degree":
         _mark(stop, "half_width")
