@@ -80,6 +80,11 @@ def promise_text(dataset: Result) -> str | None:
     return f"{given['fidelity']} does not keep its promise ({stated}) at the level that it may use; {found}"
 
 
+def breaks_promise(dataset: Result) -> bool:
+    """Whether the numerics of a result are less exact than its fidelity promises."""
+    return any(dataset.attrs.get(name) == 0 for name in (attr.PROMISE_KEPT, attr.LIMIT_PROMISE_KEPT))
+
+
 def summary(dataset: Result) -> Summary:
     """Summarise a hit map; velocity, deflection and tilt count only the cores that passed the plate."""
     codes, standoffs = status_codes(dataset), dataset[v.STANDOFF].values.tolist()
