@@ -207,7 +207,6 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
                 *v.SCATTER_VARIABLES,
                 *v.POSTERIOR_VARIABLES,
                 *v.BURST_VARIABLES,
-                *v.ESTIMATE_VARIABLES,
                 *v.LAYER_VARIABLES,
                 *v.LAYER_STANDOFF_VARIABLES,
                 *v.LAYER_FACES,

@@ -18,7 +18,7 @@ from warpimpact.runs.compute import is_double, promise_in
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver import simulate
 from warpimpact.solver.limit import with_thickness, with_velocity
-from warpimpact.solver.resolution import Fidelity, level
+from warpimpact.solver.resolution import Fidelity
 from warpimpact.solver.unfold import image_of
 
 ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
@@ -69,7 +69,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     computed, shot = images[: 1 + before], images[image + before :][:1]
     if campaign.drawn is not None:
         ((_, scene),) = campaign.drawn.scenes(scene, computed)
-    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place), snapshots=snapshots)
+    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
     home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
     period, double = campaign.hits.covered(campaign.plate), is_double(campaign)
@@ -101,10 +101,8 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
     return with_thickness(scene, layer, shots, np.full(len(shots), float(stored)))
 
 
-def _numerics(campaign: Campaign, result: xarray.Dataset, place: int) -> Numerics | Fidelity:
-    """What the hit was computed with: of a run to a tolerance, the level that it ended on."""
-    if campaign.numerics.tolerance is not None:
-        return level(int(result[v.LEVEL][place]), campaign.numerics)
+def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics | Fidelity:
+    """What the hits were computed with."""
     if attr.LIMIT_RESOLUTION in result.attrs:
         return Fidelity(**json.loads(result.attrs[attr.LIMIT_RESOLUTION]))
     promise = promise_in(result)
