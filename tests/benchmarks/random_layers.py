@@ -152,7 +152,7 @@ def untrue(row: dict[str, Any], name: str) -> list[str]:
 
 def broken(row: dict[str, Any], name: str) -> bool:
     """Whether a promise that is said to be kept is not."""
-    allowed = PROMISES[name].tolerance
+    allowed = PROMISES[name].accuracy
     limits = [allowed.residual_velocity, math.degrees(allowed.tilt), math.inf]
     return row[name]["kept"] and bool(beyond(row[name]["found"], limits, row["uncertain"]))
 

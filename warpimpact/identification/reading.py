@@ -74,8 +74,6 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     tables = with_medians(tables, prior, parameters)
     record = _model(Record, data.get("record", {}), f"{name}: record")
     numerics = _model(Numerics, {"fidelity": "draft"} | _table(data, "numerics", name), f"{name}: numerics")
-    if numerics.tolerance is not None:
-        raise FitError(f"{name}: numerics.tolerance: a fit computes all hits with one resolution; name a fidelity")
     shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
     selection = tuple(_condition(one, f"{name}: selection") for one in _selection(data, name))
     if any(one.variable == "bending_stress" for one in selection):

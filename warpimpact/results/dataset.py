@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.refinement import Estimates
     from warpimpact.solver.simulate import Outcomes, Replay
 
 
@@ -51,7 +50,6 @@ def to_table(
     *,
     period: tuple[float, float],
     attributes: Mapping[str, Any],
-    estimates: Estimates | None = None,
     double: bool = False,
 ) -> Table:
     """Gather shots and outcomes into the columns of the hit map.
@@ -64,7 +62,6 @@ def to_table(
         outcomes: Their outcomes, of shape (n,) or (n, m), SI and radians; NaN where there is no value.
         period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
-        estimates: Estimated errors of a run to a tolerance, SI and radians.
         double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
     """
@@ -95,13 +92,9 @@ def to_table(
     told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
     optional = (*told, *layered, *v.LAYER_FACES)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
-    if estimates is not None:
-        variables += v.ESTIMATE_VARIABLES
-        values |= {name: getattr(estimates, name) for name in v.ESTIMATE_VARIABLES}
-        values[v.CONVERGED] = estimates.converged.astype(np.int8)
     columns = described(variables, values)
     if not double:
-        columns |= _in_single(columns, (*ended, *v.ESTIMATE_VARIABLES))
+        columns |= _in_single(columns, ended)
     return Table.of(
         columns,
         described(along, coordinates),
@@ -307,7 +300,4 @@ def shots_at_a_plate(dataset: Result) -> int:
 
 def images(dataset: Result) -> int:
     """How many hits in a row are images of each other; 1 without `hits.irreducible`."""
-    told = dataset.attrs
-    if attr.IMAGES in told or attr.SYMMETRIES not in told:
-        return int(told.get(attr.IMAGES, 1))
-    return str(told[attr.SYMMETRIES]).count("(")  # files of version 0.1.0 name the symmetries, but not their number
+    return int(dataset.attrs.get(attr.IMAGES, 1))

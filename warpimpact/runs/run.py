@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -183,7 +183,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
                 for index, shard in _split(future.result(), task, store.extent):
                     store.save(index, shard)
                     watch.add(index, shard)
-            follow(replace(watch.standing(team.underway()), refining=team.refining()))
+            follow(watch.standing(team.underway()))
     finally:
         for future in waiting:
             future.cancel()

@@ -7,7 +7,7 @@ imports no other room: neither a kernel nor a Dataset.
 from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction
-from .numerics import Numerics, Tolerance
+from .numerics import Accuracy, Numerics
 from .patterns import (
     AnyPattern,
     CirclePattern,
@@ -33,6 +33,7 @@ from .target import Layer, Target
 __all__ = [
     "IDENTITY",
     "OF_THE_SCENE",
+    "Accuracy",
     "AnyCore",
     "AnyPattern",
     "Burst",
@@ -65,7 +66,6 @@ __all__ = [
     "SquarePattern",
     "Symmetry",
     "Target",
-    "Tolerance",
     "TrianglePattern",
     "make_shots",
     "symmetries_used",

@@ -6,7 +6,7 @@ All shots are searched together, one run of each at a time (solver/limit_search.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -17,7 +17,6 @@ from warpimpact.kernels.status import Status
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit_search import Search
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.refinement import picked, with_rows
 from warpimpact.solver.resolution import FIDELITIES, Fidelity, computed_as
 from warpimpact.solver.simulate import Outcomes, simulate
 
@@ -82,7 +81,7 @@ def limit_velocity(
         highest: largest velocity tried [m/s].
 
     Raises:
-        ValueError: the plate weakens by time (`check_arrests`); the numerics have a tolerance.
+        ValueError: the plate weakens by time (`check_arrests`).
         DeviceError: the device is absent.
     """
     compute = _Computing(scene, _in_short_steps(numerics), device, threads)
@@ -225,3 +224,16 @@ class _Kept:
             self.outcomes = ended
         self.outcomes = with_rows(self.outcomes, which[places], picked(ended, places))
         self.values[which[places]] = tried[places]
+
+
+def picked(outcomes: Outcomes, which: NDArray[np.int64]) -> Outcomes:
+    """The rows of some shots."""
+    return replace(outcomes, **{field.name: getattr(outcomes, field.name)[which] for field in fields(outcomes)})
+
+
+def with_rows(outcomes: Outcomes, which: NDArray[np.int64], other: Outcomes) -> Outcomes:
+    """Copies of the columns, with those of some shots from other outcomes."""
+    columns = {field.name: getattr(outcomes, field.name).copy() for field in fields(outcomes)}
+    for name, column in columns.items():
+        column[which] = getattr(other, name)
+    return replace(outcomes, **columns)

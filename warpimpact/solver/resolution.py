@@ -175,8 +175,6 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, shots: Shots | None = N
         fidelity, numerics = numerics, Numerics()
     else:
         fidelity = FIDELITIES[numerics.fidelity]
-    if numerics.tolerance is not None:
-        raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
     lengths = [one.degradation_length for one, does in zip(plates, weakening, strict=True) if does]
     finest = min(lengths, default=plate.degradation_length)
     width = fidelity.patch_width * finest if lengths else math.inf

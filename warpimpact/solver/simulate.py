@@ -180,7 +180,7 @@ def simulate(
 
     Raises:
         DeviceError: the device is absent.
-        ValueError: the numerics have a tolerance, or they cannot compute the bending moment that the scene records or
+        ValueError: the numerics cannot compute the bending moment that the scene records or
             several shots at one plate.
     """
     march = March(scene, numerics or Numerics(), shots, find_device(device), threads=threads)

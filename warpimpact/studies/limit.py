@@ -80,10 +80,6 @@ class LimitMap(HitMap):
             raise CampaignError("got a stop rule, but limits are searched for every hit: leave out the table [stop]")
         if campaign.burst is not None:
             raise CampaignError("got a burst, but limits are searched for every hit alone: leave out the table [burst]")
-        if campaign.numerics.tolerance is not None:
-            raise CampaignError(
-                "got numerics.tolerance, but limits take a fidelity; warpimpact limit has a --tolerance of its own"
-            )
         try:
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:

@@ -16,7 +16,6 @@ from warpimpact.results.variables import OUTCOME_VARIABLES
 from warpimpact.runs.compute import compute, promise_in
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
-from warpimpact.scene import Numerics
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -121,16 +120,14 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     assert capsys.readouterr().out.splitlines()[-1] == f"0 of {count} shots failed"
 
 
-def test_scatter_in_plate_and_core_beside_symmetry_and_tolerance(own: Campaign) -> None:
+def test_scatter_in_plate_and_core_beside_symmetry(own: Campaign) -> None:
     hits = own.hits.model_copy(update={"irreducible": True})
-    numerics = Numerics(tolerance={"residual_velocity": "5 m/s", "tilt": "5 deg"})
-    dataset = run(own.model_copy(update={"hits": hits, "numerics": numerics}), device="cpu")
+    dataset = run(own.model_copy(update={"hits": hits}), device="cpu")
     assert dataset.attrs["computed_hits"] == 8
     for name in (*OWN, "residual_velocity", "energy_loss", "tilt"):
         values = dataset[name].values.reshape(8, 8, -1)
         assert (values == values[:, :1]).all(), name  # a hit and its images
         assert len(np.unique(values[:, 0, 0])) == 8
-    assert dataset.converged.mean() > 0.8
 
 
 def test_a_list_may_bring_its_own_plates(tmp_path: Path) -> None:

@@ -87,7 +87,6 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (('title = "Two', 'tilte = "Two'), 'got the unknown key "tilte"'),
         (("seed = 3", "sets = 3"), "sampling: sets: got 3, but it must be greater than or equal to 64"),
         (("title =", 'selection = ["whole"]\ntitle ='), 'selection: got "whole", but it must be one of perforated'),
-        (('fidelity = "draft"', 'tolerance = { tilt = "1 deg" }'), "numerics"),
         (
             (RESISTANCE, "resistance = 2e9"),
             "but a prior is a distribution such as",
