@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .runs.run import run, run_to_file
     from .runs.team import ClusterError
     from .scene import (
+        Accuracy,
         CirclePattern,
         ConeCore,
         Core,
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
         SlotPattern,
         SquarePattern,
         Target,
-        Tolerance,
         TrianglePattern,
         make_shots,
     )
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Accuracy",
     "Campaign",
     "CampaignError",
     "CirclePattern",
@@ -88,7 +89,6 @@ __all__ = [
     "SquarePattern",
     "Stop",
     "Target",
-    "Tolerance",
     "TrianglePattern",
     "__version__",
     "cluster_team",

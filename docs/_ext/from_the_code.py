@@ -238,7 +238,6 @@ class VariableReference(FromTheCode):
             "With layers behind the plate": (*variables.LAYER_VARIABLES, *variables.LAYER_FACES),
             "With `output.layer_standoffs`": (*variables.LAYER_COORDINATES, *variables.LAYER_STANDOFF_VARIABLES),
             "With bursts": variables.BURST_VARIABLES,
-            "With a tolerance": variables.ESTIMATE_VARIABLES,
         }
         for title, group in groups.items():
             yield from [f"## {title}", ""]

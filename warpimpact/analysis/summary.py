@@ -68,11 +68,11 @@ def promise_text(dataset: Result) -> str | None:
         return None
     given = json.loads(told[attr.NUMERICS_GIVEN])
     if attr.PROMISE_KEPT not in told:
-        fixed = ("tolerance", "time_step", "patches_axial", "patches_around", "grid_spacing")
+        fixed = ("time_step", "patches_axial", "patches_around", "grid_spacing")
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
-    tolerance = PROMISES[given["fidelity"]].tolerance
-    stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
+    accuracy = PROMISES[given["fidelity"]].accuracy
+    stated = f"{accuracy.residual_velocity:g} m/s and {math.degrees(accuracy.tilt):g} deg for 90 % of the hits"
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
     found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR_P90, math.nan))}"
     if told[attr.PROMISE_KEPT]:

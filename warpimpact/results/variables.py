@@ -239,13 +239,6 @@ LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, fr
 LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
 """Likewise; of the means where thicknesses scatter."""
 
-RESIDUAL_VELOCITY_ERROR = Variable("residual_velocity_error", _HIT, "m s-1", "estimated error of the residual velocity")
-TILT_ERROR = Variable("tilt_error", _AT_STANDOFF, "degree", "estimated error of the tilt")
-CONVERGED = Variable("converged", _HIT, "1", "whether the estimated errors meet the tolerance, 1 or 0")
-LEVEL = Variable("level", _HIT, "1", "level of resolution on which the hit was computed")
-
-ESTIMATE_VARIABLES = (RESIDUAL_VELOCITY_ERROR, TILT_ERROR, CONVERGED, LEVEL)
-"""Present only in a run to a tolerance."""
 
 BROKEN = Variable("broken", _HIT, "1", "1 where the bending stress passed the strength of the core, else 0")
 BROKEN_TIME = Variable("broken_time", _HIT, "s", "when the core broke, since the first touch of the front face")

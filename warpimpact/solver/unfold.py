@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Symmetry
 from warpimpact.solver.layering import Weakened
-from warpimpact.solver.refinement import Estimates
 from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, Replay
 
 Array = NDArray[np.float64]
@@ -42,11 +40,6 @@ def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
         exit_axis=every.exit_axis * signs,
         exit_position=every.exit_position * signs,
     )
-
-
-def unfolded_estimates(estimates: Estimates, group: Sequence[Symmetry]) -> Estimates:
-    """Estimates of all images, in the order of `unfolded`; an image has the estimates of its shot."""
-    return _repeated(estimates, len(group))
 
 
 def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], image: tuple[float, float]) -> Replay:
@@ -91,9 +84,6 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
     )
 
 
-Columns = TypeVar("Columns", Outcomes, Estimates)
-
-
-def _repeated(columns: Columns, times: int) -> Columns:
+def _repeated(outcomes: Outcomes, times: int) -> Outcomes:
     """Every row, `times` times in a row."""
-    return replace(columns, **{f.name: np.repeat(getattr(columns, f.name), times, axis=0) for f in fields(columns)})
+    return replace(outcomes, **{f.name: np.repeat(getattr(outcomes, f.name), times, axis=0) for f in fields(outcomes)})

@@ -48,7 +48,7 @@ def test_another_process_gets_the_plain_name() -> None:
 def test_codes_carry_their_meanings() -> None:
     assert v.STATUS.attributes["flag_meanings"].split()[:2] == ["perforated", "arrested"]
     assert v.STATUS.attributes["flag_values"].dtype == np.int8
-    assert "flag_values" not in v.LEVEL.attributes
+    assert "flag_values" not in v.TILT.attributes
 
 
 def test_what_a_command_shows() -> None:
