@@ -289,7 +289,7 @@ def to_tolerance(bench: Bench, case: Case, truth: Answer, velocity: float, tilt:
     numerics = Numerics(tolerance=Tolerance(residual_velocity=velocity, tilt=tilt))
     shots = case.shots(bench.hits)
     begin = time.process_time()
-    outcomes, estimates = simulate_to_tolerance(case.scene, shots, numerics=numerics, device="cpu", threads=1)
+    outcomes = estimates = simulate_to_tolerance(case.scene, shots, numerics=numerics, device="cpu", threads=1)
     cost = (time.process_time() - begin) / bench.hits
     answer = Answer(outcomes.status, outcomes.residual_velocity, outcomes.tilt[:, 0])
     errors, done = off(answer, truth), estimates.converged

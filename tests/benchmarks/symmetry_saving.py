@@ -14,7 +14,6 @@ import numpy as np
 from warpimpact import Campaign, make_shots
 from warpimpact.scene import symmetries_used
 from warpimpact.solver.simulate import simulate
-from warpimpact.solver.unfold import unfolded
 
 ROUNDS = 7
 CAMPAIGNS = [f"campaigns/{name}.toml" for name in ("slotted_plate", "round_holes", "oblique_shot")]
@@ -35,7 +34,7 @@ def measure(campaign: Campaign) -> None:
         return simulate(campaign.scene, shots, numerics=campaign.numerics)
 
     def part() -> Any:
-        return unfolded(simulate(campaign.scene, shots[:: len(group)], numerics=campaign.numerics), group)
+        return simulate(campaign.scene, shots[:: len(group)], numerics=campaign.numerics).unfolded(group)
 
     whole, folded = every(), part()  # builds the kernels
     rounds = [(seconds(every), seconds(part)) for _ in range(ROUNDS)]

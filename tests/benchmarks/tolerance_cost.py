@@ -49,7 +49,7 @@ def main() -> None:
     def to_tolerance() -> Any:
         return simulate_to_tolerance(campaign.scene, shots, numerics=Numerics(tolerance=tolerance))
 
-    outcomes, estimates = to_tolerance()  # builds the kernels, and tells the levels
+    outcomes = estimates = to_tolerance()  # builds the kernels, and tells the levels
     finest = LADDER[estimates.level.max()]
 
     def at_finest() -> Any:

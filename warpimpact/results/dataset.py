@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
+    from warpimpact.records.outcomes import Outcomes
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.refinement import Estimates
-    from warpimpact.solver.simulate import Outcomes, Replay
+    from warpimpact.solver.simulate import Replay
 
 
 _ATTRIBUTES = {
@@ -51,7 +51,6 @@ def to_table(
     *,
     period: tuple[float, float],
     attributes: Mapping[str, Any],
-    estimates: Estimates | None = None,
     double: bool = False,
 ) -> Table:
     """Gather shots and outcomes into the columns of the hit map.
@@ -64,7 +63,6 @@ def to_table(
         outcomes: Their outcomes, of shape (n,) or (n, m), SI and radians; NaN where there is no value.
         period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
-        estimates: Estimated errors of a run to a tolerance, SI and radians.
         double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
     """
@@ -75,35 +73,19 @@ def to_table(
         v.STANDOFF: np.array(scene.record.standoffs),
         v.AXIS: ["x", "y", "z"],
     }
-    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
-    values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
-    layered: tuple[v.Variable, ...] = v.LAYER_VARIABLES
-    along: tuple[v.Variable, ...] = (*v.COORDINATES, *v.OUTLINE_VARIABLES)
-    if scene.target.layers and scene.record.layer_standoffs:
-        layered = (*layered, *v.LAYER_STANDOFF_VARIABLES)
-        along = (*along, *v.LAYER_COORDINATES)
+    if v.LAYER_STANDOFF_TILT in outcomes:
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
-    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layered)
-    values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
-    values |= of_layers(scene, shots)
-    if v.EXIT_POSITION in values:
-        zero = np.zeros(len(shots))
-        values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
-    told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
-    optional = (*told, *layered, *v.LAYER_FACES)
-    variables = [*v.VARIABLES, *(name for name in optional if name in values)]
-    if estimates is not None:
-        variables += v.ESTIMATE_VARIABLES
-        values |= {name: getattr(estimates, name) for name in v.ESTIMATE_VARIABLES}
-        values[v.CONVERGED] = estimates.converged.astype(np.int8)
-    columns = described(variables, values)
-    if not double:
-        columns |= _in_single(columns, (*ended, *v.ESTIMATE_VARIABLES))
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES)
+    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    values |= {name: shots.columns[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in shots.columns}
+    values |= vars(outcomes) | of_layers(scene, shots)
+    zero = np.zeros(len(shots))
+    values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
+    columns = described((name for name in v.hit_variables() if name in values), values)
     return Table.of(
-        columns,
-        described(along, coordinates),
+        columns if double else columns | _in_single(columns, v.computed_variables()),
+        described((name for name in along if name in coordinates), coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
@@ -121,7 +103,7 @@ def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, 
         outcomes: SI and radians.
         double: as in `to_dataset`.
     """
-    values: dict[str, Any] = {variable: getattr(outcomes, variable.field) for variable in v.SOLID_VARIABLES}
+    values: dict[str, Any] = {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
     columns = described(v.SOLID_VARIABLES, values)
     return columns if double else columns | _in_single(columns, v.SOLID_VARIABLES)
 
@@ -252,6 +234,8 @@ def described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dic
 
 
 def _in_units(variable: v.Variable, values: Any) -> Any:
+    if getattr(values, "dtype", None) == np.bool_:
+        return values.astype(np.int8)  # netCDF has no truth values
     return np.degrees(values) if variable.units == "degree" else values
 
 

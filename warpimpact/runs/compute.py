@@ -9,16 +9,16 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.posterior import Posterior
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_table
@@ -28,10 +28,9 @@ from warpimpact.scene.scatter import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PROMISES, Promise, keep
-from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_to_tolerance
+from warpimpact.solver.refinement import LEVELS, Refining, simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER, Fidelity, resolve
-from warpimpact.solver.simulate import Outcomes, build, simulate
-from warpimpact.solver.unfold import unfolded, unfolded_estimates
+from warpimpact.solver.simulate import build, simulate
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -72,7 +71,7 @@ def compute(
     numerics = campaign.numerics if promise is None else promise.fidelity
     _build(scene, computed, numerics, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining, campaign.drawn)
+    outcomes = _outcomes(scene, computed, numerics, device, threads, follow, refining, campaign.drawn)
     elapsed = time.perf_counter() - begin
     table = described(
         campaign,
@@ -82,13 +81,12 @@ def compute(
         device=device,
         elapsed=elapsed,
         attributes={} if promise is None else _promised(promise),
-        estimates=estimates,
     )
     if solid is None:
         return table
     solid, reference = at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
     follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
-    outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
+    outcomes = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
     return table.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
 
 
@@ -101,13 +99,12 @@ def described(
     device: str,
     elapsed: float,
     attributes: Mapping[str, Any],
-    estimates: Estimates | None = None,
 ) -> Table:
     """The columns of some shots of a campaign.
 
     Args:
         shots: whole groups of images.
-        outcomes: of the first shot of every group; the estimates likewise.
+        outcomes: of the first shot of every group.
         numerics: with which they were computed.
         elapsed: time that this took [s].
         attributes: global attributes beside those of any campaign.
@@ -117,7 +114,7 @@ def described(
     table = to_table(
         scene,
         shots,
-        unfolded(outcomes, group),
+        outcomes.unfolded(group),
         period=campaign.hits.covered(campaign.plate),
         attributes={
             attr.TITLE: campaign.title,
@@ -150,7 +147,6 @@ def described(
         | (_symmetry(group, computed) if campaign.hits.irreducible else {})
         | ({} if campaign.burst is None else _burst(campaign.burst))
         | dict(attributes),
-        estimates=None if estimates is None else unfolded_estimates(estimates, group),
         double=is_double(campaign),
     )
     return table if campaign.output.exit_state else table.drop_vars(v.EXIT_VARIABLES)
@@ -277,8 +273,8 @@ def _outcomes(
     progress: Progress | None = None,
     refining: Callable[[Refining], None] | None = None,
     drawn: Posterior | None = None,
-) -> tuple[Outcomes, Estimates | None]:
-    """Outcomes, and estimates of their errors if the numerics have a tolerance."""
+) -> Outcomes:
+    """Outcomes, with estimates of their errors if the numerics have a tolerance."""
     if drawn is not None and drawn.of_scene:
         return _outcomes_of_scenes(scene, shots, (numerics, device, threads, progress), drawn)
     if isinstance(numerics, Numerics) and numerics.tolerance is not None:
@@ -291,30 +287,21 @@ def _outcomes(
             progress=progress,
             refining=refining,
         )
-    return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
+    return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
 
 
-def _outcomes_of_scenes(
-    scene: Scene, shots: Shots, how: tuple[Any, ...], drawn: Posterior
-) -> tuple[Outcomes, Estimates | None]:
+def _outcomes_of_scenes(scene: Scene, shots: Shots, how: tuple[Any, ...], drawn: Posterior) -> Outcomes:
     """Outcomes of shots whose draws of the posterior need scenes of their own."""
     numerics, device, threads, progress = how
     places: list[Any] = []
-    parts: list[tuple[Outcomes, Estimates | None]] = []
+    parts: list[Outcomes] = []
     for which, own in drawn.scenes(scene, shots):
         before = sum(map(len, places))
         follow = progress and (lambda done, _, before=before: progress(before + done, len(shots)))
         parts.append(_outcomes(own, shots[which], numerics, device, threads, follow))
         places.append(which)
     order = np.argsort(np.concatenate(places), kind="stable")
-    outcomes, estimates = zip(*parts, strict=True)
-    return _joined(outcomes, order), None if estimates[0] is None else _joined(estimates, order)
-
-
-def _joined(parts: Sequence[Any], order: NDArray[np.int64]) -> Any:
-    """Outcomes or estimates one after the other, then in this order."""
-    columns = {one.name: [getattr(part, one.name) for part in parts] for one in fields(parts[0])}
-    return type(parts[0])(**{name: np.concatenate(values)[order] for name, values in columns.items()})
+    return Outcomes.joined(parts)[order]
 
 
 def _impact(campaign: Campaign) -> str:

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit_search import Search
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.refinement import picked, with_rows
 from warpimpact.solver.resolution import FIDELITIES, Fidelity, computed_as
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -230,5 +230,5 @@ class _Kept:
         """Keep the runs in some places of `which`; the first ones are of all shots."""
         if not hasattr(self, "outcomes"):
             self.outcomes = ended
-        self.outcomes = with_rows(self.outcomes, which[places], picked(ended, places))
+        self.outcomes = self.outcomes.with_rows(which[places], ended[places])
         self.values[which[places]] = tried[places]

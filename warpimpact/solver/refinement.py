@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots, Tolerance
 from warpimpact.solver.bursts import whole_plates
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import level
-from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -25,23 +27,6 @@ GROWTH = 4.0
 CLOSE, FAR = 0.25, 1.0
 """A shot has converged where its last change is at most CLOSE of the tolerance; or where its last change is within the
 tolerance and the change from two levels before within FAR times that. Two levels may agree by chance, three rarely."""
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """How far off the outcomes may be, and how fine they were computed.
-
-    Attributes:
-        residual_velocity_error: change from the level before the last to the last [m/s], shape [shots]; likewise
-        tilt_error: [rad], shape [shots, stand-offs]. Infinite where the status changed, 0 where there is no value.
-        converged: whether the changes meet the tolerance (see CLOSE), shape [shots].
-        level: index of the last level in LADDER, shape [shots].
-    """
-
-    residual_velocity_error: Array
-    tilt_error: Array
-    converged: NDArray[np.bool_]
-    level: NDArray[np.int8]
 
 
 @dataclass(frozen=True)
@@ -71,12 +56,16 @@ def simulate_to_tolerance(
     threads: int | None = None,
     progress: Progress | None = None,
     refining: Callable[[Refining], None] | None = None,
-) -> tuple[Outcomes, Estimates]:
+) -> Outcomes:
     """Compute every shot on the first two levels, and on finer ones until it has converged (CLOSE, FAR).
 
     The outcome is that of the finest level computed. The estimate is its change from the level before: where levels
     converge, the outcome is nearer to the limit (docs/model.md §4) than that. Shots at one plate go on together until
     all of them have converged.
+
+    Returns:
+        The outcomes, with the columns of records/estimates.py: the errors are infinite where the status changed, and 0
+        where there is no value.
 
     Args:
         numerics: its tolerance and precision; the others as in `simulate`.
@@ -107,28 +96,26 @@ def simulate_to_tolerance(
 
     pending = np.arange(len(shots))
     outcomes = before = on(LEVELS[0], pending)
-    estimates = Estimates(
-        residual_velocity_error=np.full(len(shots), np.inf),
-        tilt_error=np.full(outcomes.tilt.shape, np.inf),
-        converged=np.zeros(len(shots), dtype=bool),
-        level=np.zeros(len(shots), dtype=np.int8),
-    )
+    velocity_error, tilt_error = np.full(len(shots), np.inf), np.full(outcomes.tilt.shape, np.inf)
+    converged, reached = np.zeros(len(shots), dtype=bool), np.zeros(len(shots), dtype=np.int8)
     for index in LEVELS[1:]:
-        finer, last = on(index, pending), picked(outcomes, pending)
-        change, since_before = Change.between(last, finer), Change.between(picked(before, pending), finer)
+        finer, last = on(index, pending), outcomes[pending]
+        change, since_before = Change.between(last, finer), Change.between(before[pending], finer)
         near, far = change.in_tolerances(tolerance), since_before.in_tolerances(tolerance)
         three_agree = (near <= 1.0) & (far <= FAR) if index > LEVELS[1] else False
-        estimates.residual_velocity_error[pending] = change.residual_velocity
-        estimates.tilt_error[pending] = change.tilt
-        estimates.converged[pending] = (near <= CLOSE) | three_agree
-        estimates.level[pending] = index
-        before, outcomes = with_rows(before, pending, last), with_rows(outcomes, pending, finer)
-        pending = whole_plates(~estimates.converged, shots.at_a_plate)
+        velocity_error[pending] = change.residual_velocity
+        tilt_error[pending] = change.tilt
+        converged[pending] = (near <= CLOSE) | three_agree
+        reached[pending] = index
+        before, outcomes = before.with_rows(pending, last), outcomes.with_rows(pending, finer)
+        pending = whole_plates(~converged, shots.at_a_plate)
         show(len(shots) - len(pending))
         if not len(pending):
             break
     show(len(shots))
-    return outcomes, estimates
+    return outcomes.assign(
+        residual_velocity_error=velocity_error, tilt_error=tilt_error, converged=converged, level=reached
+    )
 
 
 class _Cost:
@@ -169,7 +156,7 @@ class Change:
         """The change from the outcomes of one level to those of another, of the same shots."""
         same = coarse.status == fine.status
         velocity, tilt = _apart(coarse.residual_velocity, fine.residual_velocity), _apart(coarse.tilt, fine.tilt)
-        if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
+        if LAYER_RESIDUAL_VELOCITY in coarse:
             behind = _apart(coarse.layer_residual_velocity, fine.layer_residual_velocity)
             velocity = np.maximum(velocity, behind.max(axis=1))
         return cls(np.where(same, velocity, np.inf), np.where(same[:, None], tilt, np.inf))
@@ -184,16 +171,3 @@ def _apart(coarse: Array, fine: Array) -> Array:
     missing = np.isnan(coarse), np.isnan(fine)
     change = np.where(missing[0] & missing[1], 0.0, np.abs(fine - coarse))
     return np.where(np.isnan(change), np.inf, change)
-
-
-def picked(outcomes: Outcomes, which: NDArray[np.int64]) -> Outcomes:
-    """The rows of some shots."""
-    return replace(outcomes, **{field.name: getattr(outcomes, field.name)[which] for field in fields(outcomes)})
-
-
-def with_rows(outcomes: Outcomes, which: NDArray[np.int64], other: Outcomes) -> Outcomes:
-    """Copies of the columns, with those of some shots from other outcomes."""
-    columns = {field.name: getattr(outcomes, field.name).copy() for field in fields(outcomes)}
-    for name, column in columns.items():
-        column[which] = getattr(other, name)
-    return replace(outcomes, **columns)

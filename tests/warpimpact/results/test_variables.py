@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.records.group import Group
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import images
@@ -15,7 +16,9 @@ def groups() -> dict[str, tuple[v.Variable, ...]]:
     return {
         name: tuple(group)
         for name, group in vars(v).items()
-        if name.isupper() and isinstance(group, (tuple, dict)) and all(isinstance(one, v.Variable) for one in group)
+        if name.isupper()
+        and isinstance(group, (tuple, dict, Group))
+        and all(isinstance(one, v.Variable) for one in group)
     }
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, run
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.runs.replay import replay
 from warpimpact.scene import (
     Hits,
@@ -23,7 +24,7 @@ from warpimpact.scene import (
 from warpimpact.solver.refinement import LEVELS, Refining, simulate_to_tolerance
 from warpimpact.solver.resolution import LADDER, resolve
 from warpimpact.solver.rings import rings_of
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
 PLATE = Plate(
@@ -48,7 +49,7 @@ def limit() -> Outcomes:
 
 
 def test_true_errors_are_within_the_tolerance_for_95_percent_of_hits(limit: Outcomes) -> None:
-    outcomes, estimates = simulate_to_tolerance(SCENE, shots(64), numerics=Numerics(tolerance=TOLERANCE), device="cpu")
+    outcomes = estimates = simulate_to_tolerance(SCENE, shots(64), numerics=Numerics(tolerance=TOLERANCE), device="cpu")
     assert estimates.converged.all()
     velocity = np.abs(outcomes.residual_velocity - limit.residual_velocity) <= 0.5
     tilt = (np.abs(outcomes.tilt - limit.tilt) <= np.radians(0.7)).all(axis=1)
@@ -79,7 +80,7 @@ def test_costs_less_than_every_hit_on_the_finest_level_used(monkeypatch: pytest.
         return outcomes
 
     monkeypatch.setattr("warpimpact.solver.refinement.simulate", counted)
-    _, estimates = simulate_to_tolerance(SCENE, shots(64), numerics=Numerics(tolerance=TOLERANCE), device="cpu")
+    estimates = simulate_to_tolerance(SCENE, shots(64), numerics=Numerics(tolerance=TOLERANCE), device="cpu")
     finest = LADDER[estimates.level.max()]
     every = patch_steps(shots(64), finest, simulate(SCENE, shots(64), numerics=finest, device="cpu"))
     assert estimates.level.max() >= LEVELS[2]
@@ -90,8 +91,8 @@ def test_costs_less_than_every_hit_on_the_finest_level_used(monkeypatch: pytest.
 
 def test_a_hit_does_not_depend_on_its_company() -> None:
     numerics = Numerics(tolerance=TOLERANCE)
-    whole, _ = simulate_to_tolerance(SCENE, shots(8), numerics=numerics, device="cpu")
-    alone, _ = simulate_to_tolerance(SCENE, shots(8)[3:4], numerics=numerics, device="cpu")
+    whole = simulate_to_tolerance(SCENE, shots(8), numerics=numerics, device="cpu")
+    alone = simulate_to_tolerance(SCENE, shots(8)[3:4], numerics=numerics, device="cpu")
     assert np.array_equal(alone.residual_velocity, whole.residual_velocity[3:4])
     assert np.array_equal(alone.tilt, whole.tilt[3:4])
 
@@ -99,7 +100,7 @@ def test_a_hit_does_not_depend_on_its_company() -> None:
 def test_what_no_level_meets_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("warpimpact.solver.refinement.LEVELS", LEVELS[:2])
     numerics = Numerics(tolerance={"residual_velocity": 1e-6})
-    _, estimates = simulate_to_tolerance(SCENE, shots(4), numerics=numerics, device="cpu")
+    estimates = simulate_to_tolerance(SCENE, shots(4), numerics=numerics, device="cpu")
     assert not estimates.converged.any()
     assert (estimates.residual_velocity_error > 1e-6).all()
 
@@ -123,7 +124,7 @@ def test_a_campaign_carries_estimates_and_replays_on_the_level_of_each_hit(tmp_p
 def test_progress_tells_the_level_the_pending_shots_and_the_longest_time_left() -> None:
     seen: list[Refining] = []
     numerics = Numerics(tolerance={"residual_velocity": "1e-6 m/s", "tilt": "1e-6 deg"})
-    _, estimates = simulate_to_tolerance(SCENE, shots(2), numerics=numerics, device="cpu", refining=seen.append)
+    estimates = simulate_to_tolerance(SCENE, shots(2), numerics=numerics, device="cpu", refining=seen.append)
     assert seen[0] == Refining(1, len(LEVELS), 2, None)
     levels = [found.level for found in seen]
     assert levels == sorted(levels)
