@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .runs.run import run, run_to_file
     from .runs.team import ClusterError
     from .scene import (
+        Accuracy,
         CirclePattern,
         ConeCore,
         Core,
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
         SlotPattern,
         SquarePattern,
         Target,
-        Tolerance,
         TrianglePattern,
         make_shots,
     )
@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Accuracy",
     "Campaign",
     "CampaignError",
     "CirclePattern",
@@ -89,7 +90,6 @@ __all__ = [
     "SquarePattern",
     "Stop",
     "Target",
-    "Tolerance",
     "TrianglePattern",
     "__version__",
     "cluster_team",

@@ -68,16 +68,21 @@ def promise_text(dataset: Result) -> str | None:
         return None
     given = json.loads(told[attr.NUMERICS_GIVEN])
     if attr.PROMISE_KEPT not in told:
-        fixed = ("tolerance", "time_step", "patches_axial", "patches_around", "grid_spacing")
+        fixed = ("time_step", "patches_axial", "patches_around", "grid_spacing")
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
-    tolerance = PROMISES[given["fidelity"]].tolerance
-    stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
+    accuracy = PROMISES[given["fidelity"]].accuracy
+    stated = f"{accuracy.residual_velocity:g} m/s and {math.degrees(accuracy.tilt):g} deg for 90 % of the hits"
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
     found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR_P90, math.nan))}"
     if told[attr.PROMISE_KEPT]:
         return f"{given['fidelity']} keeps its promise ({stated}); {found}"
     return f"{given['fidelity']} does not keep its promise ({stated}) at the level that it may use; {found}"
+
+
+def breaks_promise(dataset: Result) -> bool:
+    """Whether the numerics of a result are less exact than its fidelity promises."""
+    return any(dataset.attrs.get(name) == 0 for name in (attr.PROMISE_KEPT, attr.LIMIT_PROMISE_KEPT))
 
 
 def summary(dataset: Result) -> Summary:

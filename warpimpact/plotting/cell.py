@@ -106,7 +106,7 @@ def _number(dataset: xarray.Dataset, layer: int | None) -> int:
 
 
 def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None, layer: int | None) -> xarray.DataArray:
-    numbers = (*v.HIT_NUMBERS, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR, *v.LAYER_NUMBERS)
+    numbers = (*v.HIT_NUMBERS, *v.LAYER_NUMBERS)
     mapped = [name for name in numbers if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')

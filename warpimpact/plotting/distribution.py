@@ -41,8 +41,6 @@ _BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
 _PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
 _FINE = 100  # pixels along the longer side of a smoothed map
-_ERRORS: dict[str, str] = {v.RESIDUAL_VELOCITY: v.RESIDUAL_VELOCITY_ERROR, v.TILT: v.TILT_ERROR}
-"""Estimates of numerical error, of a run to a tolerance."""
 _MOST_POINTS = 4000  # more are drawn as a density
 
 
@@ -122,11 +120,9 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
 
 
 def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """A map beside what makes it uncertain.
+    """A map of the mean of the hits nearby, and half the width of its 95 % interval (`analysis.local.plane_fit`).
 
-    Where shots scatter, so that two at one place differ, that is the mean of the hits nearby and half the width of its
-    95 % interval (`analysis.local.plane_fit`). Of a run to a tolerance it is the value of each hit and the estimate of
-    its numerical error. A map of shots that all arrive alike has no uncertainty that hits nearby could tell.
+    Shots must scatter, so that two at one place differ. Where all arrive alike, hits nearby tell no uncertainty.
 
     Args:
         dataset: a result whose hits cover the cell.
@@ -137,25 +133,19 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     """
     column = shown(dataset, variable, standoff)
     unit = f"[{column.label.partition('[')[2]}"
-    if shots_scatter(dataset):
-        images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
-        labels = f"local mean of {column.label}", f"half width of its 95 % interval {unit}"
-        method = "plane through the {} nearest hits, Student's interval; bends of the map widen it"
-        return _two_maps(dataset, images, labels, column.title, method)
-    if (error := _ERRORS.get(variable)) is None or error not in dataset:
+    if not shots_scatter(dataset):
         raise ValueError(
-            f'got "{variable}" of shots that all arrive alike, with no estimate of its numerical error, so nothing is '
-            "uncertain that a map could show"
+            f'got "{variable}" of shots that all arrive alike, so nothing is uncertain that a map could show'
         )
-    nearest = _covered(dataset)
-    errors = np.where(np.isfinite(column.values), shown(dataset, error, standoff).values, np.nan)
-    labels = column.label, f"estimated numerical error {unit}"
-    return _two_maps(dataset, np.stack([column.values[nearest], errors[nearest]]), labels, column.title, "nearest hit")
+    images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
+    labels = f"local mean of {column.label}", f"half width of its 95 % interval {unit}"
+    method = "plane through the {} nearest hits, Student's interval; bends of the map widen it"
+    return _two_maps(dataset, images, labels, column.title, method)
 
 
-def is_uncertain(dataset: xarray.Dataset, variable: str) -> bool:
-    """Whether `uncertainty` has something to show of a variable."""
-    return nearest_hits(dataset) is not None and (shots_scatter(dataset) or _ERRORS.get(variable, "") in dataset)
+def is_uncertain(dataset: xarray.Dataset) -> bool:
+    """Whether `uncertainty` has something to show."""
+    return nearest_hits(dataset) is not None and shots_scatter(dataset)
 
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:

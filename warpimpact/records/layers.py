@@ -85,7 +85,7 @@ _CODES = (LAYER_STATUS, STOPPED_IN)
 
 
 def _layered(scene: Scene, shots: Shots) -> bool:
-    return bool(scene.target.layers)
+    return len(scene.target.layers) > 1
 
 
 def _left(returned: Returned) -> Columns:

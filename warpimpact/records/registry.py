@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from warpimpact.records.bending import BENDING_VARIABLES
 from warpimpact.records.broken import BROKEN_VARIABLES
-from warpimpact.records.estimates import ESTIMATE_VARIABLES
 from warpimpact.records.exit import EXIT_VARIABLES, OUTCOME_VARIABLES
 from warpimpact.records.group import Group
 from warpimpact.records.layers import LAYER_STANDOFF_VARIABLES, LAYER_VARIABLES
@@ -18,7 +17,6 @@ RECORDS: tuple[Group, ...] = (
     BROKEN_VARIABLES,
     LAYER_VARIABLES,
     LAYER_STANDOFF_VARIABLES,
-    ESTIMATE_VARIABLES,
     *LIMIT_RECORDS,
 )
 

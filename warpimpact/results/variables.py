@@ -12,7 +12,6 @@ from warpimpact.kernels.status import Status
 from warpimpact.records import registry
 from warpimpact.records.bending import *
 from warpimpact.records.broken import *
-from warpimpact.records.estimates import *
 from warpimpact.records.exit import *
 from warpimpact.records.layers import *
 from warpimpact.records.limit import *

@@ -69,7 +69,7 @@ def simulate(
 
     Raises:
         DeviceError: the device is absent.
-        ValueError: the numerics have a tolerance, or they cannot compute the bending moment that the scene records or
+        ValueError: the numerics cannot compute the bending moment that the scene records or
             several shots at one plate.
     """
     march = March(scene, numerics or Numerics(), shots, find_device(device), threads=threads)
@@ -78,7 +78,7 @@ def simulate(
 
 def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None, device: str = "auto") -> None:
     """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
-    resolution = resolve(numerics or Numerics(), scene, shots.columns)
+    resolution = resolve(numerics or Numerics(), scene, shots)
     variant = variant_of(resolution, scene, shots)
     if resolution.block:  # the window is a part of this variant
         variant = arrays_of(scene, numerics or Numerics(), shots).variant

@@ -172,7 +172,7 @@ LAYERED = {"layer_status", "stopped_in", "layer_tilt"}
 )
 def test_a_scene_says_what_is_recorded(strength: Any, layers: Any, record: Any, expected: set[str]) -> None:
     core = CORE.model_copy(update={"strength": strength})
-    scene = Scene(core=core, target=Target(plate=PLATE, layers=layers), record=Record(**record))
+    scene = Scene(core=core, target=Target(layers=(PLATE, *layers)), record=Record(**record))
     shots = make_shots(Impact(velocity=825.0), Hits(count=1), PLATE)
     groups = [group for group in registry.RECORDS if group.recorded(scene, shots)]
     assert {str(one) for group in groups for one in group} & (

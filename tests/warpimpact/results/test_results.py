@@ -230,4 +230,5 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
 
 def test_every_field_of_shots_has_a_variable():
     shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | {*SCATTER_VARIABLES, *BURST_VARIABLES}
+    of_layers = {name.removeprefix("layer_") for name in (*SCATTER_VARIABLES, *BURST_VARIABLES)}
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers
