@@ -7,6 +7,7 @@ and opens with plain ``xarray.open_dataset``.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -240,22 +241,25 @@ def _in_units(variable: v.Variable, values: Any) -> Any:
     return np.degrees(values) if variable.units == "degree" else values
 
 
-def outlines(dataset: xarray.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes [m], each of shape (vertex,), by the axis "y" and "z", with a NaN between one and the next.
+def outlines(dataset: xarray.Dataset, layer: int = 0) -> dict[str, NDArray[np.float64]]:
+    """Outlines of the holes of a layer, 0 the plate, [m], each of shape (vertex,), by the axis "y" and "z", with a NaN
+    between one and the next.
 
-    Those of a Dataset that was read or chosen without them follow from its plate. Only those of a mask cannot: they
-    are empty then.
+    Those of a Dataset that was read or chosen without them follow from its plate, as those of layers do. Only those of
+    a mask cannot: they are empty then.
     """
-    if v.OUTLINE_Y not in dataset.variables:
-        period = dataset.attrs[attr.PLATE_PERIOD]
-        try:
-            plate = Plate.model_validate_json(dataset.attrs.get(attr.PLATE, ""))
-        except ValueError:  # without a plate, or the file of its mask
-            plate = None
-        ranges = [(-0.5 * float(side), 0.5 * float(side)) for side in period]
-        found = {} if plate is None else outlines_in(plate, *ranges)
-        return {axis: found.get(name, np.empty(0)) for axis, name in v.OUTLINE.items()}
-    return {axis: dataset[name].values for axis, name in v.OUTLINE.items()}
+    if not layer and v.OUTLINE_Y in dataset.variables:
+        return {axis: dataset[name].values for axis, name in v.OUTLINE.items()}
+    told = json.loads(dataset.attrs.get(attr.LAYERS, "{}")).get(str(layer), {})
+    offset = told.get("offset", (0.0, 0.0))
+    text = json.dumps({name: told[name] for name in Plate.model_fields if name in told}) if layer else None
+    try:
+        plate = Plate.model_validate_json(text or dataset.attrs.get(attr.PLATE, ""))
+    except ValueError:  # without a plate, or the file of its mask
+        return dict.fromkeys(v.OUTLINE, np.empty(0))
+    halves = [0.5 * float(side) for side in dataset.attrs[attr.PLATE_PERIOD]]
+    found = outlines_in(plate, *((-half - at, half - at) for half, at in zip(halves, offset, strict=True)))
+    return {axis: found[name] + at for (axis, name), at in zip(v.OUTLINE.items(), offset, strict=True)}
 
 
 def outlines_in(
