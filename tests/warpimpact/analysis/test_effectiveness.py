@@ -68,7 +68,7 @@ def test_numbers_without_a_valid_interval_have_none(make_plate_result) -> None:
     assert math.isnan(few[name].low)
     assert many[name].low < many[name].value < many[name].high
     assert math.isnan(many["residual_energy_fraction_worst_point"].low)
-    images = make_plate_result(np.linspace(500.0, 900.0, 400), symmetries="(y, z), (-y, z)")
+    images = make_plate_result(np.linspace(500.0, 900.0, 400), symmetries="(y, z), (-y, z)", images=2)
     assert math.isnan(named(images)[name].low)
 
 
