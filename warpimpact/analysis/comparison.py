@@ -28,7 +28,7 @@ from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_no
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.questions import check_same_question, other_shots
 from warpimpact.analysis.summary import breaks_promise, sampling_note
-from warpimpact.analysis.survival import Survival, survival_of, why_not_by_draws
+from warpimpact.analysis.survival import Survival, draws_note, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import dealing
 from warpimpact.runs.shards import first_difference
@@ -306,7 +306,7 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
     solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
     alike = len(set(solid.values())) == 1
     yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
-    yield from dict.fromkeys(note for note in map(sampling_note, datasets) if note)
+    yield from dict.fromkeys(note for d in datasets for note in (sampling_note(d), draws_note(d)) if note)
 
 
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:

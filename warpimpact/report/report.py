@@ -22,7 +22,7 @@ from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
-from warpimpact.analysis.numbers import interval_text, number_text
+from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
 from warpimpact.report.words import compared, conclusion, study_table, told
 from warpimpact.results import variables as v
@@ -132,6 +132,6 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
         variables=data["variables"],
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
-        texts={"number": number_text, "interval": interval_text, "units": SHOWN_UNITS},
+        texts={"number": number_text, "interval": interval_text, "intervals": intervals_text, "units": SHOWN_UNITS},
         **content,
     )

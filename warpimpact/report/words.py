@@ -17,8 +17,9 @@ from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effectiveness
-from warpimpact.analysis.numbers import interval_text, number_text
+from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
 from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note, slices
+from warpimpact.analysis.survival import draws_note
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
@@ -101,7 +102,7 @@ def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, An
     told = []
     for result in results:
         first = next(iter(result["measures"]))
-        interval = interval_text(first.low, first.high)
+        interval = intervals_text(first.low, first.high, first.parameters)
         told.append(
             f"{result['name']}: {result['passed']} of {result['hits']} cores pass. {first.label}"
             f"{SHOWN_UNITS[first.units]} {number_text(first.value)}"
@@ -155,7 +156,7 @@ def _caveats(dataset: xarray.Dataset) -> list[str]:
     """What limits the numbers of a result, a sentence each, beside every table of them."""
     chance = "Intervals describe the hits that were drawn."
     model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
-    return [sentence for sentence in (chance, sampling_note(dataset), model) if sentence]
+    return [sentence for sentence in (chance, sampling_note(dataset), draws_note(dataset), model) if sentence]
 
 
 def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
@@ -190,7 +191,9 @@ def _plain(value: object) -> str:
 def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
     for measure, estimate in estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES]).items():
         if estimate.value > 0.0:
-            yield Row(words(measure.variable), f"{estimate.value:.2%}", f"{estimate.low:.2%} to {estimate.high:.2%}")
+            yield Row(
+                words(measure.variable), f"{estimate.value:.2%}", intervals_text(*ends_of(estimate), "{:.2%}".format)
+            )
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
@@ -199,7 +202,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
         if estimate.count:
             at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
             unit = UNITS[measure.units]
-            interval = interval_text(estimate.low, estimate.high, "{:.2f}".format)
+            interval = intervals_text(*ends_of(estimate), "{:.2f}".format)
             yield Row(f"mean {words(measure.variable)}{at}", f"{estimate.value:.2f}{unit}", interval)
 
 

@@ -143,6 +143,7 @@ def described(
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, computed) if campaign.hits.irreducible else {})
         | ({} if campaign.burst is None else _burst(campaign.burst))
+        | ({} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)})
         | dict(attributes),
         double=is_double(campaign),
     )
@@ -284,10 +285,10 @@ def _outcomes_of_scenes(scene: Scene, shots: Shots, how: tuple[Any, ...], drawn:
         parts.append(_outcomes(own, shots[which], numerics, device, threads, follow))
         places.append(which)
     order = np.argsort(np.concatenate(places), kind="stable")
-    return _joined(parts, order)
+    return joined_outcomes(parts, order)
 
 
-def _joined(parts: Sequence[Outcomes], order: NDArray[np.int64]) -> Outcomes:
+def joined_outcomes(parts: Sequence[Outcomes], order: NDArray[np.int64]) -> Outcomes:
     """Outcomes one after the other, then in this order."""
     columns = {one.name: [getattr(part, one.name) for part in parts] for one in fields(parts[0])}
     return type(parts[0])(**{name: np.concatenate(values)[order] for name, values in columns.items()})

@@ -21,7 +21,8 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.limits import with_limits
 from warpimpact.results.variables import STATUS
 from warpimpact.solver.limit import Limits
-from warpimpact.studies.limit import LimitMap, limits_text
+from warpimpact.studies.limit import LimitMap
+from warpimpact.studies.limit_text import limits_text
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
