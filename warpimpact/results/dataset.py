@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
+    from warpimpact.records.outcomes import Outcomes
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.simulate import Outcomes, Replay
+    from warpimpact.solver.simulate import Replay
 
 
 _ATTRIBUTES = {
@@ -73,32 +74,20 @@ def to_table(
         v.STANDOFF: np.array(scene.record.standoffs),
         v.AXIS: ["x", "y", "z"],
     }
-    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
-    own = own_columns(scene.target, shots)
-    values |= {name: own[name] for name in of_shots if name in own}
-    layered: tuple[v.Variable, ...] = v.LAYER_VARIABLES
-    along: tuple[v.Variable, ...] = (*v.COORDINATES, *v.OUTLINE_VARIABLES)
-    if len(scene.target.layers) > 1 and scene.record.layer_standoffs:
-        layered = (*layered, *v.LAYER_STANDOFF_VARIABLES)
-        along = (*along, *v.LAYER_COORDINATES)
+    if v.LAYER_STANDOFF_TILT in outcomes:
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
-    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layered)
-    values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
-    values |= faces(scene.target)
-    if v.EXIT_POSITION in values:
-        zero = np.zeros(len(shots))
-        values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
-    told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
-    optional = (*told, *layered, *v.LAYER_FACES)
-    variables = [*v.VARIABLES, *(name for name in optional if name in values)]
-    columns = described(variables, values)
-    if not double:
-        columns |= _in_single(columns, ended)
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES)
+    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    own = own_columns(scene.target, shots)
+    values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    values |= vars(outcomes) | faces(scene.target)
+    zero = np.zeros(len(shots))
+    values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
+    columns = described((name for name in v.hit_variables() if name in values), values)
     return Table.of(
-        columns,
-        described(along, coordinates),
+        columns if double else columns | _in_single(columns, v.computed_variables()),
+        described((name for name in along if name in coordinates), coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
@@ -116,7 +105,7 @@ def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, 
         outcomes: SI and radians.
         double: as in `to_dataset`.
     """
-    values: dict[str, Any] = {variable: getattr(outcomes, variable.field) for variable in v.SOLID_VARIABLES}
+    values: dict[str, Any] = {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
     columns = described(v.SOLID_VARIABLES, values)
     return columns if double else columns | _in_single(columns, v.SOLID_VARIABLES)
 
@@ -247,6 +236,8 @@ def described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dic
 
 
 def _in_units(variable: v.Variable, values: Any) -> Any:
+    if getattr(values, "dtype", None) == np.bool_:
+        return values.astype(np.int8)  # netCDF has no truth values
     return np.degrees(values) if variable.units == "degree" else values
 
 
