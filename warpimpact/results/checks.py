@@ -23,12 +23,12 @@ _TEXTS = (
     *(attr.MATERIAL, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
     *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.LAYERS, attr.PRECISION, attr.MACHINE),
     *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION, attr.SWEEP),
-    attr.BURST,
+    *(attr.BURST, attr.DISCREPANCY),
     *(f"{name}_units" for name in attr.UNITS),
 )
 _TABLES = (
     *(attr.SWEEP, attr.CORE, attr.PLATE, attr.IMPACT, attr.MATERIAL, attr.LAYERS, attr.NUMERICS_GIVEN),
-    *(attr.RESOLUTION, attr.BURST),
+    *(attr.RESOLUTION, attr.BURST, attr.DISCREPANCY),
 )
 """Texts that are JSON objects."""
 _COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS, attr.SHOTS_AT_A_PLATE)
@@ -55,13 +55,6 @@ _TOGETHER = (
 """Attributes of which the first needs the others."""
 
 
-_WHOLE = (
-    v.LAYER_VARIABLES + v.LAYER_FACES,
-    v.LAYER_COORDINATES + v.LAYER_STANDOFF_VARIABLES,
-    v.OUTLINE_VARIABLES,
-    tuple(v.SOLID_VARIABLES),
-)
-"""Variables of which a result has all or none."""
 _OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)
 """Attributes of a study."""
 _DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
@@ -171,7 +164,7 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
             continue
         if one in dataset.variables and dataset.variables[one].dims != one.dims:
             return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
-    for names in _WHOLE:
+    for names in v.whole_groups():
         there = [name for name in names if name in dataset.variables]
         if there and (missing := [name for name in names if name not in there]):
             return f'it has no variable "{missing[0]}" beside "{there[0]}"'
@@ -222,6 +215,8 @@ def _attribute_fault(told: dict[str, Any]) -> str | None:
 
 
 def _is_allowed(name: str, value: Any) -> bool:
+    if name in v.OUTLINE_VARIABLES:
+        return np.asarray(value).dtype.kind == "f"
     if name in _TEXTS:
         return isinstance(value, str) and (name not in _TABLES or _is_table(value))
     if name in _PAIRS:
