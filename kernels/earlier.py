@@ -18,8 +18,8 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of earlier hits for one variant."""
     real = variant.real
-    memories, grid = exposure.build(variant), plate_grid.build(variant)
-    Fields, Plate, Window = memories.Fields, grid.Plate, grid.Window
+    use = variant.use(exposure, plate_grid)
+    Fields, Plate, Window = use.exposure.Fields, use.plate_grid.Plate, use.plate_grid.Window
 
     @wp.struct
     class Earlier:
@@ -121,7 +121,7 @@ def build(variant: Variant) -> SimpleNamespace:
         order = shot % earlier.count
         row = row_of(earlier, window, slot, order)
         nodes = window.cells_y * window.cells_z
-        memories.clear(earlier.exposure, row, nodes)
+        use.exposure.clear(earlier.exposure, row, nodes)
         for before in range(order):
             other = (slot * earlier.count + before) * earlier.layers + layer
             if earlier.open[other]:

@@ -15,8 +15,8 @@ def build(variant: Variant) -> SimpleNamespace:
     real = variant.real
     half = real(0.5)
     read, write = memory.build(real).read, memory.build(real).write
-    grid, block, split = plate_grid.build(variant), lanes.build(variant), lanes.split(variant)
-    Plate, Window, Box = grid.Plate, grid.Window, grid.Box
+    use, split = variant.use(lanes, plate_grid), lanes.split(variant)
+    Plate, Window, Box = use.plate_grid.Plate, use.plate_grid.Window, use.plate_grid.Box
 
     @wp.struct
     class Fields:
@@ -190,7 +190,7 @@ def build(variant: Variant) -> SimpleNamespace:
         count = (box.y_high - box.y_low + 1) * stride
         filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
         if wp.static(variant.window > 0):
-            block.barrier()  # the other direction reads what other lanes have filtered, and overwrites what they read
+            use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
         filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
         add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
 

@@ -11,8 +11,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, earlier, exposure, footprint, interaction, passage, plate_grid, rigid_body
-from . import shots as conditions
+from . import contact, core_surface, earlier, exposure, footprint, interaction, passage, plate_grid, rigid_body, shots
 from .variant import Variant
 
 
@@ -22,13 +21,16 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one, tiny = real(0.0), real(0.5), real(1.0), real(1.0e-9)
     far = 1.0e9  # [m]
-    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    prints, memories, contacts, launch = (part.build(variant) for part in (footprint, exposure, contact, conditions))
-    Surface, Pose, Plate, Window, Law = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window, laws.Law
-    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
-    Fields, Footprint, Touches, Shots = contacts.Fields, prints.Footprint, contacts.Touches, launch.Shots
-    passages, hits, own = passage.build(variant), earlier.build(variant), launch.own
-    Passage, Earlier = passages.Passage, hits.Earlier
+    use = variant.use(
+        contact, core_surface, earlier, exposure, footprint, interaction, passage, plate_grid, rigid_body, shots
+    )
+    Surface, Pose, Plate = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Plate
+    Window, Law = use.plate_grid.Window, use.interaction.Law
+    Body, State, Load = use.rigid_body.Body, use.rigid_body.State, use.rigid_body.Load
+    Change = use.rigid_body.Change
+    Fields, Footprint, Touches = use.contact.Fields, use.footprint.Footprint, use.contact.Touches
+    Shots = use.shots.Shots
+    own, Passage, Earlier = use.shots.own, use.passage.Passage, use.earlier.Earlier
 
     @wp.struct
     class Layers:
@@ -112,7 +114,7 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(layers.count):
             stack.open[slot * layers.count + k] = False
             stack.near[slot * layers.count + k] = False
-        passages.begin(passage, shot, layers.count)
+        use.passage.begin(passage, shot, layers.count)
 
     @wp.func
     def in_layer(layers: Layers, stack: Stack, slot: wp.int32, layer: wp.int32, shot: wp.int32, pose: Pose):
@@ -151,16 +153,16 @@ def build(variant: Variant) -> SimpleNamespace:
         y = own(shots.hit_y, shot) + wp.float64(home[1]) - layers.offset_y[layer, shot % layers.offset_y.shape[1]]
         z = own(shots.hit_z, shot) + wp.float64(home[2]) - layers.offset_z[layer, shot % layers.offset_z.shape[1]]
         thickness = own_of(layers.thickness, layer, shot)
-        window = grid.window_at(layers.plates[layer], thickness, fields.cells_y, fields.cells_z, 0, y, z)
+        window = use.plate_grid.window_at(layers.plates[layer], thickness, fields.cells_y, fields.cells_z, 0, y, z)
         first = slot * layers.nodes + layers.first[layer]
         window.first += first
         window.home += first
         window.weakens = layers.weakens[layer]
         if wp.static(variant.degrades):
             if window.weakens:
-                memories.blank(fields, window)
+                use.exposure.blank(fields, window)
                 if wp.static(variant.burst):
-                    hits.recall(past, fields, layers.plates[layer], window, slot, layer, shot, y, z)
+                    use.earlier.recall(past, fields, layers.plates[layer], window, slot, layer, shot, y, z)
         stack.window[here] = window
         stack.home[here] = home
         stack.open[here] = True
@@ -188,7 +190,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Find what a step can touch of every layer; open the windows of layers that are reached for the first time,
         and record the layers that the core has left. `last` is the change of its velocities in the last step."""
         reached = Reached()
-        rearmost, foremost = surfaces.ends_of(surface, pose)
+        rearmost, foremost = use.core_surface.ends_of(surface, pose)
         reached.rearmost = rearmost
         reached.foremost = foremost
         reached.deepest = wp.max(before.deepest, foremost)
@@ -214,15 +216,15 @@ def build(variant: Variant) -> SimpleNamespace:
                     open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, ahead)
                 plate = layers.plates[k]
                 seen = in_layer(layers, stack, slot, k, shot, pose)
-                touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
-                if not touch.inside and not stack.near[here] and prints.is_beside(stack.window[here], touch):
+                touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
+                if not touch.inside and not stack.near[here] and use.footprint.is_beside(stack.window[here], touch):
                     open_layer(layers, stack, past, fields, shots, slot, k, shot, pose, vec3())
                     seen = in_layer(layers, stack, slot, k, shot, pose)
-                    touch = prints.footprint_of(surface, plate, stack.window[here], seen, dt)
+                    touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
                 window = stack.window[here]
-                beside = prints.clearance_at(plate, window, seen.position[1], seen.position[2])
+                beside = use.footprint.clearance_at(plate, window, seen.position[1], seen.position[2])
                 reached.clearance = wp.min(reached.clearance, wp.max(zero, beside - surface.bounding_radius))
-                if touch.last_ring >= 0 and prints.is_clear(plate, window, touch):
+                if touch.last_ring >= 0 and use.footprint.is_clear(plate, window, touch):
                     touch.last_ring = -1
                     touch.inside = True
                 if touch.last_ring >= 0:
@@ -232,13 +234,13 @@ def build(variant: Variant) -> SimpleNamespace:
                     found.inside = found.inside and (touch.inside or not layers.weakens[k])
                 stack.found[here] = touch
                 near = True
-            elif low > rear and not passages.has_left(passage, shot, k):
+            elif low > rear and not use.passage.has_left(passage, shot, k):
                 since = (rearmost - rear) / wp.max(state.velocity[0], one)
                 speed = wp.length(state.velocity)
                 if before.first != k or before.last != k:  # other layers slow the core down while it leaves this one
                     speed = wp.length(pose.velocity - (since / dt) * last.velocity)
-                passages.leave(passage, body, shot, k, state, speed, since, time, flight)
-                passages.fly_on(passage, body, layers.standoffs, layers.ahead, shot, k, state, rear, flight)
+                use.passage.leave(passage, body, shot, k, state, speed, since, time, flight)
+                use.passage.fly_on(passage, body, layers.standoffs, layers.ahead, shot, k, state, rear, flight)
             stack.near[here] = near
         return found, reached
 
@@ -270,11 +272,11 @@ def build(variant: Variant) -> SimpleNamespace:
         """The load of all layers over one step."""
         load = Load()
         if wp.static(variant.bends):
-            contacts.clear_sums(surface, touches, slot)
+            use.contact.clear_sums(surface, touches, slot)
         for k in range(reached.first, reached.last + 1):
             here = slot * layers.count + k
             if stack.found[here].last_ring >= 0:
-                part = contacts.load_on(
+                part = use.contact.load_on(
                     surface,
                     layers.plates[k],
                     law_of(layers, common, k, shot),
@@ -288,7 +290,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 )
                 if part.touching:
                     load.touching = True
-                    passages.enter(passage, shot, k)
+                    use.passage.enter(passage, shot, k)
                 load.damped = load.damped or part.damped
                 load.force += part.force
                 load.moment += part.moment
@@ -325,7 +327,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def is_behind(passage: Passage, shot: wp.int32):
         """Whether the core has left the plate through its rear face."""
-        return passages.has_left(passage, shot, 0)
+        return use.passage.has_left(passage, shot, 0)
 
     @wp.func
     def is_between(layers: Layers, shot: wp.int32, reached: Reached, x: real):
@@ -346,7 +348,7 @@ def build(variant: Variant) -> SimpleNamespace:
             front = own_of(layers.front, k, shot)
             rear = front + own_of(layers.thickness, k, shot)
             inside = reached.foremost > front and reached.rearmost < rear
-            passages.conclude(passage, shot, k, status, inside, reached.deepest - front)
+            use.passage.conclude(passage, shot, k, status, inside, reached.deepest - front)
 
     @wp.func
     def keep(layers: Layers, common: Fields, stack: Stack, past: Earlier, slot: wp.int32, shot: wp.int32):
@@ -354,7 +356,7 @@ def build(variant: Variant) -> SimpleNamespace:
         for k in range(layers.count):
             here = slot * layers.count + k
             if stack.open[here] and layers.weakens[k]:
-                hits.keep(past, common, stack.window[here], slot, shot)
+                use.earlier.keep(past, common, stack.window[here], slot, shot)
 
     return SimpleNamespace(
         Layers=Layers,

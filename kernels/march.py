@@ -11,16 +11,16 @@ from . import (
     contact,
     core_surface,
     damping,
+    earlier,
     footprint,
     interaction,
     layers,
     nodal,
     plate_grid,
     rigid_body,
+    shots,
+    trace,
 )
-from . import earlier as earlier_hits
-from . import shots as conditions
-from . import trace as tracing
 from .lanes import BLOCKS, LANES
 from .status import Status
 from .variant import Variant
@@ -35,17 +35,21 @@ def build(variant: Variant) -> SimpleNamespace:
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
     spent = real(2.5e-3)  # likewise: at 5 % it does not come back through a layer that it has left
     most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
-    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
-    stacked, hits = layers.build(variant), earlier_hits.build(variant)
+    use = variant.use(
+        bending, contact, core_surface, damping, earlier, footprint, interaction, layers, plate_grid, rigid_body, shots
+    )
+    record = trace.build(variant).record
     scheme = (nodal if variant.nodal else block if variant.window else contact).build(variant)
-    Surface, Pose, Plate, Law = surfaces.Surface, surfaces.Pose, grid.Plate, laws.Law
-    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
-    Fields, Footprint, Touches = scheme.Fields, prints.Footprint, contact.build(variant).Touches
-    Sections, Bending = bends.Sections, bends.Bending
-    Shots, Pace, own = launch.Shots, launch.Pace, launch.own
-    Layers, Stack, Passage, Reached = stacked.Layers, stacked.Stack, stacked.Passage, stacked.Reached
-    Earlier = hits.Earlier
+    Surface, Pose, Plate = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Plate
+    Law = use.interaction.Law
+    Body, State, Load = use.rigid_body.Body, use.rigid_body.State, use.rigid_body.Load
+    Change = use.rigid_body.Change
+    Fields, Footprint, Touches = scheme.Fields, use.footprint.Footprint, use.contact.Touches
+    Sections, Bending = use.bending.Sections, use.bending.Bending
+    Shots, Pace, own = use.shots.Shots, use.shots.Pace, use.shots.own
+    Layers, Stack, Passage = use.layers.Layers, use.layers.Stack, use.layers.Passage
+    Reached = use.layers.Reached
+    Earlier = use.earlier.Earlier
     PERFORATED, ARRESTED, RICOCHETED = (
         wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
     )
@@ -71,7 +75,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def reach_of(surface: Surface, thickness: real, state: State):
         """Largest distance from the hit [m], in the plane of the plate, of any part of a core that touches nothing."""
-        axis = motion.axis_of(state.attitude)
+        axis = use.rigid_body.axis_of(state.attitude)
         slope = vec3(zero, state.velocity[1], state.velocity[2]) / state.velocity[0]
         lean = axis - axis[0] * slope  # of the axis against the line of flight
         steep = wp.length(slope)
@@ -99,7 +103,7 @@ def build(variant: Variant) -> SimpleNamespace:
         that turns back `behind` a layer, and is spent, rests there.
         """
         status = RUNNING
-        energy = motion.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
+        energy = use.rigid_body.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
         along = wp.dot(state.angular_momentum, pose.axis)
         about_axis = half * along * along / body.inertia_axial
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, pose.axis))
@@ -150,20 +154,20 @@ def build(variant: Variant) -> SimpleNamespace:
         Shots at one plate are numbered in a row, and are computed one after another in one slot.
         """
         shot = order[first + wp.tid()]
-        body = launch.body_of(shots, shot)
-        law = launch.law_of(law, shots, shot)
-        pace = launch.pace_of(pace, shots, shot)
+        body = use.shots.body_of(shots, shot)
+        law = use.shots.law_of(law, shots, shot)
+        pace = use.shots.pace_of(pace, shots, shot)
         speed = own(shots.velocity, shot)
-        dt = launch.step_of(pace, speed, own(shots.obliquity, shot))
+        dt = use.shots.step_of(pace, speed, own(shots.obliquity, shot))
         max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
         slot = wp.tid() % slots
         thickness = real(own(shots.thickness, shot))
         if wp.static(variant.burst):
-            hits.begin(earlier, slot, shot)
+            use.earlier.begin(earlier, slot, shot)
         if wp.static(variant.layered):
-            stacked.begin(target, stack, passage, slot, shot)
+            use.layers.begin(target, stack, passage, slot, shot)
             reached = Reached()
-            straight = launch.line_of_flight(shots, shot)
+            straight = use.shots.line_of_flight(shots, shot)
             flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
             # A core that slides between two layers never ends: it has gone farther than one that goes straight through.
             farthest = real(pace.longest_way) + wp.length(vec3(zero, flight[1], flight[2])) / flight[0] * thickness
@@ -173,15 +177,15 @@ def build(variant: Variant) -> SimpleNamespace:
                 fields = scheme.own_fields(fields, slot)
             window = scheme.open_window(plate, thickness, fields, slot, hit_y, hit_z)
             if wp.static(variant.burst):
-                hits.recall(earlier, fields, plate, window, slot, 0, shot, hit_y, hit_z)
-        state = launch.launch_state(surface, body, shots, shot)
-        axis = motion.axis_of(state.attitude)
-        initial_energy = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+                use.earlier.recall(earlier, fields, plate, window, slot, 0, shot, hit_y, hit_z)
+        state = use.shots.launch_state(surface, body, shots, shot)
+        axis = use.rigid_body.axis_of(state.attitude)
+        initial_energy = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
         # Positions are those of mid-step from here on: kicks at mid-step, exact drifts between them.
-        state = motion.drift(body, state, half * dt)
+        state = use.rigid_body.drift(body, state, half * dt)
         status = int(RUNNING)
         if wp.static(not variant.layered):
-            if grid.clearance(plate, window) > reach_of(surface, thickness, state):
+            if use.plate_grid.clearance(plate, window) > reach_of(surface, thickness, state):
                 status = int(MISSED)
         touched = bool(False)
         if wp.static(variant.bends):
@@ -194,13 +198,15 @@ def build(variant: Variant) -> SimpleNamespace:
         step = int(0)
         behind = bool(False)  # the plate
         while status == RUNNING and step < max_steps:
-            omega = motion.angular_velocity(body, motion.axis_of(state.attitude), state.angular_momentum)
-            pose = surfaces.pose_of(surface, state.position, state.attitude, state.velocity, omega)
+            omega = use.rigid_body.angular_velocity(
+                body, use.rigid_body.axis_of(state.attitude), state.angular_momentum
+            )
+            pose = use.core_surface.pose_of(surface, state.position, state.attitude, state.velocity, omega)
             # The closing speeds are those at mid-step, if this step changes the velocities as much as the last one did.
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
             if wp.static(variant.layered):
-                found, reached = stacked.reach(
+                found, reached = use.layers.reach(
                     surface,
                     body,
                     target,
@@ -219,22 +225,22 @@ def build(variant: Variant) -> SimpleNamespace:
                     flight,
                     dt,
                 )
-                behind = stacked.is_behind(passage, shot)
+                behind = use.layers.is_behind(passage, shot)
             else:
-                found = prints.footprint_of(surface, plate, window, pose, dt)
+                found = use.footprint.footprint_of(surface, plate, window, pose, dt)
             status = ended(surface, body, state, pose, found, touched, behind, initial_energy, thickness)
             if status == RUNNING:
                 if wp.static(variant.layered):
-                    law.onset_jump = stacked.jump_of(target, stack, slot, shot, reached)
-                law.onset = laws.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
-                law.steadied = wp.where(motion.swings(body, before_last, last), steadied * law.onset, zero)
+                    law.onset_jump = use.layers.jump_of(target, stack, slot, shot, reached)
+                law.onset = use.interaction.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
+                law.steadied = wp.where(use.rigid_body.swings(body, before_last, last), steadied * law.onset, zero)
                 before_last = last
                 load = Load()
                 before = state
                 free = real(0.0)
                 if found.last_ring >= 0:
                     if wp.static(variant.layered):
-                        load = stacked.load_on(
+                        load = use.layers.load_on(
                             surface, target, law, fields, stack, touches, passage, slot, shot, reached, pose, dt
                         )
                     else:
@@ -247,40 +253,40 @@ def build(variant: Variant) -> SimpleNamespace:
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
                     if wp.static(variant.bends):
                         middle = (real(step) + half) * dt + skipped
-                        worst = bends.bent(
+                        worst = use.bending.bent(
                             worst, surface, sections, body, touches, slot, found, pose, state, load, last, dt, middle
                         )
-                    state = motion.kick(body, state, load, dt)
-                    last = motion.change_between(body, before, state)
+                    state = use.rigid_body.kick(body, state, load, dt)
+                    last = use.rigid_body.change_between(body, before, state)
                 else:
                     last = Change()
                 if pace.rows > 0:
-                    force, moment = motion.mean_load(body, before, load, dt)
+                    force, moment = use.rigid_body.mean_load(body, before, load, dt)
                     now = (real(step) + half) * dt + skipped
-                    traces.record(trace, shot * pace.rows + step, now, state, force, moment)
+                    record(trace, shot * pace.rows + step, now, state, force, moment)
                 if wp.static(variant.layered):
                     if found.last_ring < 0:
-                        free = stacked.free_time(surface, target, shot, state, pose, reached, dt)
+                        free = use.layers.free_time(surface, target, shot, state, pose, reached, dt)
                         skipped += free
                         if wp.length(vec3(zero, state.position[1], state.position[2])) > farthest:
                             max_steps = step
-                state = motion.drift(body, state, dt + free)
+                state = use.rigid_body.drift(body, state, dt + free)
                 step += 1
         if pace.rows > 0:
-            traces.record(trace, shot * pace.rows + step, (real(step) + half) * dt + skipped, state, vec3(), vec3())
+            record(trace, shot * pace.rows + step, (real(step) + half) * dt + skipped, state, vec3(), vec3())
         if status == RUNNING:
             status = UNFINISHED
             if wp.static(variant.layered):
-                if touched and stacked.is_between(target, shot, reached, state.position[0]):
+                if touched and use.layers.is_between(target, shot, reached, state.position[0]):
                     status = ARRESTED
         if wp.static(variant.layered):
-            stacked.conclude(target, passage, shot, status, reached)
+            use.layers.conclude(target, passage, shot, status, reached)
         if wp.static(variant.burst):
             if wp.static(variant.layered):
-                stacked.keep(target, fields, stack, earlier, slot, shot)
+                use.layers.keep(target, fields, stack, earlier, slot, shot)
             else:
-                hits.keep(earlier, fields, window, slot, shot)
-        axis = motion.axis_of(state.attitude)
+                use.earlier.keep(earlier, fields, window, slot, shot)
+        axis = use.rigid_body.axis_of(state.attitude)
         if wp.static(variant.window > 0):
             if scheme.lane() > 0:  # all lanes know the outcome
                 return
@@ -289,7 +295,9 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes.contact_duration[shot] = real(contact_steps) * dt
         energy_loss = zero
         if touched:
-            energy_loss = initial_energy - motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+            energy_loss = initial_energy - use.rigid_body.kinetic_energy(
+                body, axis, state.velocity, state.angular_momentum
+            )
         outcomes.energy_loss[shot] = energy_loss
         if wp.static(variant.bends):
             bending[shot] = worst
@@ -306,7 +314,7 @@ def build(variant: Variant) -> SimpleNamespace:
         Plate=Plate,
         Fields=Fields,
         Touches=Touches,
-        Sums=damping.build(variant).Sums,
+        Sums=use.damping.Sums,
         Law=Law,
         Shots=Shots,
         Outcomes=Outcomes,

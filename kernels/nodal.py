@@ -19,10 +19,10 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a literal step's load for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    Surface, Pose, Plate = surfaces.Surface, surfaces.Pose, grid.Plate
-    Window, Law, Load = grid.Window, laws.Law, motion.Load
-    Footprint, Touches = footprint.build(variant).Footprint, contact.build(variant).Touches
+    use = variant.use(contact, core_surface, footprint, interaction, plate_grid, rigid_body)
+    Surface, Pose, Plate = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Plate
+    Window, Law, Load = use.plate_grid.Window, use.interaction.Law, use.rigid_body.Load
+    Footprint, Touches = use.footprint.Footprint, use.contact.Touches
 
     @wp.struct
     class Fields:
@@ -44,20 +44,25 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """A slot's window about a hit: nodes at the centres of the tile's cells, each with its share of the resistance;
         nothing touched."""
-        window = grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
+        window = use.plate_grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
         dy, dz = plate.period_y / wp.float64(plate.tile_y), plate.period_z / wp.float64(plate.tile_z)
         home_y, home_z = wp.int32(wp.floor(hit_y / dy)), wp.int32(wp.floor(hit_z / dz))
         window.y0 = real((wp.float64(home_y) + wp.float64(0.5)) * dy - hit_y)
         window.z0 = real((wp.float64(home_z) + wp.float64(0.5)) * dz - hit_z)
         index = window.first
         for i in range(fields.cells_y):
-            row = grid.within(real(home_y % plate.tile_y + i - fields.cells_y // 2), plate.tile_y) * plate.tile_z
-            column = grid.within(real(home_z % plate.tile_z - fields.cells_z // 2), plate.tile_z)
+            row = (
+                use.plate_grid.within(real(home_y % plate.tile_y + i - fields.cells_y // 2), plate.tile_y)
+                * plate.tile_z
+            )
+            column = use.plate_grid.within(real(home_z % plate.tile_z - fields.cells_z // 2), plate.tile_z)
             y = window.y0 + real(i - fields.cells_y // 2) * real(dy)
             for j in range(fields.cells_z):
                 share = plate.tile[row + column]
                 if wp.static(variant.rimmed):
-                    share *= grid.on_plate(plate, window, y, window.z0 + real(j - fields.cells_z // 2) * real(dz))
+                    share *= use.plate_grid.on_plate(
+                        plate, window, y, window.z0 + real(j - fields.cells_z // 2) * real(dz)
+                    )
                 fields.share[index] = share
                 fields.touched[index] = zero
                 index += 1
@@ -78,7 +83,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Σ Y (−n + η t) dS over the points in the slab, t the meridian tangent towards the base."""
         load = Load()
         for index in range(found.first_ring, found.last_ring + 1):
-            ring = surfaces.ring_at(surface, pose, index)
+            ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 outward = outward_of(surface, pose, j)
                 arm = ring.station * pose.axis + ring.radius * outward
@@ -103,7 +108,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def degrade(surface: Surface, fields: Fields, window: Window, found: Footprint, pose: Pose, factor: real):
         """Multiply every node that was touched in this step by β, once even if several points touched it (eq. 6)."""
         for index in range(found.first_ring, found.last_ring + 1):
-            ring = surfaces.ring_at(surface, pose, index)
+            ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 arm = ring.station * pose.axis + ring.radius * outward_of(surface, pose, j)
                 point = pose.position + arm

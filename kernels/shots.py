@@ -18,8 +18,9 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the shots for one variant."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     tiny = wp.float64(1.0e-9)
-    surfaces, laws, motion = (part.build(variant) for part in (core_surface, interaction, rigid_body))
-    Surface, Pose, Law, Body, State = surfaces.Surface, surfaces.Pose, laws.Law, motion.Body, motion.State
+    use = variant.use(core_surface, interaction, rigid_body)
+    Surface, Pose, Law = use.core_surface.Surface, use.core_surface.Pose, use.interaction.Law
+    Body, State = use.rigid_body.Body, use.rigid_body.State
 
     @wp.struct
     class Shots:
@@ -131,8 +132,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """How far the core reaches ahead of its centre of mass along x [m]."""
         front = -surface.bounding_radius
         for index in range(surface.rings):
-            ring = surfaces.ring_at(surface, pose, index)
-            broadside = surfaces.broadside(pose)
+            ring = use.core_surface.ring_at(surface, pose, index)
+            broadside = use.core_surface.broadside(pose)
             middle = ring.station * pose.axis[0] + ring.radius * broadside
             front = wp.max(front, middle + wp.abs(ring.half_axial * pose.axis[0] + ring.half_radial * broadside))
         return front
@@ -149,8 +150,10 @@ def build(variant: Variant) -> SimpleNamespace:
         state = State()
         state.attitude = quat(real(turn[0]), real(turn[1]), real(turn[2]), real(turn[3]))
         state.velocity = real(own(shots.velocity, shot)) * direction
-        state.angular_momentum = (body.inertia_axial * real(own(shots.spin, shot))) * motion.axis_of(state.attitude)
-        pose = surfaces.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())
+        state.angular_momentum = (body.inertia_axial * real(own(shots.spin, shot))) * use.rigid_body.axis_of(
+            state.attitude
+        )
+        pose = use.core_surface.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())
         state.position = (-foremost(surface, pose) / direction[0]) * direction
         return state
 
