@@ -115,10 +115,7 @@ def build(variant: Variant) -> SimpleNamespace:
             here = slot * surface.rings + index
             area = zero
             if index >= found.first_ring and index <= found.last_ring:
-                if wp.static(variant.layered):
-                    area = touches.total_area[here]
-                else:
-                    area = touches.ring_area[here]
+                area = touches.total_area[here]
             if area > zero:
                 sums = touches.sums[here]
                 force += share * mean_force(sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)

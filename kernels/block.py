@@ -57,31 +57,32 @@ def build(variant: Variant) -> SimpleNamespace:
     Law, Load, Slopes = use.interaction.Law, use.rigid_body.Load, use.damping.Slopes
     Footprint = use.footprint.Footprint
     Fields, Touches = use.exposure.Fields, use.contact.Touches
-    read, read_index = memory.build(real).read, memory.build(wp.int32).read
+    read, part_of, read_index = memory.build(real).read, memory.build(real).part_of, memory.build(wp.int32).read
 
     @wp.func
     def own_fields(fields: Fields, slot: wp.int32):
         """The fields of a block alone: exposure and gain in shared memory, the filter's room in that of its slot."""
-        nodes = fields.cells_y * fields.cells_z
         own = fields
         if wp.static(variant.degrades):
-            own.exposure = use.lanes.own_exposure(fields.exposure, slot, nodes)
-            own.gain = use.lanes.own_gain(fields.gain, slot, nodes)
-            own.filtered = use.lanes.own_room(fields.filtered, slot, nodes)
+            own.exposure = use.lanes.own_exposure(fields.exposure, slot, fields.nodes)
+            own.gain = use.lanes.own_gain(fields.gain, slot, fields.nodes)
+            own.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
         return own
 
     @wp.func
     def open_window(
-        plate: Plate, thickness: real, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64
+        plate: Plate, thickness: real, fields: Fields, layer: wp.int32, hit_y: wp.float64, hit_z: wp.float64
     ):
-        """A block's window about a hit, on an untouched plate; `fields` are the block's own."""
-        window = use.contact.open_window(plate, thickness, fields, 0, hit_y, hit_z)
+        """The window of a layer about a hit, on an untouched plate; `fields` are the block's own."""
+        window = use.exposure.open_window(plate, thickness, fields, layer, hit_y, hit_z)
         if wp.static(variant.degrades):
             use.lanes.barrier()
         return window
 
     @wp.func
-    def expose(fields: Fields, touches: Touches, base: wp.int32, begin: wp.int32, end: wp.int32, units: real):
+    def expose(
+        fields: Fields, window: Window, touches: Touches, base: wp.int32, begin: wp.int32, end: wp.int32, units: real
+    ):
         """Add the exposure of this lane's patches, of those with begin ≤ j < end, to the plate."""
         j = begin + use.lanes.lane()
         while j < end:
@@ -89,7 +90,7 @@ def build(variant: Variant) -> SimpleNamespace:
             if gain > zero:
                 cell = read_index(touches.cell, base + j)
                 y, z = read(touches.y, base + j), read(touches.z, base + j)
-                use.fixed_point.scatter(fields.gain, fields.cells_z, cell, y, z, gain * units)
+                use.fixed_point.scatter(fields.gain, window.cells_z, cell, y, z, gain * units)
             j += use.lanes.count()
 
     @wp.func
@@ -129,13 +130,13 @@ def build(variant: Variant) -> SimpleNamespace:
                 for index in range(found.first_closing, found.last_closing + 1):
                     coarsest = wp.max(coarsest, read(surface.area, index))
                 units = use.fixed_point.units(law, window, coarsest, wp.length(pose.velocity), dt)
-                expose(fields, touches, base, begin, end, units)
+                expose(fields, window, touches, base, begin, end, units)
                 use.lanes.barrier()
                 use.fixed_point.measure(fields.gain, window, found.box, units)
                 use.lanes.barrier()
                 use.exposure.spread(plate, fields, window, found.box)
                 use.lanes.barrier()
-            sums = use.contact.sum_patches(surface, law, fields, touches, pose, base, begin, end)
+            sums = use.contact.sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
             load.force = use.lanes.total_triple(sums.force)
             load.moment = use.lanes.total_triple(sums.moment)
             slopes = total_slopes(sums.slopes)
@@ -150,5 +151,10 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     return SimpleNamespace(
-        Fields=Fields, own_fields=own_fields, open_window=open_window, load_on=load_on, lane=use.lanes.lane
+        Fields=Fields,
+        Touches=Touches,
+        own_fields=own_fields,
+        open_window=open_window,
+        load_on=load_on,
+        lane=use.lanes.lane,
     )

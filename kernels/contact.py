@@ -37,7 +37,7 @@ def build(variant: Variant) -> SimpleNamespace:
         that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
         of the tile and of the grid; `y` and `z` are its place in the grid's cell. `ring_area` is the area of all
         patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
-        `total_area` is the area of a ring in all layers of a target.
+        `total_area` is the area of a ring in all layers of the target.
         """
 
         area: wp.array(dtype=real)
@@ -51,16 +51,6 @@ def build(variant: Variant) -> SimpleNamespace:
         ring_area: wp.array(dtype=real)
         sums: wp.array(dtype=Sums)
         total_area: wp.array(dtype=real)
-
-    @wp.func
-    def open_window(
-        plate: Plate, thickness: real, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64
-    ):
-        """A slot's window about a hit, on an untouched plate."""
-        window = use.plate_grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
-        if wp.static(variant.degrades):
-            use.exposure.blank(fields, window)
-        return window
 
     @wp.func
     def find_touches(
@@ -114,7 +104,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return use.plate_grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
 
     @wp.func
-    def expose(surface: Surface, fields: Fields, touches: Touches, first: wp.int32):
+    def expose(surface: Surface, fields: Fields, window: Window, touches: Touches, first: wp.int32):
         """Add the exposure of a ring's patches to the plate, one patch of each quarter in turn. Neighbours share nodes,
         so a CPU would have to wait between them. A patch that does not touch adds zero, which is faster than a
         branch."""
@@ -124,7 +114,7 @@ def build(variant: Variant) -> SimpleNamespace:
             for k in range(4):
                 i = j + k * quarter
                 cell, y, z = read_index(touches.cell, i), read(touches.y, i), read(touches.z, i)
-                use.exposure.scatter(fields.gain, fields.cells_z, cell, y, z, read(touches.gain, i))
+                use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, read(touches.gain, i))
             j += 1
 
     def summing(weakened: bool) -> Any:
@@ -135,6 +125,7 @@ def build(variant: Variant) -> SimpleNamespace:
             surface: Surface,
             law: Law,
             fields: Fields,
+            window: Window,
             touches: Touches,
             pose: Pose,
             base: wp.int32,
@@ -162,7 +153,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     cell = read_index(touches.cell, base + j)
                     y, z = read(touches.y, base + j), read(touches.z, base + j)
                     left = use.interaction.remaining(
-                        law, use.exposure.gather(fields.exposure, fields.cells_z, cell, y, z)
+                        law, use.exposure.gather(fields.exposure, window.cells_z, cell, y, z)
                     )
                 area = left * read(touches.area, base + j)
                 stress = use.interaction.normal_stress(law, face.closing)
@@ -246,11 +237,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def keep_sums(touches: Touches, index: wp.int32, sums: Sums):
         """Keep what the second pass sums over a ring, of all layers together."""
-        if wp.static(variant.layered):
-            touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
-            touches.sums[index] = use.damping.joined(touches.sums[index], sums)
-        else:
-            touches.sums[index] = sums
+        touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
+        touches.sums[index] = use.damping.joined(touches.sums[index], sums)
 
     @wp.func
     def summed(
@@ -268,8 +256,8 @@ def build(variant: Variant) -> SimpleNamespace:
         begin, end = first * surface.around, (last + 1) * surface.around
         if wp.static(mixed):
             if not window.weakens:
-                return sum_sound(surface, law, fields, touches, pose, base, begin, end)
-        return sum_patches(surface, law, fields, touches, pose, base, begin, end)
+                return sum_sound(surface, law, fields, window, touches, pose, base, begin, end)
+        return sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
 
     @wp.func
     def load_on(
@@ -309,7 +297,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     # stored as vectors.
                     for index in range(first, last + 1):
                         if touches.ring_area[slot * surface.rings + index] > zero:
-                            expose(surface, fields, touches, base + index * surface.around)
+                            expose(surface, fields, window, touches, base + index * surface.around)
                     use.exposure.spread(plate, fields, window, found.box)
             sums = Sums()
             if wp.static(variant.bends):
@@ -335,7 +323,8 @@ def build(variant: Variant) -> SimpleNamespace:
     return SimpleNamespace(
         Fields=Fields,
         Touches=Touches,
-        open_window=open_window,
+        own_fields=use.exposure.own_fields,
+        open_window=use.exposure.open_window,
         clear_sums=clear_sums,
         find_touches=find_touches,
         meet=meet,

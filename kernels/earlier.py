@@ -96,7 +96,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def row_of(earlier: Earlier, window: Window, slot: wp.int32, order: wp.int32):
         """Index of the first node of a shot's window among those of its slot."""
-        return (slot * (earlier.count - 1) + order) * earlier.nodes + window.first
+        return (slot * earlier.count + order) * earlier.nodes + window.first
 
     @wp.func
     def begin(earlier: Earlier, slot: wp.int32, shot: wp.int32):

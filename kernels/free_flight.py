@@ -16,7 +16,7 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, undefined = real(0.0), real(wp.nan)
     use = variant.use(march, rigid_body, shots)
-    Shots, Contact = use.shots.Shots, use.march.Outcomes
+    Shots, Target, Contact = use.shots.Shots, use.march.Target, use.march.Outcomes
     angular_velocity = use.rigid_body.angular_velocity
     axis_at = use.rigid_body.axis_at
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
@@ -51,6 +51,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def free_flight(
         # inputs
         shots: Shots,
+        target: Target,
         contact: Contact,
         standoffs: wp.array(dtype=wp.float64),
         ahead: real,
@@ -82,7 +83,7 @@ def build(variant: Variant) -> SimpleNamespace:
         report.contact_duration[shot] = wp.where(failed, undefined, contact.contact_duration[shot])
         for k in range(standoffs.shape[0]):
             if passes:
-                distance = real(standoffs[k] + use.shots.own(shots.thickness, shot)) - contact.position[shot][0]
+                distance = real(standoffs[k] + use.march.depth_of(target, shot)) - contact.position[shot][0]
                 then = axis_at(body, axis, momentum, ahead, velocity[0], distance)
                 report_standoff(report, shot, k, then, flight, velocity)
             else:
