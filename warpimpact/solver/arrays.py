@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
+from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.bending import Sections, check_bending, sections_of
 from warpimpact.solver.blocks import SIMPLE_ONLY, check_layout, in_blocks
 from warpimpact.solver.materials import Materials, materials_of
@@ -97,14 +98,13 @@ class Arrays:
 
 def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
     """The build of the kernels that a scene needs."""
-    plates, interaction, scattered = scene.target.plates, scene.interaction, shots.columns
-    degrades = any(weakens(scene.target, scattered))
+    plates, interaction = scene.target.layers, scene.interaction
+    degrades = any(weakens(scene.target, shots))
     return Variant(
         double=resolution.double,
         nodal=resolution.nodal,
         degrades=degrades,
-        rubs=any(plate.shear_coefficient > 0.0 for plate in plates)
-        or not scattered.keys().isdisjoint(("shear_coefficient", "layer_shear_coefficient")),
+        rubs=any(one.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, one in enumerate(plates)),
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
         rimmed=any(plate.size is not None for plate in plates),
         bends=scene.record.bending,
@@ -126,7 +126,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
     """
     core, target, record = scene.core, scene.target, scene.record
     check_bending(record, numerics)
-    resolution = resolve(numerics, scene, shots.columns)
+    resolution = resolve(numerics, scene, shots)
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
@@ -139,8 +139,8 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         azimuths=azimuths_of(around),
         sections=sections_of(core, rings) if record.bending else None,
         grids=[
-            _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length)
-            for plate in target.plates
+            _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length)
+            for plate in target.layers
         ],
         materials=materials,
         onset=scene.interaction.onset,
@@ -187,11 +187,11 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
     passage = _least(resolution.passage(one.thickness) for one in materials)
     times = (
         resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
-        for material, layer in zip(materials, target.plates, strict=True)
+        for material, layer in zip(materials, target.layers, strict=True)
     )
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
-    gaps = sum(layer.gap for layer in target.layers)
-    return {name: values for name, values in shots.columns.items() if not name.startswith("layer_")} | {
+    gaps = sum(target.gaps)
+    return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
         "mass": mass,
         "inertia_axial": scale * body.inertia_axial,
         "inertia_transverse": scale * body.inertia_transverse,

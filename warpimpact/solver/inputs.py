@@ -68,9 +68,10 @@ class Inputs:
         """The Target (kernels/target.py)."""
         target, materials = self.stage.Target(), arrays.materials
         target.count = len(materials)
-        target.plates = self.plates[0]
         if arrays.variant.layered:
             target.plates = wp.array(self.plates, dtype=self.stage.Plate, device=self.put.device)
+        else:
+            target.plates = self.plates[0]
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
         target.a2 = self.put(np.array([one.a2 for one in materials]))
