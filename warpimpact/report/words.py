@@ -16,7 +16,7 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import depth_note, effectiveness
 from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note
+from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
@@ -177,9 +177,9 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
-            unit = UNITS[measure.units]
-            interval = interval_text(estimate.low, estimate.high, "{:.2f}".format)
-            yield Row(f"mean {words(measure.variable)}{at}", f"{estimate.value:.2f}{unit}", interval)
+            unit = measure.display
+            interval = interval_text(unit.factor * estimate.low, unit.factor * estimate.high, "{:.2f}".format)
+            yield Row(f"mean {words(measure.variable)}{at}", unit.text(estimate.value, ".2f"), interval)
 
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -43,6 +43,11 @@ class Estimate:
         """Half of the interval's length."""
         return 0.5 * (self.high - self.low)
 
+    def times(self, factor: float) -> Self:
+        """The estimate in another unit."""
+        value, low, high, spread = (factor * one for one in (self.value, self.low, self.high, self.spread))
+        return replace(self, value=value, low=low, high=high, spread=spread)
+
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate of a number that lies between two others: no end of its interval is beyond them."""
         low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))

@@ -24,6 +24,8 @@ from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import HitMap, at_solid, described, pilot_of
 from warpimpact.scene import Scene, Shots, Target
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKEST,
@@ -47,7 +49,6 @@ if TYPE_CHECKING:
 
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
-_UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 
 
 @dataclass(frozen=True)
@@ -254,11 +255,17 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
 _MOST_LISTED = 12
 
 
+def shown_unit(name: str) -> tuple[str, float]:
+    """Unit that people see a limit in, and the factor to it."""
+    shown = reader_of(QUANTITIES[name].type).display
+    return shown.shown, shown.factor
+
+
 def limits_text(dataset: xarray.Dataset) -> str:
     """What a search found, as a short table: V50 and V05, and every hit of a short list."""
     told = dataset.attrs
     quantity = told[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
+    unit, factor = shown_unit(quantity)
     value, lower, upper, runs, converged = (dataset[name].values for name in v.LIMITS[quantity])
     rows = []
     if len(value) <= _MOST_LISTED:
@@ -296,7 +303,7 @@ def _solid_lines(dataset: xarray.Dataset) -> list[str]:
     if reference is None:
         return []
     quantity = dataset.attrs[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
+    unit, factor = shown_unit(quantity)
     value = reference[v.LIMITS[quantity].value].values
     found = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
     density = float(dataset.attrs[attr.AREAL_DENSITY])
@@ -325,7 +332,7 @@ def _proxy_lines(dataset: xarray.Dataset) -> list[str]:
 def promise_line(dataset: xarray.Dataset) -> str:
     """How far off the limits are estimated to be."""
     told = dataset.attrs
-    unit, factor = _UNITS[told[attr.LIMIT]]
+    unit, factor = shown_unit(told[attr.LIMIT])
     of_layer = f"thickness of layer {told[attr.LIMIT_LAYER]}; " if told[attr.LIMIT_LAYER] else ""
     ends = f"{of_layer}ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
     if attr.LIMIT_ERROR_SHOWN not in told:
