@@ -9,16 +9,16 @@ import json
 import math
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.posterior import Posterior
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_table
@@ -29,8 +29,7 @@ from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PROMISES, Promise, keep
 from warpimpact.solver.resolution import Fidelity, resolve
-from warpimpact.solver.simulate import Outcomes, build, simulate
-from warpimpact.solver.unfold import unfolded
+from warpimpact.solver.simulate import build, simulate
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -112,7 +111,7 @@ def described(
     table = to_table(
         scene,
         shots,
-        unfolded(outcomes, group),
+        outcomes.unfolded(group),
         period=campaign.hits.covered(campaign.plate),
         attributes={
             attr.TITLE: campaign.title,
@@ -284,13 +283,7 @@ def _outcomes_of_scenes(scene: Scene, shots: Shots, how: tuple[Any, ...], drawn:
         parts.append(_outcomes(own, shots[which], numerics, device, threads, follow))
         places.append(which)
     order = np.argsort(np.concatenate(places), kind="stable")
-    return _joined(parts, order)
-
-
-def _joined(parts: Sequence[Outcomes], order: NDArray[np.int64]) -> Outcomes:
-    """Outcomes one after the other, then in this order."""
-    columns = {one.name: [getattr(part, one.name) for part in parts] for one in fields(parts[0])}
-    return type(parts[0])(**{name: np.concatenate(values)[order] for name, values in columns.items()})
+    return Outcomes.joined(parts)[order]
 
 
 def _impact(campaign: Campaign) -> str:

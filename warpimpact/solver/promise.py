@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Accuracy, Numerics, Scene, Shots
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import LADDER, Fidelity, level
-from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -183,7 +185,7 @@ def changes(coarse: Outcomes, fine: Outcomes, impact: Array | None = None) -> tu
         neither = np.isnan(last[0]) & np.isnan(last[1])
         tilt = np.where(neither, 0.0, weight * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
     depth = np.full(len(velocity), math.nan)
-    if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
+    if LAYER_RESIDUAL_VELOCITY in coarse:
         before, after = (np.nan_to_num(one.layer_residual_velocity) for one in (coarse, fine))
         apart = _weight(before, after, None if impact is None else impact[:, None]) * np.abs(after - before)
         velocity = np.maximum(velocity, apart.max(axis=1))

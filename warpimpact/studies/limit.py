@@ -19,7 +19,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.limits import solid_limits, with_limits, with_solid_limits
+from warpimpact.results.limits import solid_limits, with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import HitMap, at_solid, described, pilot_of
@@ -124,7 +124,7 @@ class LimitMap(HitMap):
         dataset = described(
             campaign,
             self._put(campaign, shots, limits, images),
-            limits.outcomes,
+            limits.outcomes.assign(**{name: getattr(limits, name.field) for name in v.LIMITS[self.quantity]}),
             numerics=campaign.numerics if promise is None else promise.fidelity,
             device=device,
             elapsed=time.perf_counter() - begin,
@@ -139,8 +139,7 @@ class LimitMap(HitMap):
         )
         begun, *_ = dataset.attrs[attr.HISTORY].split()
         dataset.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {self.quantity}"
-        found = with_limits(dataset, self.quantity, limits, images)
-        return found if how.get("solid") is None else self._beside_solid(campaign, found, **how)
+        return dataset if how.get("solid") is None else self._beside_solid(campaign, dataset, **how)
 
     def _beside_solid(self, campaign: Campaign, found: Table, **how: Any) -> Table:
         """The Dataset with the limits of some shots at the solid plate that is as heavy as the whole target."""

@@ -8,11 +8,12 @@ import pytest
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
 from warpimpact.solver.limit import limit_thickness, limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
