@@ -19,6 +19,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 from warpimpact.results.files import ResultError
+from warpimpact.results.measures import place_of_standoff
 from warpimpact.scene import AnyCore, Core
 from warpimpact.scene.units import Length, Obliquity
 
@@ -272,12 +273,10 @@ def _at_standoff(dataset: xarray.Dataset, standoff: float | str | None) -> float
     distances = dataset[v.STANDOFF].values
     if standoff is None:
         return float(distances[-1])
-    standoff = _read("standoff", Length, standoff)
-    nearest = float(distances[np.argmin(np.abs(distances - standoff))])
-    if not np.isclose(nearest, standoff, rtol=1e-9, atol=0.0):
-        known = ", ".join(f"{distance * 1e3:g} mm" for distance in distances)
-        raise ResultError(f"standoff: got {standoff * 1e3:g} mm, but the result has {known}")
-    return nearest
+    try:
+        return float(distances[place_of_standoff(distances, _read("standoff", Length, standoff))])
+    except ValueError as error:
+        raise ResultError(f"standoff: {error}") from None
 
 
 def _of_passed(part: xarray.Dataset, values: Array, otherwise: float) -> Array:

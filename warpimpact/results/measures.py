@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
@@ -142,14 +143,18 @@ class Measure:
         return _shown(self.units, value)
 
     def values(self, dataset: Result) -> Array:
-        """The number of every shot, shape [hits]; NaN for a shot that does not count."""
+        """The number of every shot, shape [hits]; NaN for a shot that does not count.
+
+        Raises:
+            ValueError: the result does not have the stand-off.
+        """
         if self.kind == "share" and self.variable == v.BROKEN:
             return np.asarray(dataset[v.BROKEN].values, dtype=np.float64)  # NaN of a failed shot
         if self.kind == "share":
             return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
         column = np.asarray(dataset[self.variable].values)
         if self.standoff is not None:
-            column = column[:, np.abs(dataset[v.STANDOFF].values - self.standoff).argmin()]
+            column = column[:, place_of_standoff(dataset[v.STANDOFF].values, self.standoff)]
         counts = ~failed(dataset) if self.variable in v.LIMIT_VARIABLES else passed(dataset)
         values = np.where(counts, column.astype(np.float64), np.nan)
         if self.kind == "mean":
@@ -158,6 +163,19 @@ class Measure:
             return values
         beyond = values > self.limit if self.above else values < self.limit
         return np.where(np.isnan(values), np.nan, beyond)
+
+
+def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
+    """Place of a stand-off [m] among those that there are.
+
+    Raises:
+        ValueError: it is none of them.
+    """
+    found = np.flatnonzero(np.isclose(distances, standoff, rtol=1e-9, atol=0.0))
+    if not len(found):
+        known = ", ".join(f"{distance * 1e3:g} mm" for distance in distances) or "not given"
+        raise ValueError(f"got {standoff * 1e3:g} mm, but the stand-offs are {known}")
+    return int(found[0])
 
 
 def _shown(units: str, value: float) -> float:

@@ -169,10 +169,8 @@ def _place(data: dict[str, Any], key: str, value: Any, path: str) -> None:
         raise CampaignError(f"{path}: sweep: got {quoted(key)}, but the campaign has no [[layer]]")
     inside: Any = data
     for part in tables:
-        if isinstance(inside, list):
-            inside = inside[part] if part in range(len(inside)) else None
-        else:
-            inside = inside.setdefault(part, {})
+        entries: dict[Any, Any] = dict(enumerate(inside)) if isinstance(inside, list) else inside
+        inside = entries.setdefault(part, {} if entries is inside else None)
         if not isinstance(inside, dict | list):
             raise CampaignError(f"{path}: sweep: {key} leads through {part}, which is no table")
     if isinstance(inside, list) and last not in range(len(inside)):
@@ -278,7 +276,7 @@ def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
     numbers = [_value(one.key, campaign) for campaign in campaigns]
     if found is None or not all(isinstance(number, int | float) for number in numbers):
         return one.name, np.array(one.labels), {"long_name": one.key}
-    unit = next((_unit(mark) for mark in _marks(found) if _unit(mark) is not None), "") or ""
+    unit = next((_unit(mark) for mark in _marks(found) if _unit(mark) is not None), "")
     values = np.array(numbers, dtype=float)
     told = {"units": UNITS[unit].stored, "long_name": one.key}
     return one.name, np.degrees(values) if unit == "rad" else values, told
