@@ -120,6 +120,11 @@ class Measure:
         return cls(text, kind, name, standoff)
 
     @property
+    def least(self) -> float:
+        """What no value is below."""
+        return -math.inf if self.variable in _SIGNED else 0.0
+
+    @property
     def is_binary(self) -> bool:
         """Whether the values of single shots are 0 or 1."""
         return self.kind in ("probability", "share")
@@ -201,8 +206,7 @@ class Tally:
 
     def estimate(self) -> Estimate:
         """The estimate from the shots so far."""
-        found = self._dealt.estimate()
-        return found if self.measure.variable in _SIGNED else found.within(0.0)
+        return self._dealt.estimate().within(self.measure.least)
 
 
 def dealing(dataset: Result) -> dict[str, Any]:
