@@ -25,7 +25,8 @@ from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import LayerStatus
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import outlines, passed
+from warpimpact.results.dataset import passed
+from warpimpact.results.outlines import outlines
 from warpimpact.scene.units import STORED
 
 if TYPE_CHECKING:

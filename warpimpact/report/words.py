@@ -24,9 +24,10 @@ from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import outlines, passed
+from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.outlines import outlines
 from warpimpact.studies.accuracy import QUANTITIES
 from warpimpact.studies.accuracy_text import study_text
 
