@@ -276,7 +276,7 @@ def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
     numbers = [_value(one.key, campaign) for campaign in campaigns]
     if found is None or not all(isinstance(number, int | float) for number in numbers):
         return one.name, np.array(one.labels), {"long_name": one.key}
-    unit = next((_unit(mark) for mark in _marks(found) if _unit(mark) is not None), "")
+    unit = next(filter(None, map(_unit, _marks(found))), "")
     values = np.array(numbers, dtype=float)
     told = {"units": UNITS[unit].stored, "long_name": one.key}
     return one.name, np.degrees(values) if unit == "rad" else values, told
