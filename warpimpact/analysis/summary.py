@@ -17,7 +17,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
-from warpimpact.scene.units import STORED
+from warpimpact.scene.display import STORED
 from warpimpact.solver.promise import PROMISES, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 

@@ -21,7 +21,7 @@ from warpimpact.identification.parameters import Parameter
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior as files
 from warpimpact.results.variables import HIT_Y, HIT_Z
-from warpimpact.scene.units import UNITS
+from warpimpact.scene.display import UNITS
 from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import xarray
 from warpimpact.identification.posterior import LARGEST_NOISE, learnt, together
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior as files
-from warpimpact.scene.units import STORED, Unit
+from warpimpact.scene.display import STORED, Unit
 from warpimpact.statistics.importance import LARGEST_K
 
 

@@ -27,7 +27,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.outlines import outlines
-from warpimpact.scene.units import STORED
+from warpimpact.scene.display import STORED
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

@@ -15,7 +15,7 @@ from warpimpact.plotting.cell import words
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
-from warpimpact.scene.units import STORED
+from warpimpact.scene.display import STORED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

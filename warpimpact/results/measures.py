@@ -15,20 +15,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
-from warpimpact.scene.units import (
-    STORED,
-    Angle,
-    Energy,
-    Length,
-    Moment,
-    Number,
-    Speed,
-    Stress,
-    Time,
-    Unit,
-    quantity,
-    quoted,
-)
+from warpimpact.scene.display import STORED, Unit
+from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
 if TYPE_CHECKING:

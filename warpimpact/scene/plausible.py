@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from .units import UNITS
+from .display import UNITS
 
 
 class Implausible(UserWarning):

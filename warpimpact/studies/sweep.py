@@ -25,7 +25,8 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Impact, Interaction, Plate
-from warpimpact.scene.units import UNITS, quoted
+from warpimpact.scene.display import UNITS
+from warpimpact.scene.units import quoted
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys need no table in front of them, as there is no other key of that name."""
