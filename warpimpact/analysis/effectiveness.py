@@ -36,7 +36,7 @@ ANGLE = math.radians(30.0)
 
 
 @dataclass(frozen=True)
-class Measure:
+class EffectMeasure:
     """One number of how well a plate protects; NaN where something does not exist.
 
     Attributes:
@@ -76,7 +76,7 @@ class Evidence:
         solid: the same of the first shots at the solid plate; None where there is none.
     """
 
-    measure: Measure
+    measure: EffectMeasure
     kind: str
     numbers: Array | None
     solid: Array | None
@@ -102,7 +102,9 @@ _WORST_TENTH = _Statistic(
 _WORST_POINT = _Statistic("_worst_point", ", worst point", " The worst of the hits, an observed extreme.", "")
 
 
-def effectiveness(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None) -> list[Measure]:
+def effectiveness(
+    dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None
+) -> list[EffectMeasure]:
     """How well the plate of a result protects.
 
     Args:
@@ -184,8 +186,8 @@ def _without_interval(value: float) -> Estimate:
 
 def _measure(
     effect: Effect, statistic: _Statistic, estimate: Estimate, against: Ratio, hit: int | None = None
-) -> Measure:
-    return Measure(
+) -> EffectMeasure:
+    return EffectMeasure(
         name=effect.name + statistic.name,
         label=effect.label + statistic.label,
         value=estimate.value,
@@ -232,7 +234,7 @@ def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standof
     return "\n".join(rows)
 
 
-def depth_note(measures: Sequence[Measure]) -> str:
+def depth_note(measures: Sequence[EffectMeasure]) -> str:
     """What to know of the depths in a base that some cores pierce; empty if none does."""
     share = {measure.name: measure.value for measure in measures}.get("base_pierced_share", 0.0)
     if not share > 0.0:
@@ -252,7 +254,7 @@ def plate_text(dataset: xarray.Dataset) -> str:
     return f", {told[attr.AREAL_DENSITY]:.4g} kg/m², {told[attr.OPEN_AREA]:.1%} open"
 
 
-def _second(measure: Measure) -> str:
+def _second(measure: EffectMeasure) -> str:
     return (
         f"at hit {measure.hit}"
         if measure.hit is not None
@@ -260,6 +262,6 @@ def _second(measure: Measure) -> str:
     )
 
 
-def _against_text(measure: Measure) -> str:
+def _against_text(measure: EffectMeasure) -> str:
     interval = "" if math.isnan(measure.ratio_low) else f"  {interval_text(measure.ratio_low, measure.ratio_high)}"
     return f"{number_text(measure.solid):>12}   {number_text(measure.ratio)}{interval}"
