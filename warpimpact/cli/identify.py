@@ -16,7 +16,7 @@ from .paths import check_place
 from .progress import is_quiet, warn
 
 if TYPE_CHECKING:
-    from warpimpact.identification.identify import Standing
+    from warpimpact.identification.identify import FitStanding
 
 
 def add_identify(commands: Commands) -> None:
@@ -72,7 +72,7 @@ def _identify(arguments: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _show() -> "Iterator[Callable[[Standing], None]]":
+def _show() -> "Iterator[Callable[[FitStanding], None]]":
     """Show the progress of a fit: a bar on a terminal, a line per tenth of the sets in a log."""
     if is_quiet():
         yield lambda standing: None
@@ -80,7 +80,7 @@ def _show() -> "Iterator[Callable[[Standing], None]]":
     if not sys.stderr.isatty():
         shown = -1
 
-        def log(standing: "Standing") -> None:
+        def log(standing: "FitStanding") -> None:
             nonlocal shown
             if (tenths := 10 * standing.done // standing.total) > shown:
                 shown = tenths
@@ -92,7 +92,7 @@ def _show() -> "Iterator[Callable[[Standing], None]]":
 
     with tqdm(unit="set", dynamic_ncols=True) as bar:
 
-        def show(standing: "Standing") -> None:
+        def show(standing: "FitStanding") -> None:
             bar.total = standing.total
             bar.set_postfix_str(_running(standing), refresh=False)
             bar.update(max(0, standing.done - bar.n))
@@ -100,7 +100,7 @@ def _show() -> "Iterator[Callable[[Standing], None]]":
         yield show
 
 
-def _running(standing: "Standing") -> str:
+def _running(standing: "FitStanding") -> str:
     parts = [f"smallest misfit {standing.misfit:.3g}"] if math.isfinite(standing.misfit) else []
     if math.isfinite(standing.effective):
         parts.append(f"effective sample size {standing.effective:.0f}, Pareto k {standing.pareto_k:.2f}")

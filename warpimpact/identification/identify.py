@@ -35,7 +35,7 @@ FARTHEST = 5.0
 
 
 @dataclass(frozen=True)
-class Standing:
+class FitStanding:
     """How far a fit is.
 
     Attributes:
@@ -53,7 +53,7 @@ class Standing:
     misfit: float
 
 
-Follow = Callable[[Standing], None]
+Follow = Callable[[FitStanding], None]
 
 
 def identify_to_file(
@@ -171,7 +171,7 @@ class _Work:
         self._say()
 
     def _say(self) -> None:
-        self._follow(Standing(self.done, self._total, self._resumed, self._effective, self._pareto_k, self._misfit))
+        self._follow(FitStanding(self.done, self._total, self._resumed, self._effective, self._pareto_k, self._misfit))
 
 
 def _check_reach(fit: Fit, scores: list[Score]) -> None:
