@@ -25,11 +25,11 @@ from warpimpact.identification.parameters import (
 )
 from warpimpact.results.measures import Measure, place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
+from warpimpact.scene import exclusions as asked
 from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
-from warpimpact.solver.bending import check_bending
 from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
 
@@ -238,7 +238,8 @@ def _check_scenes(fit: Fit, name: str) -> None:
         where = f"{name}: shot[{place}]"
         try:
             scene = fit.scene_of(shot)
-            check_bending(fit.record, fit.numerics)
+            nodal = isinstance(fit.numerics, Numerics) and fit.numerics.scheme == "nodal"
+            asked.check_together({asked.BENDING: fit.record.bending, asked.NODAL: nodal})
         except ValueError as error:
             told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
             raise FitError(f"{where}: {told}") from None

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
+from warpimpact.scene import exclusions as asked
 from warpimpact.scene.quantities import BY_LAYER
-from warpimpact.solver.bending import Sections, check_bending, sections_of
-from warpimpact.solver.blocks import SIMPLE_ONLY, check_layout, in_blocks
+from warpimpact.solver.bending import Sections, sections_of
+from warpimpact.solver.blocks import in_blocks
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
@@ -125,9 +126,18 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         MemoryError: the plate's period does not fit at the grid spacing.
     """
     core, target, record = scene.core, scene.target, scene.record
-    check_bending(record, numerics)
     resolution = resolve(numerics, scene, shots)
     nodal, around = resolution.nodal, resolution.patches_around
+    asked.check_together(
+        {
+            asked.NODAL: nodal,
+            asked.BLOCK: resolution.block,
+            asked.DOUBLE: resolution.double,
+            asked.BENDING: record.bending,
+            asked.LAYERS: len(target.layers) > 1,
+            asked.BURST: shots.at_a_plate > 1,
+        }
+    )
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
     conditions = _conditions(scene, resolution, shots, materials)
@@ -149,10 +159,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
         ahead=record.ahead(core),
     )
-    if resolution.block:
-        check_layout(**{name: getattr(arrays.variant, name) for name in SIMPLE_ONLY})
-        return in_blocks(arrays, shots)
-    return arrays
+    return in_blocks(arrays, shots) if resolution.block else arrays
 
 
 def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:

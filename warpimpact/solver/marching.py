@@ -28,7 +28,6 @@ from warpimpact.solver.arrays import Arrays, arrays_of
 from warpimpact.solver.blocks import first_window
 from warpimpact.solver.bursts import (
     bytes_of,
-    check_bursts,
     chunk_of,
     earlier_hits,
     in_turns,
@@ -77,7 +76,6 @@ class March:
     ) -> None:
         self.scene, self.shots, self.device = scene, shots, device
         self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
-        check_bursts(shots, numerics)
         self._take(arrays_of(scene, numerics, shots, traced=traced))
         self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
         self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import exclusions as asked
 
 Array = NDArray[np.float64]
 
@@ -80,9 +81,6 @@ NODAL: dict[str, Any] = {
     "time_step": 1.0e-6,
 }
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
-
-
-ONE_PLATE = "the nodal scheme knows one plate and no layers behind it; the consistent scheme takes layers"
 
 
 def level(index: int, numerics: Numerics) -> Fidelity:
@@ -186,13 +184,8 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, shots: Shots | None = N
     }
     if numerics.scheme == "nodal":
         defaults = NODAL
-        if len(plates) > 1:
-            raise ValueError(ONE_PLATE)
-        if plate.degradation_distance is not None:
-            raise ValueError(
-                "the nodal scheme weakens the plate once per time step: it knows no degradation_distance, which the "
-                "consistent scheme takes"
-            )
+        by_path = plate.degradation_distance is not None
+        asked.check_together({asked.NODAL: True, asked.LAYERS: len(plates) > 1, asked.BY_PATH: by_path})
     given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
     return Resolution(
         nodal=numerics.scheme == "nodal",
