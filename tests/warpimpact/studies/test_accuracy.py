@@ -20,15 +20,7 @@ from warpimpact.results.variables import STUDY_COORDINATES, STUDY_VARIABLES
 from warpimpact.scene import Numerics, Shots
 from warpimpact.solver.resolution import FIDELITIES, Fidelity, resolve, spelt_out
 from warpimpact.studies import accuracy as studies
-from warpimpact.studies.accuracy import (
-    Answer,
-    converged,
-    default_settings,
-    extrapolated,
-    front,
-    label,
-    study,
-)
+from warpimpact.studies.accuracy import Answer, converged, default_settings, extrapolated, front, label, study
 from warpimpact.studies.accuracy_text import advantage, study_text
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
