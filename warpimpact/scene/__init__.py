@@ -7,7 +7,7 @@ imports no other room: neither a kernel nor a Dataset.
 from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction
-from .numerics import Accuracy, Numerics
+from .numerics import PRESETS, Accuracy, Numerics
 from .patterns import (
     AnyPattern,
     CirclePattern,
@@ -32,6 +32,7 @@ from .target import Layer, Target
 __all__ = [
     "IDENTITY",
     "OF_THE_SCENE",
+    "PRESETS",
     "Accuracy",
     "AnyCore",
     "AnyPattern",

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.scene import Core, Numerics, Record
+from warpimpact.scene import Core
 
 if TYPE_CHECKING:
-    from warpimpact.solver.resolution import Fidelity
     from warpimpact.solver.rings import Array, Rings
 
 THINNEST = 0.5
@@ -29,16 +28,6 @@ class Sections:
     first: Array
     second: Array
     rotary: Array
-
-
-def check_bending(record: Record, numerics: Numerics | Fidelity) -> None:
-    """Refuse numerics that cannot compute the bending moment that is to be recorded.
-
-    Raises:
-        ValueError: names the scheme.
-    """
-    if record.bending and isinstance(numerics, Numerics) and numerics.scheme == "nodal":
-        raise ValueError('got bending = true beside numerics.scheme = "nodal", but it must be "consistent"')
 
 
 def bending_columns(found: Any, failed: NDArray[np.bool_], *, breaks: bool) -> dict[str, Array]:
