@@ -59,7 +59,7 @@ class Layered(Case):
 
     def shots(self, count: int, seed: int = 0) -> Shots:
         """Some `count` hits; whole bursts."""
-        plate = self.scene.target.plate
+        plate = self.scene.target.layers[0]
         if self.burst is None:
             return make_shots(self.impact, Hits(count=count, seed=seed), plate)
         hits = Hits(count=count // BURST, seed=seed)
@@ -69,7 +69,7 @@ class Layered(Case):
 def drawn(seed: int, index: int) -> Layered:
     """The case of an index, a function of (seed, index) alone."""
     front, rng = draw(seed, index), np.random.default_rng([seed, index, 1])
-    core, plate = front.scene.core, front.scene.target.plate
+    core, plate = front.scene.core, front.scene.target.layers[0]
     calibre, several = 2.0 * core.max_radius, index % 3 == 2
     count = int(rng.integers(0 if several else 1, 4))
     # A solid plate without friction takes Y h π R² of the core's energy.
@@ -78,7 +78,7 @@ def drawn(seed: int, index: int) -> Layered:
     layers = tuple(_layer(rng, calibre, share * energy / (math.pi * core.max_radius**2)) for share in shares)
     path = {"degradation_interval": None, "degradation_distance": rng.uniform(0.5e-3, 1e-3)}
     by_path: dict[str, Any] = path if rng.random() < 0.5 else {}
-    target = Target(plate=plate.model_copy(update=by_path), layers=layers)
+    target = Target(layers=(plate.model_copy(update=by_path), *layers))
     spacing = float(rng.uniform(0.5, 3.0)) * calibre
     scene = Scene(core=core, target=target, interaction=Interaction(), record=Record(standoffs=(0.13,)))
     kinds = " + ".join("solid" if isinstance(one.pattern, NoPattern) else "holes" for one in layers)

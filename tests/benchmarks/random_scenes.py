@@ -72,7 +72,7 @@ class Case:
 
     def shots(self, count: int, seed: int = 0) -> Shots:
         """Hits spread evenly over the cell; the same for every count that holds them."""
-        return make_shots(self.impact, Hits(count=count, seed=seed), self.scene.target.plate)
+        return make_shots(self.impact, Hits(count=count, seed=seed), self.scene.target.layers[0])
 
     @property
     def key(self) -> str:
@@ -121,7 +121,7 @@ def draw(seed: int, index: int) -> Case:
         yaw=angles[2] * math.cos(math.radians(angles[3])) if yawed else 0.0,
     )
     way = ("oblique" if oblique else "normal") + (" yawed" if yawed else "")
-    scene = Scene(core=core, target=Target(plate=plate), record=Record(standoffs=(STANDOFF,)))
+    scene = Scene(core=core, target=Target(layers=(plate,)), record=Record(standoffs=(STANDOFF,)))
     return Case(f"{kind}, {holes}, {way}", scene, impact)
 
 

@@ -90,7 +90,7 @@ def calibrate(fit: Fit, *, data_sets: int, library: int, device: str = "auto") -
             some = {kind: scale[which] for kind, scale in scales.items()}
             for place in bench.which:
                 shot = fit.shots[place]
-                own = run.aim.of(shot.hit, run.scene.target.plate, run.scene.core)
+                own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
                 for row, values in enumerate(measured[place]):
                     data = _replaced(data_of(fit, shot), values)
                     log_likelihood[row, which] += score(data, own, run.outcomes, some, rng).log_likelihood

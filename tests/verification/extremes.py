@@ -126,7 +126,7 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
     )
     precision = draw.one_of("single", "single", "single", "double")
     layers = tuple(_layer(draw, plate) for _ in range(draw.one_of(0, 0, 0, 1, 2, 3)))
-    target = Target(plate=Plate(**plate), layers=layers)
+    target = Target(layers=(Plate(**plate), *layers))
     return Extreme(
         Scene(core=core, target=target, interaction=interaction, record=Record(standoffs=(1.0,))), shots, precision
     )

@@ -97,7 +97,7 @@ def test_parts_without_a_gap_bend_a_core_as_the_whole_does(shares: tuple[float, 
     layers = tuple(Layer(**{name: getattr(part, name) for name in part.model_fields_set}) for part in parts[1:])
     shots = slanted_shots()
     expected = bent(whole, shots, device, time_step=1e-6)
-    got = bent(Target(plate=parts[0], layers=layers), shots, device, time_step=1e-6)
+    got = bent(Target(layers=(parts[0], *layers)), shots, device, time_step=1e-6)
     alone = bent(parts[0], shots, device, time_step=1e-6)
     for name in ("largest_bending_moment", "bending_stress"):
         np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-3)

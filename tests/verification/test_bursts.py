@@ -51,7 +51,7 @@ def near_bursts() -> Shots:
 
 
 def scene_of(plate: Plate, behind: tuple[Layer, ...] = ()) -> Scene:
-    return Scene(core=PAPER_CORE, target=Target(plate=plate, layers=behind), record=Record(standoffs=STANDOFFS))
+    return Scene(core=PAPER_CORE, target=Target(layers=(plate, *behind)), record=Record(standoffs=STANDOFFS))
 
 
 def simulate(

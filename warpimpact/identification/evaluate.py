@@ -78,11 +78,11 @@ def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iter
     of_scene = {path: column for path, column in own.items() if path not in columns}
     for rows in _of_one_scene(of_scene, len(alike)):
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in of_scene.items()})
-        targets = aim(bench.shot, scene.target.plate, scene.core, fit.sampling)
+        targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling)
         per_call = max(1, AT_A_TIME // len(targets.computed))
         for first in range(0, len(rows), per_call):
             some = rows[first : first + per_call]
-            of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.plate)
+            of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.layers[0])
             shots = repeated(targets.computed, of_sets, len(some))
             outcomes = _outcomes(fit, bench, scene, shots, device)
             yield Run(alike[some], scene, targets, unfolded(outcomes, targets.group))
@@ -169,7 +169,7 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
         for run in runs(fit, bench, points, device=device):
             for place in bench.which:
                 shot = fit.shots[place]
-                own = run.aim.of(shot.hit, run.scene.target.plate, run.scene.core)
+                own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
                 for which in run.which.T:
                     some = {kind: scale[which] for kind, scale in scales.items()}
                     scored[place].append((which, score(data_of(fit, shot), own, run.outcomes, some, rng)))

@@ -27,7 +27,7 @@ from warpimpact.results.measures import Measure
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
 from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
-from warpimpact.scene.scatter import QUANTITIES
+from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.bending import check_bending
 from warpimpact.solver.columns import Path
@@ -263,7 +263,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
 
 
 def _check_hit(shot: MeasuredShot, scene: Scene, where: str) -> None:
-    if isinstance(shot.hit, str) and not _some(shot.hit, scene.target.plate, scene.core):
+    if isinstance(shot.hit, str) and not _some(shot.hit, scene.target.layers[0], scene.core):
         raise FitError(f'{where}: hit: got "{shot.hit}", but no place of this plate is')
 
 

@@ -15,8 +15,6 @@ REFERENCES = "references"
 
 # The campaign, and how it was computed
 CAMPAIGN = "campaign"
-CAMPAIGN_ANGLES = "campaign_angles"
-"""Unit of the angles that the campaign gives as numbers; not there where they are radians (version 0.1.0)."""
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
 PYTHON_VERSION = "python_version"

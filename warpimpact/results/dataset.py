@@ -15,7 +15,7 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.layers import fields, of_layers, sections
+from warpimpact.results.layers import faces, fields, own_columns, sections
 from warpimpact.results.table import Table
 from warpimpact.scene import Plate
 
@@ -74,20 +74,21 @@ def to_table(
     }
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
-    values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
+    own = own_columns(scene.target, shots)
+    values |= {name: own[name] for name in of_shots if name in own}
     layered: tuple[v.Variable, ...] = v.LAYER_VARIABLES
     along: tuple[v.Variable, ...] = (*v.COORDINATES, *v.OUTLINE_VARIABLES)
-    if scene.target.layers and scene.record.layer_standoffs:
+    if len(scene.target.layers) > 1 and scene.record.layer_standoffs:
         layered = (*layered, *v.LAYER_STANDOFF_VARIABLES)
         along = (*along, *v.LAYER_COORDINATES)
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
     ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layered)
     values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
-    values |= of_layers(scene, shots)
+    values |= faces(scene.target)
     if v.EXIT_POSITION in values:
         zero = np.zeros(len(shots))
         values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
-    coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
+    coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
     told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
     optional = (*told, *layered, *v.LAYER_FACES)
     variables = [*v.VARIABLES, *(name for name in optional if name in values)]
@@ -200,10 +201,10 @@ def history_dataset(
         replay: the shot's history.
         attributes: global attributes, which override those of `hit`.
     """
-    core, plate = scene.core, scene.target.plate
+    core, plate = scene.core, scene.target.layers[0]
     hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
     history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
-    farthest = np.abs(history.position[:, 1:]).max() if scene.target.layers else 0.0
+    farthest = np.abs(history.position[:, 1:]).max() if len(scene.target.layers) > 1 else 0.0
     section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * (core.bounding_radius + 0.25 * farthest)
     values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}
     values |= {
@@ -232,7 +233,7 @@ def history_dataset(
         .assign_coords(described(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
-    layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if scene.target.layers else ()
+    layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if len(scene.target.layers) > 1 else ()
     layered = (*layered, *(name for name in v.LAYER_FIELDS if name in behind))
     return dataset.assign(described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
@@ -299,7 +300,4 @@ def shots_at_a_plate(dataset: Result) -> int:
 
 def images(dataset: Result) -> int:
     """How many hits in a row are images of each other; 1 without `hits.irreducible`."""
-    told = dataset.attrs
-    if attr.IMAGES in told or attr.SYMMETRIES not in told:
-        return int(told.get(attr.IMAGES, 1))
-    return str(told[attr.SYMMETRIES]).count("(")  # files of version 0.1.0 name the symmetries, but not their number
+    return int(dataset.attrs.get(attr.IMAGES, 1))

@@ -24,7 +24,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_table
 from warpimpact.results.table import Table
 from warpimpact.scene import Burst, Numerics, Scene, Shots, Symmetry
-from warpimpact.scene.scatter import QUANTITIES
+from warpimpact.scene.quantities import BY_LAYER, QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PROMISES, Promise, keep
@@ -118,7 +118,6 @@ def described(
             attr.TITLE: campaign.title,
             attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
             attr.CAMPAIGN: campaign.text,
-            attr.CAMPAIGN_ANGLES: "degree",
             **attr.versions(),
             **attr.machine(),
             attr.DEVICE: f"{chosen.alias} ({chosen.name})",
@@ -190,14 +189,14 @@ def is_double(campaign: Campaign) -> bool:
 def at_solid(campaign: Campaign, shots: Shots) -> Shots:
     """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
     target, plate = campaign.target, campaign.plate
-    own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}
-    if shots.thickness is None and shots.layer_thickness is None:
-        return replace(shots, **own)
-    thickness = shots.own("thickness", plate.thickness) * (plate.solid.thickness / plate.thickness)
-    for k, layer in enumerate(target.layers):
-        share = layer.areal_density / layer.thickness / plate.density
-        thickness = thickness + share * shots.own_of_layer("thickness", k, layer.thickness)
-    return replace(shots, **own, thickness=np.broadcast_to(thickness, len(shots)).copy())
+    own: dict[str, Any] = {name: shots.columns[name][:, :1] if shots.differs(name, 0) else None for name in BY_LAYER}
+    if shots.thickness is not None:
+        thickness = shots.own_of(target, "thickness", 0) * (plate.solid.thickness / plate.thickness)
+        for k, layer in enumerate(target.layers[1:], start=1):
+            share = layer.areal_density / layer.thickness / plate.density
+            thickness = thickness + share * shots.own_of(target, "thickness", k)
+        own["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
+    return replace(shots, **own)
 
 
 def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Promise | None:
@@ -296,10 +295,9 @@ def _joined(parts: Sequence[Outcomes], order: NDArray[np.int64]) -> Outcomes:
 
 def _impact(campaign: Campaign) -> str:
     """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
-    scatter = {name: given.model_dump() for name, given in campaign.scatter.given.items()}
-    return json.dumps(
-        dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
-    )
+    scatter = campaign.scatter.given.items()
+    given = {name: one.model_dump() for (name, _), one in scatter if not QUANTITIES[name].by_layer}
+    return json.dumps(dict(campaign.impact) | given)
 
 
 def _material(campaign: Campaign) -> str:
@@ -319,8 +317,9 @@ def _plate(campaign: Campaign) -> str:
 def _layers(campaign: Campaign) -> str:
     """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
     layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
-    for (name, k), given in campaign.scatter.of_layers.items():
-        layers[str(k + 1)][name] = given.model_dump()
+    for (name, k), given in campaign.scatter.given.items():
+        if k:
+            layers[str(k)][name] = given.model_dump()
     return json.dumps(layers)
 
 
@@ -345,7 +344,7 @@ def made_by(device: str) -> dict[str, str]:
 
 def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -> str:
     """The numerics in force, every choice made, as one line."""
-    resolution = resolve(numerics, campaign.scene, shots.columns)
+    resolution = resolve(numerics, campaign.scene, shots)
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
@@ -357,7 +356,7 @@ def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -
 
 def _numbers_of(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -> dict[str, Any]:
     """The numerics in force as numbers, by the names of attributes."""
-    resolution = resolve(numerics, campaign.scene, shots.columns)
+    resolution = resolve(numerics, campaign.scene, shots)
     return {
         attr.PRECISION: "double" if is_double(campaign) else "single",
         attr.PATCHES_AXIAL: resolution.patches_axial,

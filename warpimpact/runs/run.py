@@ -197,7 +197,7 @@ def _solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
     plate = campaign.plate
     if not campaign.output.solid_reference or campaign.target.solid == plate:
         return None
-    elsewhere = (v.HIT_Y, v.HIT_Z, "layer_offset_y", "layer_offset_z")
+    elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
     conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
     alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     if alike and campaign.burst is None:

@@ -22,8 +22,9 @@ from .patterns import (
     TrianglePattern,
 )
 from .plate import Plate
+from .quantities import OF_THE_SCENE
 from .sampling import Sampler, make_shots
-from .scatter import OF_THE_SCENE, Scatter
+from .scatter import Scatter
 from .scene import Record, Scene
 from .shots import Hits, Impact, Shots
 from .symmetry import IDENTITY, Symmetry, symmetries_used

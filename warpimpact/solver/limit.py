@@ -138,7 +138,7 @@ def limit_thickness(
 
 def thickest(scene: Scene, layer: int) -> float:
     """The largest thickness of a layer that is tried [m]."""
-    return THICKEST * scene.target.plates[layer].thickness
+    return THICKEST * scene.target.layers[layer].thickness
 
 
 def _limits(
@@ -199,10 +199,9 @@ def _begun(scene: Scene, shots: Shots, sought: Sought) -> tuple[Search, Callable
     tolerance, highest, layer = sought.tolerance, sought.highest, sought.layer
     if sought.quantity == "velocity":
         return Search(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest), with_velocity
-    own = scene.target.plates[layer].thickness
-    start = shots.own("thickness", own) if layer == 0 else shots.own_of_layer("thickness", layer - 1, own)
-    search = Search(np.broadcast_to(start, len(shots)), 0.0, shots.velocity**2, tolerance, highest)
-    return search, partial(with_thickness, scene, layer)
+    start = np.broadcast_to(shots.own_of(scene.target, "thickness", layer), len(shots))
+    search = Search(start, 0.0, shots.velocity**2, tolerance, highest)
+    return search, partial(with_thickness, layer)
 
 
 def with_velocity(shots: Shots, values: Array) -> Shots:
@@ -210,14 +209,9 @@ def with_velocity(shots: Shots, values: Array) -> Shots:
     return replace(shots, velocity=values)
 
 
-def with_thickness(scene: Scene, layer: int, shots: Shots, values: Array) -> Shots:
+def with_thickness(layer: int, shots: Shots, values: Array) -> Shots:
     """Shots with thicknesses of a layer of their own [m], shape [shots]; layer 0 is the plate."""
-    if layer == 0:
-        return replace(shots, thickness=values)
-    columns = shots.layer_thickness
-    columns = np.full((len(shots), len(scene.target.layers)), np.nan) if columns is None else columns.copy()
-    columns[:, layer - 1] = values
-    return replace(shots, layer_thickness=columns)
+    return shots.with_own({"thickness": values}, layer)
 
 
 def short_steps(numerics: Numerics) -> Numerics:
@@ -248,10 +242,9 @@ def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
 
 
 def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
-    """Whether a plate, layer 0, or a layer behind it weakens in any shot."""
-    own = None if shots is None else shots.degradation if layer == 0 else shots.layer_degradation
-    column = own if own is None or layer == 0 else own[:, layer - 1]
-    return plate.degradation < 1.0 or (column is not None and bool((column < 1.0).any()))
+    """Whether a layer weakens in any shot."""
+    own = None if shots is None or not shots.differs("degradation", layer) else shots.columns["degradation"][:, layer]
+    return plate.degradation < 1.0 or (own is not None and bool((own < 1.0).any()))
 
 
 class _Kept:

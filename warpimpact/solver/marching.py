@@ -135,7 +135,7 @@ class March:
         if not (self.variant.layered and self.variant.degrades):
             return {}
         hit = float(self.shots.hit_y[-1]), float(self.shots.hit_z[-1])
-        return weakened(self.arrays, self.scene.target.plates, hit, scratch, self._windows(*self.cells))
+        return weakened(self.arrays, self.scene.target.layers, hit, scratch, self._windows(*self.cells))
 
     def body(self) -> MassProperties:
         """Mass properties of the last shot."""
@@ -152,7 +152,7 @@ class March:
     @cached_property
     def _material(self) -> Array:
         """Share of material about every node of the last shot's window."""
-        return material_about(self.scene.target.plate, *self.nodes(), self.arrays.grid.spacing)
+        return material_about(self.scene.target.layers[0], *self.nodes(), self.arrays.grid.spacing)
 
     def report(self, contact: Any) -> dict[str, NDArray[Any]]:
         """Compute the free flight to the stand-offs; return all values on the host, by the names of `Outcomes`."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
+from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.bending import Sections, sections_of
 from warpimpact.solver.blocks import SIMPLE_ONLY, block_window, check_layout, first_window
 from warpimpact.solver.materials import Materials, materials_of
@@ -114,7 +115,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     """
     core, target, record = scene.core, scene.target, scene.record
     _check_scheme(scene, shots, numerics)
-    weakening = weakens(target, shots.columns)
+    weakening = weakens(target, shots)
     resolution = resolve(scene, numerics, weakening)
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
@@ -122,7 +123,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     conditions = _conditions(scene, resolution, shots, materials)
     variant = _variant(resolution, scene, shots, degrades=any(weakening))
     grids = [
-        _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length) for plate in target.plates
+        _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length)
+        for plate in target.layers
     ]
     deepest = float(conditions["thickness"].max())
     cells = first_window(core, shots, deepest, grids[0].spacing, grids[0].reach, nodal=nodal)
@@ -160,13 +162,12 @@ def _check_scheme(scene: Scene, shots: Shots, numerics: Numerics) -> None:
 
 def _variant(resolution: Resolution, scene: Scene, shots: Shots, *, degrades: bool) -> Variant:
     """The build of the kernels that a scene needs."""
-    plates, interaction = scene.target.plates, scene.interaction
+    plates, interaction = scene.target.layers, scene.interaction
     return Variant(
         double=resolution.double,
         nodal=resolution.nodal,
         degrades=degrades,
-        rubs=any(plate.shear_coefficient > 0.0 for plate in plates)
-        or not shots.columns.keys().isdisjoint(("shear_coefficient", "layer_shear_coefficient")),
+        rubs=any(one.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, one in enumerate(plates)),
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
         rimmed=any(plate.size is not None for plate in plates),
         bends=scene.record.bending,
@@ -208,11 +209,11 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
     passage = _least(resolution.passage(one.thickness) for one in materials)
     times = (
         resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
-        for material, layer in zip(materials, target.plates, strict=True)
+        for material, layer in zip(materials, target.layers, strict=True)
     )
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
-    gaps = sum(layer.gap for layer in target.layers)
-    return {name: values for name, values in shots.columns.items() if not name.startswith("layer_")} | {
+    gaps = sum(target.gaps)
+    return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
         "thickness": depth,
         "mass": mass,
         "inertia_axial": scale * body.inertia_axial,

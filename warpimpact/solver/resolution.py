@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene, Target
+from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
 
 Array = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ class Resolution:
 
     def step_in(self, impact: Impact, target: Target) -> float:
         """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
-        return min(self.step_of(impact, plate) for plate in target.plates)
+        return min(self.step_of(impact, plate) for plate in target.layers)
 
 
 def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Resolution:
@@ -166,9 +166,9 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     Args:
         weakening: whether each layer weakens.
     """
-    core, plate, plates = scene.core, scene.target.plate, scene.target.plates
+    core, plate = scene.core, scene.target.layers[0]
     nodal, level = numerics.scheme == "nodal", LADDER[base_level(numerics)]
-    lengths = [one.degradation_length for one, does in zip(plates, weakening, strict=True) if does]
+    lengths = [one.degradation_length for one, does in zip(scene.target.layers, weakening, strict=True) if does]
     finest = min(lengths, default=plate.degradation_length)
     width = level.patch_width * finest if lengths else math.inf
     defaults: dict[str, Any] = {
@@ -179,7 +179,7 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     }
     if nodal:
         defaults = NODAL
-        if scene.target.layers:
+        if len(scene.target.layers) > 1:
             raise ValueError(ONE_PLATE)
         if plate.degradation_distance is not None:
             raise ValueError(
@@ -204,10 +204,12 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     )
 
 
-def weakens(target: Target, scattered: Collection[str] = ()) -> list[bool]:
-    """Whether each layer weakens, if the quantities of these names differ from shot to shot."""
-    names = ["degradation", *["layer_degradation"] * len(target.layers)]
-    return [one.degradation < 1.0 or name in scattered for one, name in zip(target.plates, names, strict=True)]
+def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
+    """Whether each layer weakens; one that differs from shot to shot may."""
+    return [
+        layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
+        for k, layer in enumerate(target.layers)
+    ]
 
 
 FASTEST_DECAY = 1.0e30

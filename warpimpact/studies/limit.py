@@ -86,7 +86,7 @@ class LimitMap(HitMap):
             raise CampaignError(str(error)) from None
         if quantity == "velocity":
             return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
-        plates = campaign.target.plates
+        plates = campaign.target.layers
         if layer >= len(plates):
             raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
         return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * plates[layer].thickness, layer)
@@ -192,7 +192,7 @@ class LimitMap(HitMap):
         """What turns the thickness of the layer into the areal density of the target; nothing of a velocity."""
         if self.quantity == "velocity":
             return {}
-        layer = target.plates[self.layer]
+        layer = target.layers[self.layer]
         return {
             attr.LIMIT_DENSITY: layer.areal_density / layer.thickness,
             attr.LIMIT_ELSEWHERE: target.areal_density - layer.areal_density,
@@ -202,13 +202,8 @@ class LimitMap(HitMap):
         """Shots, with their images, as they just perforate."""
         if self.quantity == "velocity":
             return with_velocity(shots, np.repeat(limits.shots.velocity, images))
-        if self.layer == 0:
-            tried = limits.shots.thickness
-        else:
-            columns = limits.shots.layer_thickness
-            tried = None if columns is None else columns[:, self.layer - 1]
-        assert tried is not None  # searched
-        return with_thickness(campaign.scene, self.layer, shots, np.repeat(tried, images))
+        tried = limits.shots.own_of(campaign.target, "thickness", self.layer)
+        return with_thickness(self.layer, shots, np.repeat(tried, images))
 
     def _search(self, scene: Scene, shots: Shots, numerics: Any, **how: Any) -> Limits:
         how |= {"numerics": numerics, "tolerance": self.tolerance}
@@ -233,7 +228,7 @@ def _promised(promise: LimitPromise) -> dict[str, Any]:
 
 def told_of(campaign: Campaign, quantity: str) -> str | None:
     """What a user should know of a campaign whose limits are asked for."""
-    if getattr(campaign.scatter, quantity) is None:
+    if (quantity, 0) not in campaign.scatter.given:
         return None
     return (
         f"the {quantity} scatters in this campaign, but a limit {quantity} does not depend on that: the scatter only "

@@ -39,7 +39,7 @@ def test_a_distribution_stands_in_the_place_of_its_value(tmp_path: Path) -> None
         (VELOCITY, f'{NORMAL}\nyaw = {{ distribution = "triangular", low = "-2 deg", mode = 0, high = "2 deg" }}'),
     )
     assert campaign.impact.velocity == 820.0  # the median
-    assert set(campaign.scatter.given) == {"velocity", "yaw"}
+    assert set(campaign.scatter.given) == {("velocity", 0), ("yaw", 0)}
     assert campaign.scatter.yaw.high == pytest.approx(math.radians(2))
     dataset = run(campaign, device="cpu")
     shots = campaign.sampler().shots(0, 64)
@@ -106,7 +106,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(
 
     dataset, shots = files.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
     for name in OWN:
-        assert np.array_equal(dataset[name], shots.columns[name])
+        assert np.array_equal(dataset[name], shots.columns[name].ravel())
         assert len(np.unique(dataset[name])) == count
     # The loss of translational energy exceeds the total loss by the rotational energy; each core has its own mass.
     energy = 0.5 * dataset.mass * (dataset.impact_velocity**2 - dataset.residual_velocity**2)

@@ -132,7 +132,7 @@ def test_kept_hits_follow_their_posterior() -> None:
 def test_hits_cover_the_cell_and_know_their_class(make_fit: FitMaker) -> None:
     fit = make_fit()
     scene = fit.scene_of(fit.shots[0])
-    plate, core = scene.target.plate, scene.core
+    plate, core = scene.target.layers[0], scene.core
     points = aim(fit.shots[0], plate, core, fit.sampling)
     assert len(points.group) == 4
     assert len(points.computed) == fit.sampling.hits
@@ -149,12 +149,12 @@ def test_a_place_with_its_uncertainty_is_drawn(make_fit: FitMaker) -> None:
     place = '{ y = "6 mm", z = { distribution = "normal", mean = "5 mm", std = "0.5 mm" } }'
     fit = make_fit(('hit = "between holes"', f"hit = {place}"))
     scene = fit.scene_of(fit.shots[0])
-    points = aim(fit.shots[0], scene.target.plate, scene.core, fit.sampling)
+    points = aim(fit.shots[0], scene.target.layers[0], scene.core, fit.sampling)
     assert (points.shots.hit_y == 6e-3).all()
     assert points.shots.hit_z.mean() == pytest.approx(5e-3, abs=5e-5)
     assert points.shots.hit_z.std() == pytest.approx(0.5e-3, rel=0.1)
     exact = make_fit(('hit = "between holes"', 'hit = { y = "6 mm", z = "5 mm" }'))
-    assert len(aim(exact.shots[0], scene.target.plate, scene.core, fit.sampling).shots) == 1
+    assert len(aim(exact.shots[0], scene.target.layers[0], scene.core, fit.sampling).shots) == 1
 
 
 def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMaker) -> None:
@@ -173,7 +173,7 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     (run,) = runs(fit, bench, points, device="cpu")
     values = {one.path: float(one.at(points[1:, i])[0]) for i, one in enumerate(fit.parameters)}
     scene = fit.scene_of(fit.shots[0], values)
-    assert scene.target.plate.degradation_interval == values["plate", "degradation_interval"]
+    assert scene.target.layers[0].degradation_interval == values["plate", "degradation_interval"]
     alone = simulate(scene, run.aim.computed, numerics=fit.numerics, device="cpu")
     again = run.outcomes.residual_velocity.reshape(2, -1, len(run.aim.group))[1, :, 0]
     assert again == pytest.approx(alone.residual_velocity, abs=0.02)

@@ -22,10 +22,8 @@ from warpimpact import (
     run,
 )
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.former import in_present_terms
 from warpimpact.campaign.plates import read_plates
 from warpimpact.results import files
-from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Hits, NoPattern
@@ -258,31 +256,6 @@ def test_numbers_of_angles_are_degrees_and_their_text_gives_them_again() -> None
     for model in (campaign.impact, campaign.plate.pattern, campaign.scatter, campaign.stop, campaign.numerics):
         assert model.model_copy() == model
         assert type(model).model_validate(model.model_dump()) == model
-
-
-def test_a_result_of_the_first_version_keeps_its_radians(folder: Path) -> None:
-    """It took numbers of angles for radians, and did not say so."""
-    text = HEAD + "[impact]\nvelocity = 825\nobliquity = 0.3\n[hits]\ncount = 2\n"
-    campaign = Campaign.from_text(text.replace("0.3", '"0.3 rad"'), name="text", folder=folder)
-    result = run(campaign, device="cpu")
-    del result.attrs["campaign_angles"]
-    result.attrs["campaign"] = text
-    assert replay(result, 1, folder=folder).attrs["agreement"] == "bit-identical"
-    result.attrs["campaign_angles"] = "degree"
-    with pytest.raises(ResultError, match="now give another shot than the stored one"):
-        replay(result, 1, folder=folder)
-
-
-def test_every_angle_of_a_former_text_is_marked() -> None:
-    text = ANGLES.replace("obliquity = 30", "obliquity = 0.3").replace("mean = 1, std = 0.5", "mean = 0.1, std = 0.05")
-    text = text.replace("values = [0, 2]", "values = [0, 0.2]")
-    campaign = Campaign.from_text(in_present_terms(text, "text"), name="text", folder=Path())
-    assert (campaign.impact.obliquity, campaign.impact.azimuth) == (0.3, 0.5)
-    assert (campaign.impact.pitch, campaign.scatter.pitch.std) == (0.1, 0.05)
-    assert (campaign.scatter.yaw.values, campaign.scatter.yaw.weights) == ((0.0, 0.2), (1, 3))
-    assert campaign.plate.pattern.rotation == 20
-    assert campaign.plate.pattern.holes[0].rotation == 10
-    assert campaign.stop.half_width == 2
 
 
 def test_angles_of_a_hit_list_are_degrees(folder: Path) -> None:

@@ -163,7 +163,7 @@ def test_a_single_setting_promises_nothing() -> None:
 
 # Stops some of the cores, and lets others go on slowly.
 BASE = Layer(thickness=6.6e-3, resistance=5e9, gap=40e-3, shear_coefficient=0.08)
-STOPPING = SCENE.model_copy(update={"target": Target(plate=PLATE, layers=(BASE,))})
+STOPPING = SCENE.model_copy(update={"target": Target(layers=(PLATE, BASE))})
 
 
 def test_draft_tells_errors_that_other_hits_keep_where_a_base_stops_some_of_them() -> None:
