@@ -40,9 +40,8 @@ from ..scene.scatter import check_range
 from ..scene.symmetry import check_layers, check_scatter
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
-from ..solver.bending import check_bending
 from ..solver.blocks import check_layout
-from ..solver.resolution import ONE_PLATE
+from ..solver.resolution import ONE_PLATE, check_scheme
 from .plausible import warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
@@ -309,7 +308,7 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _core_has_a_bending_moment(self) -> Self:
         self.output.check_bending(self.core)
-        check_bending(self.output, self.numerics)
+        check_scheme(self.output, self.numerics)
         return self
 
     @model_validator(mode="after")

@@ -10,7 +10,7 @@ from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
 from .paths import check_place, check_suffix
 from .plain import say
-from .progress import show_standing, warn
+from .progress import show_run, warn
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -57,7 +57,7 @@ def _run(arguments: argparse.Namespace) -> int:
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
-    with memory_told(arguments.campaign), show_standing() as progress:
+    with memory_told(arguments.campaign), show_run() as progress:
         run_to_file(
             campaign,
             output,

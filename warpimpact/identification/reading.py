@@ -29,9 +29,9 @@ from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
-from warpimpact.solver.bending import check_bending
 from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
+from warpimpact.solver.resolution import check_scheme
 
 _TABLES = ("core", "plate", "interaction")
 _KEYS = ("title", *_TABLES, "record", "numerics", "prior", "discrepancy", "selection", "sampling", "shot")
@@ -73,7 +73,7 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     parameters = read_priors(prior, tables, name)
     tables = with_medians(tables, prior, parameters)
     record = _model(Record, data.get("record", {}), f"{name}: record")
-    numerics = _model(Numerics, {"fidelity": "draft"} | _table(data, "numerics", name), f"{name}: numerics")
+    numerics = _model(Numerics, {"level": 0} | _table(data, "numerics", name), f"{name}: numerics")
     shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
     selection = tuple(_condition(one, f"{name}: selection") for one in _selection(data, name))
     if any(one.variable == "bending_stress" for one in selection):
@@ -236,7 +236,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
         where = f"{name}: shot[{place}]"
         try:
             scene = fit.scene_of(shot)
-            check_bending(fit.record, fit.numerics)
+            check_scheme(fit.record, fit.numerics)
         except ValueError as error:
             told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
             raise FitError(f"{where}: {told}") from None

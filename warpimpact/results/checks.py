@@ -20,7 +20,7 @@ _LABELS = (v.AXIS, v.QUATERNION, v.SETTING, v.SCHEME, v.STUDY_LEVEL)
 _TEXTS = (
     *(attr.TITLE, attr.HISTORY, attr.REFERENCES, attr.CAMPAIGN, attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     *(attr.DEVICE, attr.NUMERICS, attr.NUMERICS_GIVEN, attr.FINGERPRINT, attr.SAMPLING, attr.SYMMETRIES, attr.CORE),
-    *(attr.MATERIAL, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
+    *(attr.MATERIAL, attr.RESOLUTION, attr.ACCURACY, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
     *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.LAYERS, attr.PRECISION, attr.MACHINE),
     *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION, attr.SWEEP),
     attr.BURST,
@@ -28,7 +28,7 @@ _TEXTS = (
 )
 _TABLES = (
     *(attr.SWEEP, attr.CORE, attr.PLATE, attr.IMPACT, attr.MATERIAL, attr.LAYERS, attr.NUMERICS_GIVEN),
-    *(attr.RESOLUTION, attr.BURST),
+    *(attr.RESOLUTION, attr.ACCURACY, attr.BURST),
 )
 """Texts that are JSON objects."""
 _COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS, attr.SHOTS_AT_A_PLATE)
@@ -37,7 +37,7 @@ _NUMBERS = (
     *(attr.PLATE_THICKNESS, attr.FAILED_SHARE, attr.ESTIMATE, attr.CONFIDENCE, attr.HIT),
     *(attr.LIMIT_LAYER, attr.LIMIT_DENSITY, attr.LIMIT_ELSEWHERE, attr.LIMIT_TOLERANCE, attr.LIMIT_HIGHEST),
     *(attr.SOLID_LIMIT_TIME, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST),
-    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.DEPTH_ERROR_P90),
+    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.DEPTH_ERROR, attr.LIMIT_ERROR),
     *(attr.GRID_SPACING, attr.TIME_STEP),
     *(attr.PATCHES_AXIAL, attr.PATCHES_AROUND),
 )
@@ -50,7 +50,8 @@ _TOGETHER = (
     (attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS, attr.CONFIDENCE),
     (attr.COMPUTED_HITS, attr.SYMMETRIES),
     (attr.BURST, attr.SHOTS_AT_A_PLATE),
-    (attr.PROMISE_KEPT, attr.RESOLUTION, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.NUMERICS_GIVEN),
+    (attr.PROMISE_KEPT, attr.RESOLUTION, attr.ACCURACY, attr.NUMERICS_GIVEN),
+    (attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.PROMISE_KEPT),
 )
 """Attributes of which the first needs the others."""
 

@@ -165,7 +165,7 @@ def pilot_of_limits(
         trying(level)
         return limits(scene, pilot, sought, at_level(level, numerics), worker).value
 
-    return pilot_limits(limits_at, numerics, squared=sought.quantity == "thickness")
+    return pilot_limits(limits_at, numerics, sought.quantity)
 
 
 def limits(

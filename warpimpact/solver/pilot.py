@@ -14,7 +14,7 @@ from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
-from warpimpact.solver.simulate import LayeredOutcomes, Outcomes
+
+if TYPE_CHECKING:
+    from warpimpact.solver.simulate import Outcomes
 
 Array = NDArray[np.float64]
 
@@ -101,10 +103,19 @@ class HitErrors(Found):
 
 @dataclass(frozen=True)
 class LimitErrors(Found):
-    """Upper estimate of the errors of limits [m/s] or [m]; infinite where the pilot could not tell."""
+    """Upper estimate of the errors of limits.
+
+    Attributes:
+        error: of velocities [m/s] or of thicknesses [m]; infinite where the pilot could not tell.
+        quantity: "velocity" or "thickness".
+    """
 
     error: float
-    errors: str
+    quantity: str
+
+    @property
+    def errors(self) -> str:
+        return limit_error_text(self.error, self.quantity)
 
 
 def hits_text(share: float) -> str:
@@ -118,17 +129,22 @@ def errors_text(velocity: float, tilt: float, depth: float = math.nan) -> str:
     return errors if math.isnan(depth) else f"{errors} and {upper_digits(1e3 * depth)} mm of depth"
 
 
+def limit_error_text(error: float, quantity: str) -> str:
+    """Error of a limit velocity [m/s] or of a limit thickness [m]."""
+    return f"{upper_digits(error)} m/s" if quantity == "velocity" else f"{upper_digits(1e3 * error)} mm"
+
+
 def upper_digits(error: float) -> str:
     """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
     up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count
     return f"{float(up):g}"
 
 
-def accuracy_text(accuracy: Accuracy) -> str:
-    """What is asked for of the outcomes."""
-    parts = [f"{accuracy.residual_velocity:g} m/s"] if math.isfinite(accuracy.residual_velocity) else []
-    parts += [f"{math.degrees(accuracy.tilt):g} deg"] if math.isfinite(accuracy.tilt) else []
-    return f"{' and '.join(parts)} for {hits_text(accuracy.share)}"
+def accuracy_text(velocity: float, tilt: float, share: float) -> str:
+    """Errors in residual velocity [m/s] and tilt [rad] that are asked for; an infinite one is not."""
+    parts = [f"{velocity:g} m/s"] if math.isfinite(velocity) else []
+    parts += [f"{math.degrees(tilt):g} deg"] if math.isfinite(tilt) else []
+    return f"{' and '.join(parts)} for {hits_text(share)}"
 
 
 def pilot_size(accuracy: Accuracy) -> int:
@@ -184,13 +200,13 @@ def pilot_hits(outcomes_at: Callable[[int], Outcomes], pilot: Shots, numerics: N
     return found or HitErrors(at_level(first, numerics), False, accuracy.share, math.inf, math.inf)
 
 
-def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, *, squared: bool) -> LimitErrors:
+def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:
     """Find the coarsest level whose limits have the accuracy that is asked for.
 
     Args:
         limits_at: the limits of a pilot's shots on a level of LADDER.
         numerics: as in `pilot_hits`.
-        squared: whether the limit goes with the square of the velocity, as a thickness does.
+        quantity: "velocity", or "thickness", which goes with the square of the velocity.
 
     Returns:
         The level that keeps the promise. If none does: the coarsest one on which half of the limits are within it; if
@@ -202,12 +218,11 @@ def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, *, squar
     asked, usual = numerics.asked, PRESETS["draft"].limit
     if asked.limit is None or usual is None:
         raise ValueError("accuracy: needs limit, the error of a limit as a share of the median limit")
-    share, allowed_share = asked.share, (2.0 if squared else 1.0) * asked.limit
+    share, allowed_share = asked.share, (1.0 if quantity == "velocity" else 2.0) * asked.limit
     first = min(coarsest_level(usual / asked.limit), FINEST_LIMIT)
 
     def found_at(index: int, error: float, allowed: float) -> LimitErrors:
-        shown = f"{upper_digits(1e3 * error)} mm" if squared else f"{upper_digits(error)} m/s"
-        return LimitErrors(at_level(index, numerics), error <= allowed, share, error, shown)
+        return LimitErrors(at_level(index, numerics), error <= allowed, share, error, quantity)
 
     def judge(index: int, coarse: Array, fine: Array, margin: float) -> tuple[LimitErrors, bool]:
         change, half, typical = _change(coarse, fine, share)
@@ -327,6 +342,8 @@ def changes(coarse: Outcomes, fine: Outcomes, impact: Array | None = None) -> tu
         neither = np.isnan(last[0]) & np.isnan(last[1])
         tilt = np.where(neither, 0.0, weight * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
     depth = np.full(len(velocity), math.nan)
+    from warpimpact.solver.simulate import LayeredOutcomes
+
     if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
         before, after = (np.nan_to_num(one.layer_residual_velocity) for one in (coarse, fine))
         apart = _weight(before, after, None if impact is None else impact[:, None]) * np.abs(after - before)

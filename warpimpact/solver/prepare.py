@@ -17,7 +17,7 @@ from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.bending import Sections, sections_of
 from warpimpact.solver.blocks import SIMPLE_ONLY, block_window, check_layout, first_window
 from warpimpact.solver.materials import Materials, materials_of
-from warpimpact.solver.resolution import Resolution, resolve, weakens
+from warpimpact.solver.resolution import Resolution, check_scheme, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
 from warpimpact.solver.tile import FINER, FINEST, Tile, tent_taps, tile_of
 
@@ -105,16 +105,18 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     """Make every choice for some shots.
 
     Args:
-        numerics: an accuracy stands for the coarsest level at which it would be looked for.
+        numerics: those of a resolution; for an accuracy a pilot finds it first.
         traced: leave room for the history of every shot.
 
     Raises:
-        ValueError: the numerics cannot compute the bending moment that the scene records, several shots at one plate or
-            layers, or the block layout does not compute the scene.
+        ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
+            several shots at one plate or layers; or the block layout does not compute the scene.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
     core, target, record = scene.core, scene.target, scene.record
-    _check_scheme(scene, shots, numerics)
+    if numerics.explicit is None:
+        raise ValueError("got numerics that name an accuracy, for which a pilot finds the resolution, but no pilot did")
+    check_scheme(record, numerics, shots.at_a_plate)
     weakening = weakens(target, shots)
     resolution = resolve(scene, numerics, weakening)
     nodal, around = resolution.nodal, resolution.patches_around
@@ -149,15 +151,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
         layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
         ahead=record.ahead(core),
     )
-
-
-def _check_scheme(scene: Scene, shots: Shots, numerics: Numerics) -> None:
-    """Refuse numerics that cannot compute what the scene records, or several shots at one plate."""
-    wanted = (
-        "bending = true" if scene.record.bending else "several shots at one plate" if shots.at_a_plate > 1 else None
-    )
-    if numerics.scheme == "nodal" and wanted is not None:
-        raise ValueError(f'got {wanted} beside numerics.scheme = "nodal", but it must be "consistent"')
 
 
 def _variant(resolution: Resolution, scene: Scene, shots: Shots, *, degrades: bool) -> Variant:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import Impact, Numerics, Plate, Record, Scene, Shots, Target
 
 Array = NDArray[np.float64]
 
@@ -158,6 +158,18 @@ class Resolution:
     def step_in(self, impact: Impact, target: Target) -> float:
         """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
         return min(self.step_of(impact, plate) for plate in target.layers)
+
+
+def check_scheme(record: Record, numerics: Numerics, at_a_plate: int = 1) -> None:
+    """Refuse numerics that cannot compute what is recorded, or several shots at one plate.
+
+    Raises:
+        ValueError: names the scheme.
+    """
+    wanted = {"bending = true": record.bending, "several shots at one plate": at_a_plate > 1}
+    for what, is_wanted in wanted.items():
+        if is_wanted and numerics.scheme == "nodal":
+            raise ValueError(f'got {what} beside numerics.scheme = "nodal", but it must be "consistent"')
 
 
 def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Resolution:

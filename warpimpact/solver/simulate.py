@@ -242,19 +242,19 @@ def _outcomes(march: March, contact: Any) -> Outcomes:
     return kinds[march.variant.bends, "broken" in report, march.variant.layered](**report)
 
 
-def trace(scene: Scene, shots: Shots, *, numerics: Numerics | None = None) -> list[Array]:
+def trace(scene: Scene, shots: Shots, *, numerics: Numerics) -> list[Array]:
     """Histories of shots on the CPU: one array [steps + 1, WIDTH] per shot (kernels/trace.py)."""
     march = _traced(scene, shots, numerics)
     return march.traces(march.march())
 
 
-def replay(scene: Scene, shots: Shots, *, numerics: Numerics | None = None, snapshots: int = 6) -> Replay:
+def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6) -> Replay:
     """Compute one shot again on the CPU, with its history. The outcome equals that of `simulate` on the same CPU, bit
     for bit.
 
     Args:
         shots: the shot, after those that hit the same plate before it.
-        numerics: those with which `simulate` computed it; of an accuracy, what its pilot found.
+        numerics: the resolution with which `simulate` computed it.
         snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. Each computes
             the shot again up to there; 0 computes no field of any layer.
     """
@@ -288,5 +288,5 @@ def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
     return last._replace(share=np.stack([share(one.get(number)) for one in left]))
 
 
-def _traced(scene: Scene, shots: Shots, numerics: Numerics | None) -> March:
-    return March(prepare(scene, shots, numerics or Numerics(), traced=True), find_device("cpu"))
+def _traced(scene: Scene, shots: Shots, numerics: Numerics) -> March:
+    return March(prepare(scene, shots, numerics, traced=True), find_device("cpu"))
