@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .campaign.stop import Stop
     from .campaign.text import CampaignError
     from .export.table import to_dataframe
+    from .records.outcomes import Outcomes
     from .results.files import OutputError, ResultError, open_result
     from .runs.cluster import cluster_team
     from .runs.replay import replay
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
     )
     from .solver.device import DeviceError
     from .solver.limit import limit_thickness, limit_velocity
-    from .solver.simulate import Outcomes, simulate
+    from .solver.simulate import simulate
 
     __version__: str
 
@@ -112,7 +113,7 @@ _HOMES = {
     "ClusterError": ".runs.team",
     "Comparison": ".analysis.comparison",
     "DeviceError": ".solver.device",
-    "Outcomes": ".solver.simulate",
+    "Outcomes": ".records.outcomes",
     "Output": ".campaign.campaign",
     "OutputError": ".results.files",
     "ResultError": ".results.files",

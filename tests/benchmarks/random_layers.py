@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from random_scenes import Case, _pattern, draw, p90
 
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import (
     Burst,
     BurstSampler,
@@ -39,7 +40,7 @@ from warpimpact.scene import (
 )
 from warpimpact.solver.promise import PROMISES, changes, keep
 from warpimpact.solver.resolution import LADDER, Fidelity
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 

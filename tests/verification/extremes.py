@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import (
     AnyPattern,
     CirclePattern,
@@ -139,8 +140,8 @@ def found(extreme: Extreme) -> Found:
     numerics = Numerics(level=0, precision=precision)
     march = March(prepare(scene, shots, numerics, traced=True), find_device("cpu"), threads=1)
     contact = march.march()
-    report, traces = march.report(contact), march.traces(contact)
-    statuses = [Status(int(code)) for code in report["status"]]
+    report, traces = Outcomes.collected(scene, shots, march.report(contact)), march.traces(contact)
+    statuses = [Status(int(code)) for code in report.status]
     properties = scene.core.mass_properties
     rises, steep, gains, stretches = [0.0], [0.0], [0.0], [0.0]
     epsilon = np.finfo(np.float32 if precision == "single" else np.float64).eps
@@ -181,16 +182,18 @@ def _steepness(history: History, properties: MassProperties) -> NDArray[np.float
     return np.maximum(after, np.append(after[0], after[:-1]))
 
 
-def _defined(report: dict[str, Any], shot: int, status: Status) -> bool:
+def _defined(report: Outcomes, shot: int, status: Status) -> bool:
     """Whether an outcome has the values that its status promises, and no other ones."""
-    scalars = np.array([report[name][shot] for name in ("residual_velocity", "energy_loss", "contact_duration")])
-    seen = np.isfinite(report["tilt"][shot]).all()
+    scalars = np.array(
+        [getattr(report, name)[shot] for name in ("residual_velocity", "energy_loss", "contact_duration")]
+    )
+    seen = np.isfinite(report.tilt[shot]).all()
     if status.failed:
         return bool(np.isnan(scalars).all() and not seen)
     passed = status is Status.PERFORATED
     return bool(
         np.isfinite(scalars).all()
-        and np.isfinite(report["angular_velocity"][shot]).all()
+        and np.isfinite(report.angular_velocity[shot]).all()
         and (seen == passed or status is Status.MISSED)
     )
 

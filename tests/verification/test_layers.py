@@ -1,6 +1,5 @@
 """Targets of several layers: closed forms, and targets that say the same thing in two ways (docs/model.md §6.10)."""
 
-from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -10,9 +9,9 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from warpimpact.kernels.status import LayerStatus, Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, NoPattern, Plate, Target
 from warpimpact.solver import arrays
-from warpimpact.solver.simulate import LayeredOutcomes, Outcomes
 
 from . import references
 from .scenes import PAPER_CORE, SLOTS, histories, paper_plate, scattered_hits, shots_at, simulate, solid_plate
@@ -30,11 +29,9 @@ def layer(plate: Plate, **changes: Any) -> Layer:
     return Layer(**{name: getattr(plate, name) for name in plate.model_fields_set} | changes)
 
 
-def layered(plate: Plate, *layers: Layer, **shots: Any) -> LayeredOutcomes:
+def layered(plate: Plate, *layers: Layer, **shots: Any) -> Outcomes:
     """Outcomes of a target."""
-    outcomes = simulate(Target(layers=(plate, *layers)), **shots)
-    assert isinstance(outcomes, LayeredOutcomes)
-    return outcomes
+    return simulate(Target(layers=(plate, *layers)), **shots)
 
 
 def assert_alike(got: Outcomes, expected: Outcomes, velocity: float, angle: float) -> None:
@@ -215,7 +212,7 @@ def test_mirror_image(device: str) -> None:
     scene: dict[str, Any] = {"device": device, "precision": "double"}
     plain = simulate(STACK, shots_at(Y, Z, **TURNED), **scene)
     got = simulate(mirrored(STACK), shots_at(-Y, Z, obliquity=15.0, azimuth=140.0, pitch=4.0, yaw=6.0), **scene)
-    assert_alike(got, replace(plain, yaw=-plain.yaw), velocity=1e-9, angle=1e-9)
+    assert_alike(got, plain.assign(yaw=-plain.yaw), velocity=1e-9, angle=1e-9)
     np.testing.assert_array_equal(got.layer_status, plain.layer_status)
     assert got.layer_tilt == pytest.approx(plain.layer_tilt, abs=1e-10, nan_ok=True)
 

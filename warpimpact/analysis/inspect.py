@@ -85,8 +85,9 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
     """Means and quantiles of the cores that passed the plate, or the target, with intervals."""
     what = "target" if v.LAYER_STATUS in dataset else "plate"
-    if any(passed(part).any() for part in slices(dataset[[v.STATUS]])):
-        yield f"{f'passed the {what}':<43}{'':>10}   95 % interval"
+    if count := sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])):
+        of_how_many = f"{count} of {dataset.sizes['hit']} hits passed the {what}"
+        yield f"{of_how_many:<43}{'':>10}   95 % interval"
     else:
         yield f"no core passed the {what}"
     shown = [name for name in v.shown_by("inspect") if name in dataset]

@@ -169,14 +169,14 @@ def summary_text(dataset: Result) -> str:
         rows.append(_count_row("broken", result.broken, hits))
     rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<18}  spread")
     rows += [
-        _spread_row("residual velocity", result.residual_velocity, "m/s"),
-        _spread_row("deflection", result.deflection, "°"),
+        _spread_row("residual velocity", result.residual_velocity, "m/s", hits),
+        _spread_row("deflection", result.deflection, "°", hits),
     ]
-    rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°") for standoff, tilt in result.tilt.items()]
+    rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°", hits) for standoff, tilt in result.tilt.items()]
     if (depth := result.base_depth) is not None and depth.count:
         shown = replace(depth, mean=1e3 * depth.mean, standard_deviation=1e3 * depth.standard_deviation)
         low, high = depth.interval
-        rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm"))
+        rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm", hits))
     return "\n".join([*rows, *stop_lines(dataset)])
 
 
@@ -209,8 +209,9 @@ def _count_row(meaning: str, count: int, hits: int) -> str:
     return f"{meaning.replace('_', ' '):<20}{count:>8d}   {count / hits:.1%}"
 
 
-def _spread_row(name: str, spread: Spread, unit: str) -> str:
+def _spread_row(name: str, spread: Spread, unit: str, hits: int) -> str:
     if spread.count == 0:
         return f"{name:<20}{'-':>8}   no core behind the plate"
     interval = interval_text(*spread.interval, "{:.2f}".format)
-    return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}"
+    some = f"   of {spread.count} hits" if spread.count < hits else ""
+    return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}{some}"

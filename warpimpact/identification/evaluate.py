@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.hits import Aim, Place, aim
 from warpimpact.identification.likelihood import Data, Score, score
-from warpimpact.identification.measured import WithLimit
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.solver.limit import limit_velocity
-from warpimpact.solver.simulate import Outcomes, simulate
-from warpimpact.solver.unfold import unfolded
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -85,7 +84,7 @@ def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iter
             of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.layers[0])
             shots = repeated(targets.computed, of_sets, len(some))
             outcomes = _outcomes(fit, bench, scene, shots, device)
-            yield Run(alike[some], scene, targets, unfolded(outcomes, targets.group))
+            yield Run(alike[some], scene, targets, outcomes.unfolded(targets.group))
 
 
 def _alike(points: Array) -> NDArray[np.int64]:
@@ -106,8 +105,7 @@ def _outcomes(fit: Fit, bench: Bench, scene: Scene, shots: Shots, device: str) -
     limits = limit_velocity(scene, shots, numerics=fit.numerics, device=device)
     other = fit.selection or any(shot.status for shot in measured) or not all(one.is_limit for one in observations)
     outcomes = simulate(scene, shots, numerics=fit.numerics, device=device) if other else limits.outcomes
-    plain = {one.name: getattr(outcomes, one.name) for one in fields(Outcomes)}
-    return WithLimit(**plain, limit_velocity=limits.value)
+    return outcomes.assign(limit_velocity=limits.value)
 
 
 def _as_columns(fit: Fit, own: Mapping[Path, Array]) -> dict[Path, Array]:

@@ -56,13 +56,6 @@ _TOGETHER = (
 """Attributes of which the first needs the others."""
 
 
-_WHOLE = (
-    v.LAYER_VARIABLES + v.LAYER_FACES,
-    v.LAYER_COORDINATES + v.LAYER_STANDOFF_VARIABLES,
-    v.OUTLINE_VARIABLES,
-    tuple(v.SOLID_VARIABLES),
-)
-"""Variables of which a result has all or none."""
 _OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)
 """Attributes of a study."""
 _DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
@@ -172,7 +165,7 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
             continue
         if one in dataset.variables and dataset.variables[one].dims != one.dims:
             return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
-    for names in _WHOLE:
+    for names in v.whole_groups():
         there = [name for name in names if name in dataset.variables]
         if there and (missing := [name for name in names if name not in there]):
             return f'it has no variable "{missing[0]}" beside "{there[0]}"'

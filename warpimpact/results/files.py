@@ -203,16 +203,8 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         else:
             if found := unusable(dataset):
                 raise ResultError(f"{path}: {found}")
-            optional = (
-                *v.SCATTER_VARIABLES,
-                *v.POSTERIOR_VARIABLES,
-                *v.BURST_VARIABLES,
-                *v.LAYER_VARIABLES,
-                *v.LAYER_STANDOFF_VARIABLES,
-                *v.LAYER_FACES,
-                *(name for names in v.GROUPS.values() for name in names),
-            )
-            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
+            in_groups = (name for names in v.GROUPS.values() for name in names)
+            _check(dataset, path, (*v.COORDINATES, *v.hit_variables(), *in_groups))
         yield dataset
 
 

@@ -6,7 +6,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.posterior import Posterior
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import solid_coordinates
 from warpimpact.results.table import Table
@@ -24,7 +25,7 @@ from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import Found, HitErrors, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
-from warpimpact.solver.simulate import Outcomes, build, computed, pilot_of
+from warpimpact.solver.simulate import build, computed, pilot_of
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
@@ -173,10 +174,4 @@ def _outcomes(
         places.append(which)
         if progress is not None:
             progress(sum(map(len, places)), len(shots))
-    return _joined(parts, np.argsort(np.concatenate(places), kind="stable"))
-
-
-def _joined(parts: Sequence[Outcomes], order: NDArray[np.int64]) -> Outcomes:
-    """Outcomes one after the other, then in this order."""
-    columns = {one.name: [getattr(part, one.name) for part in parts] for one in fields(parts[0])}
-    return type(parts[0])(**{name: np.concatenate(values)[order] for name, values in columns.items()})
+    return Outcomes.joined(parts)[np.argsort(np.concatenate(places), kind="stable")]

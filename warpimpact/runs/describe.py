@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import to_table
@@ -19,8 +20,6 @@ from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.pilot import Found
 from warpimpact.solver.resolution import Resolution
-from warpimpact.solver.simulate import Outcomes
-from warpimpact.solver.unfold import unfolded
 
 
 def described(
@@ -37,7 +36,7 @@ def described(
     table = to_table(
         campaign.scene,
         shots,
-        unfolded(outcomes, campaign.symmetries),
+        outcomes.unfolded(campaign.symmetries),
         period=campaign.hits.covered(campaign.plate),
         attributes={**_campaign(campaign), **_numerics(campaign, resolution), **attributes},
         double=is_double(campaign),

@@ -93,14 +93,14 @@ class Passages:
     """How the cores of some shots left each layer (kernels/layers.py), on the device.
 
     Args:
-        free: whether a core flies free at each stand-off behind each layer, shape [layers, stand-offs].
 
     Attributes:
         filled: the struct that the march fills; empty if the plate stands alone.
+        free: whether a core flies free at each stand-off behind each layer, shape [layers, stand-offs].
     """
 
     def __init__(self, stage: Any, shots: int, free: NDArray[np.bool_], variant: Variant, device: Any) -> None:
-        self._stage, self._free, self._layered, self._device = stage, free, variant.layered, device
+        self._stage, self.free, self._layered, self._device = stage, free, variant.layered, device
         self._layers, standoffs = free.shape
         self.filled = stage.Passage()
         shapes = (shots,), (shots, self._layers), (shots, self._layers, standoffs)
@@ -114,22 +114,3 @@ class Passages:
         for name, variable in self._stage.Stack.vars.items() if self._layered else ():
             setattr(stack, name, wp.empty(slots * self._layers, dtype=variable.type.dtype, device=self._device))
         return stack
-
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """What was filled, by the names of `LayeredOutcomes`."""
-        if not self._layered:
-            return {}
-        values = {name: getattr(self.filled, name).numpy() for name in self._stage.Passage.vars}
-        at_standoffs = {
-            f"layer_{name}": np.where(self._free, values[name].astype(np.float64), np.nan)
-            for name in ("standoff_tilt", "standoff_pitch", "standoff_yaw")
-        }
-        return at_standoffs | {
-            "layer_status": values["status"].astype(np.int8),
-            "layer_residual_velocity": values["velocity"].astype(np.float64),
-            "layer_tilt": values["tilt"].astype(np.float64),
-            "layer_time": values["time"].astype(np.float64),
-            "layer_deflection": values["deflection"].astype(np.float64),
-            "stopped_in": values["stopped_in"].astype(np.int8),
-            "depth": values["depth"].astype(np.float64),
-        }

@@ -6,20 +6,21 @@ All shots are searched together, one run of each at a time (solver/limit_search.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit_search import Search
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import LimitErrors, limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
-from warpimpact.solver.simulate import Outcomes, computed, spread
+from warpimpact.solver.simulate import computed, spread
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
@@ -259,18 +260,5 @@ class _Kept:
         """Keep the runs in some places of `which`; the first ones are of all shots."""
         if not hasattr(self, "outcomes"):
             self.outcomes = ended
-        self.outcomes = with_rows(self.outcomes, which[places], picked(ended, places))
+        self.outcomes = self.outcomes.with_rows(which[places], ended[places])
         self.values[which[places]] = tried[places]
-
-
-def picked(outcomes: Outcomes, which: NDArray[np.int64]) -> Outcomes:
-    """The rows of some shots."""
-    return replace(outcomes, **{field.name: getattr(outcomes, field.name)[which] for field in fields(outcomes)})
-
-
-def with_rows(outcomes: Outcomes, which: NDArray[np.int64], other: Outcomes) -> Outcomes:
-    """Copies of the columns, with those of some shots from other outcomes."""
-    columns = {field.name: getattr(outcomes, field.name).copy() for field in fields(outcomes)}
-    for name, column in columns.items():
-        column[which] = getattr(other, name)
-    return replace(outcomes, **columns)

@@ -22,8 +22,8 @@ from warpimpact.kernels import free_flight
 from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
+from warpimpact.records.group import Returned
 from warpimpact.scene import MassProperties
-from warpimpact.solver.bending import bending_columns
 from warpimpact.solver.bursts import (
     bytes_of,
     chunk_of,
@@ -34,7 +34,6 @@ from warpimpact.solver.bursts import (
     whole_plates,
 )
 from warpimpact.solver.device import cores, free_memory, halving, load
-from warpimpact.solver.exits import exits
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.layering import Passages, Weakened, deep_cells, material_about, nodes_about, weakened
 from warpimpact.solver.prepare import Prepared
@@ -154,10 +153,10 @@ class March:
         """Share of material about every node of the last shot's window."""
         return material_about(self.scene.target.layers[0], *self.nodes(), self.arrays.grid.spacing)
 
-    def report(self, contact: Any) -> dict[str, NDArray[Any]]:
-        """Compute the free flight to the stand-offs; return all values on the host, by the names of `Outcomes`."""
-        count, record = len(self.shots), self.scene.record
-        flight, standoffs = free_flight.build(self.variant), np.array(record.standoffs, dtype=np.float64)
+    def report(self, contact: Any) -> Returned:
+        """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
+        count, standoffs = len(self.shots), np.array(self.scene.record.standoffs, dtype=np.float64)
+        flight = free_flight.build(self.variant)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
         wp.launch(
             flight.kernel,
@@ -166,16 +165,8 @@ class March:
             outputs=[report],
             device=self.device,
         )
-        values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
-        status = contact.status.numpy().astype(np.int8)
-        values |= exits(contact, status)
-        bent = self._bending(status) if self.variant.bends else {}
-        return {"status": status} | values | bent | self.passages.columns()
-
-    def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
-        """What is known of the bending of every shot."""
-        breaks = self.scene.core.strength is not None or self.shots.strength is not None
-        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks)
+        status, passages = contact.status.numpy().astype(np.int8), self.passages
+        return Returned(status, contact, report, self.bending.numpy(), passages.filled, passages.free)
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""

@@ -14,17 +14,16 @@ from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
-
-if TYPE_CHECKING:
-    from warpimpact.solver.simulate import Outcomes
 
 Array = NDArray[np.float64]
 
@@ -342,9 +341,7 @@ def changes(coarse: Outcomes, fine: Outcomes, impact: Array | None = None) -> tu
         neither = np.isnan(last[0]) & np.isnan(last[1])
         tilt = np.where(neither, 0.0, weight * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
     depth = np.full(len(velocity), math.nan)
-    from warpimpact.solver.simulate import LayeredOutcomes
-
-    if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
+    if LAYER_RESIDUAL_VELOCITY in coarse:
         before, after = (np.nan_to_num(one.layer_residual_velocity) for one in (coarse, fine))
         apart = _weight(before, after, None if impact is None else impact[:, None]) * np.abs(after - before)
         velocity = np.maximum(velocity, apart.max(axis=1))

@@ -19,7 +19,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.limits import solid_limits, with_limits, with_solid_limits
+from warpimpact.results.limits import solid_limits, with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, pilot_shots
@@ -121,10 +121,10 @@ class LimitMap:
         }
         put = self._put(campaign, task.shots, searched, images)
         resolution = prepare(scene, put[:1], short_steps(numerics)).resolution
-        table = described(campaign, put, searched.outcomes, resolution, attributes)
+        found_limits = {name: getattr(searched, name.field) for name in v.LIMITS[sought.quantity]}
+        table = described(campaign, put, searched.outcomes.assign(**found_limits), resolution, attributes)
         begun, *_ = table.attrs[attr.HISTORY].split()
         table.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {sought.quantity}"
-        table = with_limits(table, sought.quantity, searched, images)
         return table if task.solid is None else self._beside_solid(campaign, table, task.solid, numerics, worker)
 
     def _beside_solid(

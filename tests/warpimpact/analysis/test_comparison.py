@@ -102,7 +102,7 @@ def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) 
     best = next(line for line in lines if line.startswith("residual energy fraction, mean  "))
     assert best.endswith("   one and other")
     assert next(line for line in lines if line.startswith("P(stopped)  ")).endswith("   cannot be told apart")
-    ranking = lines[lines.index("P(inclined > 30° at 130 mm, or stopped); higher is better") + 2 :]
+    ranking = lines[lines.index("P(inclined > 30° at 130 mm, either end first, or stopped); higher is better") + 2 :]
     assert [line.split()[:2] for line in ranking[:3]] == [["1", "one"], ["1", "other"], ["3", "worst"]]
 
 
@@ -294,7 +294,7 @@ def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> Non
     assert [axes.get_title(loc="left").split(";")[0] for axes in left] == [
         "residual energy fraction",
         "proxy: energy per presented area at 130 mm [J/mm²]",
-        "P(inclined > 30° at 130 mm, or stopped)",
+        "P(inclined > 30° at 130 mm, either end first, or stopped)",
         "P(stopped)",
     ]
     for axes in right:
@@ -325,7 +325,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert sorted(path.name for path in folder.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
     before = Path("slots.nc").stat()
     assert main([*command, "-o", "two.svg", "--angle", "45 deg", "--standoff", "50 mm"]) == 0
-    assert "P(inclined > 45° at 50 mm, or stopped)" in capsys.readouterr().out
+    assert "P(inclined > 45° at 50 mm, either end first, or stopped)" in capsys.readouterr().out
     assert Path("slots.nc").stat() == before
     assert main(["compare", "slots.nc", "round holes.nc"]) == 0
     assert capsys.readouterr().out == shown.replace("two.png", "comparison.png")

@@ -1,7 +1,6 @@
 """The promise of a named fidelity: the level that a pilot chooses keeps it on hits that were not in the pilot."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ import pytest
 
 from warpimpact import Campaign, run
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
 from warpimpact.scene import (
@@ -27,7 +27,6 @@ from warpimpact.scene import (
     make_shots,
 )
 from warpimpact.solver import pilot
-from warpimpact.solver.limit import picked
 from warpimpact.solver.pilot import (
     MARGIN,
     RISK,
@@ -40,7 +39,7 @@ from warpimpact.solver.pilot import (
     upper_digits,
     upper_place,
 )
-from warpimpact.solver.simulate import Outcomes, pilot_of, simulate
+from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
 CORE = OgiveCore(diameter=6.17e-3, crh=3, length=27e-3, mass=5.25e-3)
@@ -217,17 +216,16 @@ def test_draft_tells_errors_that_other_hits_keep_where_a_base_stops_some_of_them
 
 
 def test_errors_of_slow_cores_are_those_of_their_energy(limit: Outcomes) -> None:
-    one, impact = picked(limit, np.arange(3)), np.full(3, 800.0)
+    one, impact = limit[np.arange(3)], np.full(3, 800.0)
     speeds, back = np.array([600.0, 20.0, 20.0]), [Status.PERFORATED, Status.PERFORATED, Status.ARRESTED]
-    passed = replace(one, residual_velocity=speeds, status=np.zeros(3, dtype=np.int8))
+    passed = one.assign(residual_velocity=speeds, status=np.zeros(3, dtype=np.int8))
     stopped = np.where(np.array(back) == Status.ARRESTED, np.nan, one.tilt[:, -1])
-    slower = replace(
-        passed,
+    slower = passed.assign(
         residual_velocity=np.array([599.0, 18.0, 0.0]),
         tilt=np.stack([stopped + 0.01] * 2, axis=1),
         status=np.array(back, dtype=np.int8),
     )
-    velocity, tilt, depth = changes(replace(passed, tilt=np.stack([one.tilt[:, -1]] * 2, axis=1)), slower, impact)
+    velocity, tilt, depth = changes(passed.assign(tilt=np.stack([one.tilt[:, -1]] * 2, axis=1)), slower, impact)
     energy = (speeds**2 - slower.residual_velocity**2)[1:] / (2.0 * SLOW * 800.0)
     assert velocity == pytest.approx([1.0, *energy])
     assert tilt == pytest.approx([0.01, 0.01 * 19.0 / 200.0, math.pi * 10.0 / 200.0])
@@ -250,8 +248,8 @@ def test_shots_at_one_plate_count_as_one() -> None:
 
 
 def test_a_failed_computation_has_no_bound(limit: Outcomes) -> None:
-    one = picked(limit, np.arange(2))
-    failed = replace(one, status=np.array([Status.UNFINISHED, one.status[1]], dtype=np.int8))
+    one = limit[np.arange(2)]
+    failed = one.assign(status=np.array([Status.UNFINISHED, one.status[1]], dtype=np.int8))
     velocity, tilt, _ = changes(one, failed, np.full(2, 820.0))
     assert np.isinf([velocity[0], tilt[0]]).all()
     assert velocity[1] == tilt[1] == 0.0
