@@ -23,7 +23,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.solver import arrays, marching, simulate
+from warpimpact.solver import marching, prepare, simulate
 
 Array = NDArray[np.float64]
 
@@ -145,7 +145,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
-    monkeypatch.setattr(arrays, "STEP_ALLOWANCE", 0.1)
+    monkeypatch.setattr(prepare, "STEP_ALLOWANCE", 0.1)
     outcomes = simulate.simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])

@@ -8,7 +8,7 @@ import pytest
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Core, Layer, Numerics, Plate, Record, Scene, Shots, Target
-from warpimpact.solver import arrays
+from warpimpact.solver import prepare
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.bending import Sections, sections_of
 from warpimpact.solver.rings import Rings
@@ -46,7 +46,7 @@ def test_no_moment_is_left_behind_the_base(monkeypatch: pytest.MonkeyPatch) -> N
         stress[-1] = 1.0  # [1/m³]: its "stress" is its moment
         return replace(sections, stress=stress)
 
-    monkeypatch.setattr(arrays, "sections_of", last_alone)
+    monkeypatch.setattr(prepare, "sections_of", last_alone)
     outcomes = bent(paper_plate(), slanted_shots(), level=0)
     assert outcomes.largest_bending_moment.min() > 1.0
     assert (outcomes.bending_stress < 1e-10 * outcomes.largest_bending_moment).all()
