@@ -100,9 +100,8 @@ def measure(campaign: Campaign, device: str, peak: float) -> dict[str, Any]:
     for name in LEVELS:
         work = work_of(campaign, shots_of(campaign, FLOOR_HITS), Numerics(level=name))
         floor = peak / work.operations
-        print(
-            f"level {name}: the floor allows {floor:.3g} hits/s; {work.steps:.3g} steps, {work.operations:.3g} operations"
-        )
+        print(f"level {name}: the floor allows {floor:.3g} hits/s")
+        print(f"  {work.steps:.3g} steps, {work.operations:.3g} operations")
         found = {layout: of_layout(campaign, name, layout, device, floor) for layout in LAYOUTS[name]}
         values["levels"][name] = {"floor_hits_per_second": floor, "work": asdict(work), "layouts": found}
         values["same"] &= all(one["same"] for one in found.values())

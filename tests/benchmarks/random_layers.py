@@ -39,7 +39,8 @@ from warpimpact.scene import (
     Target,
     make_shots,
 )
-from warpimpact.solver.pilot import changes, pilot_size
+from warpimpact.solver.changes import changes
+from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 

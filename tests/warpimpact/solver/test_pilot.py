@@ -27,17 +27,14 @@ from warpimpact.scene import (
     make_shots,
 )
 from warpimpact.solver import pilot
+from warpimpact.solver.changes import RISK, SLOW, changes, upper_error, upper_place
 from warpimpact.solver.pilot import (
     MARGIN,
-    RISK,
-    SLOW,
     HitErrors,
-    changes,
     errors_text,
     pilot_hits,
     pilot_size,
     upper_digits,
-    upper_place,
 )
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
@@ -243,8 +240,8 @@ def test_fast_cores_count_as_they_are(limit: Outcomes) -> None:
 
 def test_shots_at_one_plate_count_as_one() -> None:
     errors = np.arange(60.0)
-    assert pilot._upper(errors, 1, 0.9) == upper_place(60, 0.9) - 1 < 59
-    assert pilot._upper(errors, 3, 0.9) == 59  # of 20 plates the last one
+    assert upper_error(errors, 1, 0.9) == upper_place(60, 0.9) - 1 < 59
+    assert upper_error(errors, 3, 0.9) == 59  # of 20 plates the last one
 
 
 def test_a_failed_computation_has_no_bound(limit: Outcomes) -> None:
