@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.effects import Effect, effects
-from warpimpact.analysis.numbers import interval_text, number_text
+from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
+from warpimpact.analysis.survival import over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_reference
@@ -41,10 +42,11 @@ class Measure:
     Attributes:
         name, label, units, definition, source, higher_is_better: as of `Effect`, and of what is made of it.
         value: the number.
-        low, high: its confidence interval; none of a worst point, as what lies between the hits may be worse.
+        low, high: its confidence interval by the hits; none of a worst point: what lies between the hits may be worse.
         solid: the same of the solid plate of equal areal density.
         ratio, ratio_low, ratio_high: the value as a multiple of that.
         hit: number of the hit that is the worst point; None of anything else.
+        parameters: its interval by the parameters as of an `Estimate`.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Measure:
     ratio_low: float
     ratio_high: float
     hit: int | None = None
+    parameters: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -135,22 +138,30 @@ def gather(
             continue
         values, solid = effect.over(dataset), None if reference is None else effect.over(reference)
         if effect.kind == "share":
-            yield _averaged(effect, _SHARE, values, solid, dealt)
+            yield _averaged(effect, _SHARE, values, solid, dealt, dataset)
         else:
-            yield _averaged(effect, _MEAN, values, solid, dealt)
+            yield _averaged(effect, _MEAN, values, solid, dealt, dataset)
             sign = -1.0 if effect.higher_is_better else 1.0
             worst = None if solid is None else sign * worst_tenth(sign * solid)
-            yield _averaged(effect, _WORST_TENTH, sign * worst_tenth(sign * values), worst, dealt)
+            yield _averaged(effect, _WORST_TENTH, sign * worst_tenth(sign * values), worst, dealt, dataset)
             yield _worst_point(effect, values, solid, dataset)
 
 
 def _averaged(
-    effect: Effect, statistic: _Statistic, numbers: Array, solid: Array | None, dealt: dict[str, Any]
+    effect: Effect,
+    statistic: _Statistic,
+    numbers: Array,
+    solid: Array | None,
+    dealt: dict[str, Any],
+    dataset: xarray.Dataset,
 ) -> Evidence:
     """The measure that is the mean of some numbers."""
-    estimate = estimate_of(effect.kind, numbers, **dealt).within(0.0, 1.0 if effect.units == "1" else math.inf)
+    estimate = over_draws(dataset, estimate_of(effect.kind, numbers, **dealt), numbers)
+    estimate = estimate.within(0.0, 1.0 if effect.units == "1" else math.inf)
+    if statistic is _WORST_TENTH and estimate.parameters:  # that is of all draws together
+        estimate = replace(estimate, parameters=(math.nan, math.nan))
     if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
-        estimate = _without_interval(estimate.value)
+        estimate = replace(_without_interval(estimate.value), parameters=estimate.parameters)
     against = Ratio.of(estimate, numbers, solid, dealt)
     return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers, solid)
 
@@ -189,6 +200,7 @@ def _measure(
         ratio_low=against.low,
         ratio_high=against.high,
         hit=hit,
+        parameters=estimate.parameters,
     )
 
 
@@ -241,7 +253,11 @@ def plate_text(dataset: xarray.Dataset) -> str:
 
 
 def _second(measure: Measure) -> str:
-    return f"at hit {measure.hit}" if measure.hit is not None else interval_text(measure.low, measure.high)
+    return (
+        f"at hit {measure.hit}"
+        if measure.hit is not None
+        else intervals_text(measure.low, measure.high, measure.parameters)
+    )
 
 
 def _against_text(measure: Measure) -> str:

@@ -17,6 +17,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 from warpimpact.results.files import ResultError
+from warpimpact.results.measures import place_of_standoff
 from warpimpact.scene import AnyCore, Core
 
 Array = NDArray[np.float64]
@@ -262,11 +263,10 @@ def _at_standoff(dataset: xarray.Dataset, standoff: float | None) -> float:
     distances = dataset[v.STANDOFF].values
     if standoff is None:
         return float(distances[-1])
-    nearest = float(distances[np.argmin(np.abs(distances - standoff))])
-    if not np.isclose(nearest, standoff, rtol=1e-9, atol=0.0):
-        known = ", ".join(f"{distance * 1e3:g} mm" for distance in distances)
-        raise ResultError(f"standoff: got {standoff * 1e3:g} mm, but the result has {known}")
-    return nearest
+    try:
+        return float(distances[place_of_standoff(distances, standoff)])
+    except ValueError as error:
+        raise ResultError(f"standoff: {error}") from None
 
 
 def _of_passed(part: xarray.Dataset, values: Array, otherwise: float) -> Array:

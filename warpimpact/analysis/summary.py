@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.analysis import base
-from warpimpact.analysis.numbers import interval_text
+from warpimpact.analysis.numbers import interval_text, intervals_text
+from warpimpact.analysis.survival import draws_note, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
-from warpimpact.solver.pilot import accuracy_text, errors_text
+from warpimpact.solver.pilot import accuracy_text, errors_text, hits_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
 if TYPE_CHECKING:
@@ -37,11 +38,12 @@ class Spread:
     mean: float
     standard_deviation: float
     interval: tuple[float, float] = (math.nan, math.nan)
+    parameters: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, estimate: Estimate) -> Spread:
         """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
-        return cls(estimate.count, estimate.value, estimate.spread, (estimate.low, estimate.high))
+        return cls(estimate.count, estimate.value, estimate.spread, (estimate.low, estimate.high), estimate.parameters)
 
 
 @dataclass(frozen=True)
@@ -109,7 +111,7 @@ def _base_depth(dataset: Result) -> Spread | None:
         return None
     needed = dataset[[name for name in base.NEEDED if name in dataset]]
     depths = np.concatenate([base.base_depth(part) for part in slices(needed)])
-    return Spread.of(estimate_of("mean", depths, **dealing(dataset)))
+    return Spread.of(over_draws(dataset, estimate_of("mean", depths, **dealing(dataset)), depths))
 
 
 def _broken(dataset: Result) -> int | None:
@@ -130,10 +132,21 @@ def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> lis
 def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals; of an open file only a slice is in memory at a time."""
     tallies = [Tally(measure, **dealing(dataset), confidence=confidence) for measure in measures]
+    drawn: list[list[Any]] = [[] for _ in tallies]
     for part in slices(dataset[[v.STATUS, *(name for name in MEASURED if name in dataset)]]):
-        for tally in tallies:
+        for tally, values in zip(tallies, drawn, strict=True):
             tally.add(part)
-    return {tally.measure: tally.estimate() for tally in tallies}
+            if v.POSTERIOR_DRAW in dataset:
+                values.append(tally.measure.values(part))
+    found = {tally.measure: tally.estimate() for tally in tallies}
+    if v.POSTERIOR_DRAW not in dataset:
+        return found
+    return {
+        one: replace(estimate, parameters=(math.nan, math.nan))  # a quantile does not move as the mean does
+        if one.kind == "quantile"
+        else over_draws(dataset, estimate, np.concatenate(values), units=one.units).within(one.least)
+        for (one, estimate), values in zip(found.items(), drawn, strict=True)
+    }
 
 
 def slices(dataset: Result) -> Iterator[Any]:
@@ -177,7 +190,17 @@ def summary_text(dataset: Result) -> str:
         shown = replace(depth, mean=1e3 * depth.mean, standard_deviation=1e3 * depth.standard_deviation)
         low, high = depth.interval
         rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm", hits))
-    return "\n".join([*rows, *stop_lines(dataset)])
+    notes = (numerics_note(dataset, result.residual_velocity), draws_note(dataset))
+    return "\n".join([*rows, *stop_lines(dataset), *filter(None, notes)])
+
+
+def numerics_note(dataset: Result, velocity: Spread) -> str:
+    """That an interval is narrower than what the numerics may be off by; empty where it is not."""
+    error, (low, high) = dataset.attrs.get(attr.RESIDUAL_VELOCITY_ERROR, 0.0), velocity.interval
+    if not 0.5 * (high - low) < error:
+        return ""
+    hits = hits_text(json.loads(dataset.attrs[attr.ACCURACY])["share"])
+    return f"Intervals are by the hits alone; the numerics may be off by more: {error:.2g} m/s for {hits}."
 
 
 UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "N m": " N m", "Pa": " Pa", "m": " m", "1": ""}
@@ -212,6 +235,6 @@ def _count_row(meaning: str, count: int, hits: int) -> str:
 def _spread_row(name: str, spread: Spread, unit: str, hits: int) -> str:
     if spread.count == 0:
         return f"{name:<20}{'-':>8}   no core behind the plate"
-    interval = interval_text(*spread.interval, "{:.2f}".format)
+    interval = intervals_text(*spread.interval, spread.parameters, "{:.2f}".format)
     some = f"   of {spread.count} hits" if spread.count < hits else ""
     return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}{some}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -211,7 +212,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         attr.TITLE: fit.title,
         attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact identify",
         files.FIT: fit.text,
-        files.MATERIAL: _material(fit),
+        files.MATERIAL: _material(fit, sampled),
         **made,
         attr.SEED: fit.sampling.seed,
         files.EFFECTIVE: sampled.effective,
@@ -227,10 +228,20 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
     }
 
 
-def _material(fit: Fit) -> str:
+def _material(fit: Fit, sampled: Sampled) -> str:
+    found = discrepancies(fit, sampled.points)
+    sizes = {"m s-1": found.get("velocity"), "degree": found.get("angle")}
+    missed = {unit: _median(size, sampled) for unit, size in sizes.items() if size is not None}
+    missed |= {"degree": math.degrees(missed["degree"])} if "degree" in missed else {}
     scene = fit.scene_of(fit.shots[0])
     plate = scene.target.layers[0].model_dump(include={str(name) for name in _OF_PLATE})
-    return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump()})
+    return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump(), "discrepancy": missed})
+
+
+def _median(values: Array, sampled: Sampled) -> float:
+    """Of the posterior."""
+    order = np.argsort(values)
+    return float(values[order][np.searchsorted(np.cumsum(sampled.weights.values[order]), 0.5)])
 
 
 def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:

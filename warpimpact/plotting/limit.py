@@ -15,7 +15,8 @@ from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
-from warpimpact.studies.limit import QUANTILES, promise_line, quantiles
+from warpimpact.studies.limit import QUANTILES, quantiles
+from warpimpact.studies.limit_text import promise_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -105,6 +105,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     told |= {} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count}
     told |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
     told |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
+    told |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
     return told | ({} if campaign.burst is None else _burst(campaign.burst))
 
 

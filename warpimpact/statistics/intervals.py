@@ -30,6 +30,8 @@ class Estimate:
     Attributes:
         count: number of shots that count.
         spread: standard deviation over these shots.
+        parameters: interval of the number for the true parameters, which are one draw of a posterior; None where shots
+            draw none, NaN where the hits do not tell it. `low` and `high` are by the drawn hits alone.
     """
 
     value: float
@@ -37,6 +39,7 @@ class Estimate:
     high: float
     count: int
     spread: float
+    parameters: tuple[float, float] | None = None
 
     @property
     def half_width(self) -> float:
@@ -45,8 +48,9 @@ class Estimate:
 
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate of a number that lies between two others: no end of its interval is beyond them."""
-        low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))
-        return replace(self, low=low, high=high)
+        ends = (self.low, self.high, *(self.parameters or ()))
+        low, high, *more = (end if math.isnan(end) else min(max(end, least), most) for end in ends)
+        return replace(self, low=low, high=high, parameters=(more[0], more[1]) if more else None)
 
 
 def estimate_of(kind: str, values: Array, **dealt: Any) -> Estimate:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -11,21 +10,23 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
-from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.proxy import proxy
+from warpimpact.analysis.survival import over_draws
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.posterior import Posterior
 from warpimpact.campaign.text import CampaignError
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.limits import solid_limits, with_solid_limits
+from warpimpact.results.limits import with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
-from warpimpact.scene import Numerics, Shots, Target
+from warpimpact.scene import Numerics, Scene, Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -40,9 +41,8 @@ from warpimpact.solver.limit import (
     with_thickness,
     with_velocity,
 )
-from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.pilot import LimitErrors, hits_text, limit_error_text, limits_pilot_size
+from warpimpact.solver.pilot import LimitErrors, limits_pilot_size
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -52,7 +52,6 @@ if TYPE_CHECKING:
 
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
-_UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,9 @@ class LimitMap:
         scene, sought, images, found = campaign.scene, self.sought, len(campaign.symmetries), task.found
         numerics = numerics_of(campaign, found)
         begin = time.perf_counter()
-        searched = limits(scene, task.shots[::images], sought, numerics, worker, of_images(progress, images))
+        searched = _searched(
+            campaign.drawn, scene, task.shots[::images], sought, numerics, worker, of_images(progress, images)
+        )
         elapsed = time.perf_counter() - begin
         attributes = {
             **computed_by(campaign, worker.device, len(task.shots) // images, elapsed),
@@ -136,7 +137,7 @@ class LimitMap:
         if sought.quantity == "thickness":
             sought = replace(sought, highest=thickest(scene, 0))
         begin = time.perf_counter()
-        searched = limits(scene, at_solid(campaign, solid), sought, numerics, worker)
+        searched = _searched(campaign.drawn, scene, at_solid(campaign, solid), sought, numerics, worker)
         told = {
             attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
             attr.SOLID_LIMIT_DENSITY: plate.density,
@@ -177,6 +178,33 @@ class LimitMap:
         return with_thickness(self.sought.layer, shots, np.repeat(tried, images))
 
 
+def _searched(
+    drawn: Posterior | None,
+    scene: Scene,
+    shots: Shots,
+    sought: Sought,
+    numerics: Numerics,
+    worker: Worker,
+    progress: Progress | None = None,
+) -> Limits:
+    """Limits of shots. Draws of a posterior may need scenes of their own."""
+    if drawn is None or not drawn.of_scene:
+        return limits(scene, shots, sought, numerics, worker, progress)
+    places, parts = list[NDArray[np.int64]](), list[Limits]()
+    for which, own in drawn.scenes(scene, shots):
+        parts.append(limits(own, shots[which], sought, numerics, worker))
+        places.append(which)
+        if progress is not None:
+            progress(sum(map(len, places)), len(shots))
+    order = np.argsort(np.concatenate(places), kind="stable")
+    numbers = ("value", "lower", "upper", "runs", "converged")
+    return Limits(
+        **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
+        shots=Shots.joined([part.shots for part in parts])[order],
+        outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
+    )
+
+
 def warning_of(campaign: Campaign, quantity: str) -> str | None:
     """What a user should know of a campaign whose limits are asked for."""
     if (quantity, 0) not in campaign.scatter.given:
@@ -197,91 +225,7 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     for name, share in QUANTILES.items():
         estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
         ends = (estimate.value, estimate.low, estimate.high)
+        estimate = over_draws(dataset, estimate, counted, units="m s-1", kind="quantile")
         value_, low, high = (math.inf if end >= highest else end for end in ends)
         found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
     return found
-
-
-_MOST_LISTED = 12
-
-
-def limits_text(dataset: xarray.Dataset) -> str:
-    """What a search found, as a short table: V50 and V05, and every hit of a short list."""
-    told = dataset.attrs
-    quantity = told[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
-    value, lower, upper, runs, converged = (dataset[name].values for name in v.LIMITS[quantity])
-    rows = []
-    if len(value) <= _MOST_LISTED:
-        rows.append(f"{'hit':>4} {'obliquity':>10} {f'limit {quantity}':>16}   between")
-        for hit, obliquity in enumerate(dataset[v.OBLIQUITY].values):
-            ends = f"{factor * lower[hit]:.5g} and {factor * upper[hit]:.5g} {unit}"
-            rows.append(f"{hit:>4} {obliquity:>9.4g}° {factor * value[hit]:>11.5g} {unit:<4}   {ends}")
-        rows += _proxy_lines(dataset)
-    else:
-        for name, estimate in quantiles(dataset).items():
-            ends = interval_text(factor * estimate.low, factor * estimate.high, "{:.5g}".format)
-            what = "perforate" if quantity == "velocity" else "have a smaller limit"
-            share = f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"
-            rows.append(f"{name} = {factor * estimate.value:.5g} {unit}   95 % interval {ends}   ({share})")
-    if broken := int(np.isnan(value).sum()):
-        rows.append(f"{broken} hits failed, and count in none of these numbers")
-    beyond, missed = int(np.isposinf(value).sum()), int((value == 0.0).sum())
-    if beyond:
-        rows.append(f"{beyond} hits have no limit {quantity} up to {factor * told[attr.LIMIT_HIGHEST]:g} {unit}")
-    if missed:
-        rows.append(f"{missed} hits touch no material")
-    if open_ := int((converged == 0).sum()) - int(np.isnan(value).sum()):
-        rows.append(
-            f"{open_} hits were not found to {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
-        )
-    rows += _solid_lines(dataset)
-    rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
-    rows.append(promise_line(dataset))
-    return "\n".join(rows)
-
-
-def _solid_lines(dataset: xarray.Dataset) -> list[str]:
-    """The solid plate that replaces the whole target, and what its search cost; none without one."""
-    reference = solid_limits(dataset)
-    if reference is None:
-        return []
-    quantity = dataset.attrs[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
-    value = reference[v.LIMITS[quantity].value].values
-    found = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
-    density = float(dataset.attrs[attr.AREAL_DENSITY])
-    if quantity == "thickness":
-        found += f", {float(np.nanmean(value)) * reference.attrs[attr.LIMIT_DENSITY]:.4g} kg/m²"
-        found += f" (the target as given has {density:.4g} kg/m²)"
-    else:
-        found += f", of {density:.4g} kg/m² as the target"
-    hits = f"{len(value)} hit{'s' if len(value) > 1 else ''}"
-    seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
-    return [f"solid plate in place of the whole target: limit {quantity} {found}; {hits} searched in {seconds:.2g} s"]
-
-
-def _proxy_lines(dataset: xarray.Dataset) -> list[str]:
-    """The proxy beside the limit thickness of a solid plate; none of another search."""
-    found = proxy(dataset) if dataset.attrs[attr.LIMIT] == "thickness" else None
-    if found is None:
-        return []
-    rows = ["proxy: energy over presented area and resistance, as a depth, and its ratio to the limit thickness"]
-    rows.append(f"{'hit':>4} {'inclination':>12} {'proxy':>12}   ratio")
-    for hit, (inclination, depth, ratio) in enumerate(zip(*found, strict=True)):
-        rows.append(f"{hit:>4} {inclination:>11.4g}° {1e3 * depth:>9.4g} mm   {ratio:.3f}")
-    return rows
-
-
-def promise_line(dataset: xarray.Dataset) -> str:
-    """How far off the limits are estimated to be."""
-    told = dataset.attrs
-    unit, factor = _UNITS[told[attr.LIMIT]]
-    of_layer = f"thickness of layer {told[attr.LIMIT_LAYER]}; " if told[attr.LIMIT_LAYER] else ""
-    ends = f"{of_layer}ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
-    if attr.LIMIT_ERROR not in told:
-        return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
-    kept = "" if told[attr.PROMISE_KEPT] else ", more than was asked for"
-    error = limit_error_text(told[attr.LIMIT_ERROR], told[attr.LIMIT])
-    hits = hits_text(json.loads(told[attr.ACCURACY])["share"])
-    return f"{ends}; against a finer level {hits} are within {error}{kept}"

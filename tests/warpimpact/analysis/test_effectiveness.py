@@ -68,7 +68,7 @@ def test_numbers_without_a_valid_interval_have_none(make_plate_result) -> None:
     assert math.isnan(few[name].low)
     assert many[name].low < many[name].value < many[name].high
     assert math.isnan(many["residual_energy_fraction_worst_point"].low)
-    images = make_plate_result(np.linspace(500.0, 900.0, 400), symmetries="(y, z), (-y, z)")
+    images = make_plate_result(np.linspace(500.0, 900.0, 400), images=2)
     assert math.isnan(named(images)[name].low)
 
 
@@ -117,7 +117,7 @@ def test_a_solid_plate_is_its_own_reference(make_plate_result) -> None:
 
 
 def test_a_stand_off_that_is_not_there_is_refused(mixed) -> None:
-    with pytest.raises(ResultError, match=r"^standoff: got 100 mm, but the result has 50 mm, 130 mm$"):
+    with pytest.raises(ResultError, match=r"^standoff: got 100 mm, but the stand-offs are 50 mm, 130 mm$"):
         effectiveness(mixed, standoff=0.1)
 
 

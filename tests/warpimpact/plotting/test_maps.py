@@ -296,7 +296,7 @@ def test_what_cannot_be_mapped_is_named(perforated, variable):
 
 
 def test_an_absent_standoff_is_named(perforated):
-    with pytest.raises(ValueError, match=r"no stand-off of 0\.2 m; it has 0\.05, 0\.13 m"):
+    with pytest.raises(ValueError, match="got 200 mm, but the stand-offs are 50 mm, 130 mm"):
         hit_map(perforated, "tilt", 0.2)
 
 
