@@ -281,7 +281,7 @@ class _Bench:
         copies, spent, best = 1, elapsed, len(self.shots) / elapsed
         while spent < MEASURED_TIME or elapsed < shortest:
             copies *= max(1, math.ceil(shortest / elapsed))
-            elapsed = self._seconds(numerics, _repeated(self.shots, copies))
+            elapsed = self._seconds(numerics, Shots.joined([self.shots] * copies))
             spent, best = spent + elapsed, max(best, copies * len(self.shots) / elapsed)
         return answer, best
 
@@ -297,10 +297,6 @@ class _Bench:
 
     def _simulate(self, numerics: Numerics, shots: Shots, progress: Progress) -> Outcomes:
         return simulate(self.scene, shots, numerics=numerics, device=str(self.device), progress=progress)
-
-
-def _repeated(shots: Shots, copies: int) -> Shots:
-    return Shots.joined([shots] * copies)
 
 
 def _doubled(level: Level) -> Level:
