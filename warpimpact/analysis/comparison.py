@@ -32,6 +32,8 @@ from warpimpact.analysis.survival import Survival, draws_note, survival_of, why_
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import dealing
 from warpimpact.runs.shards import first_difference
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (
     Ratio,
     confidence_of_each,
@@ -43,7 +45,6 @@ from warpimpact.statistics.intervals import Array, Estimate, estimate_of
 
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
-_MATERIAL_UNITS = {"resistance": " Pa", "degradation_interval": " s", "degradation_length": " m", "density": " kg/m³"}
 
 
 @dataclass(frozen=True)
@@ -145,8 +146,8 @@ def compare(
     datasets: Sequence[xarray.Dataset],
     names: Sequence[str],
     *,
-    angle: float = ANGLE,
-    standoff: float | None = None,
+    angle: float | str = ANGLE,
+    standoff: float | str | None = None,
     confidence: float = 0.95,
 ) -> Comparison:
     """Compare the plates of some hit maps, by all their hits.
@@ -154,8 +155,7 @@ def compare(
     Args:
         datasets: two or more, of the same core under the same impact; of open files one number per hit is in memory.
         names: of the plates, each once.
-        angle: inclination beyond which a core counts as tilted [rad].
-        standoff: where that is looked at [m]; None is the largest stand-off.
+        angle, standoff: beyond which inclination a core counts as tilted, and where, as in `effectiveness`.
         confidence: of all differences in a measure together.
 
     Raises:
@@ -319,5 +319,6 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
     for quantity in dict.fromkeys(key for material in told.values() for key in material):
         values = {name: material.get(quantity) for name, material in told.items()}
         if len(set(values.values())) > 1:
-            units = _MATERIAL_UNITS.get(quantity, "")
-            yield f"{quantity} ({of_each(list(values), [f'{value:.6g}{units}' for value in values.values()])})"
+            read = reader_of(QUANTITIES[quantity].type)
+            shown = ["not given" if value is None else read.text(value) for value in values.values()]
+            yield f"{quantity} ({of_each(list(values), shown)})"

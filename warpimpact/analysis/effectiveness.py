@@ -25,13 +25,14 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_reference
 from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import dealing
+from warpimpact.scene.units import Radians
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
 
 Array = NDArray[np.float64]
 
-ANGLE = math.radians(30.0)
+ANGLE = Radians(math.radians(30.0))
 """Inclination beyond which a core counts as tilted, unless said otherwise [rad]."""
 
 
@@ -102,13 +103,15 @@ _WORST_TENTH = _Statistic(
 _WORST_POINT = _Statistic("_worst_point", ", worst point", " The worst of the hits, an observed extreme.", "")
 
 
-def effectiveness(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None) -> list[Measure]:
+def effectiveness(
+    dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
+) -> list[Measure]:
     """How well the plate of a result protects.
 
     Args:
         dataset: a hit map; of an open file a slice is in memory at a time, and one number per hit.
-        angle: inclination beyond which a core counts as tilted [rad].
-        standoff: distance behind the rear face where tilt counts [m]; the largest of the result if None.
+        angle: inclination beyond which a core counts as tilted: degrees, a string with its unit, or `Radians`.
+        standoff: distance behind the rear face where tilt counts [m], or a string; the largest of the result if None.
 
     Raises:
         ResultError: the result has no such stand-off.
@@ -124,8 +127,8 @@ def effect_names(dataset: xarray.Dataset) -> list[str]:
 def gather(
     dataset: xarray.Dataset,
     *,
-    angle: float = ANGLE,
-    standoff: float | None = None,
+    angle: float | str = ANGLE,
+    standoff: float | str | None = None,
     confidence: float = 0.95,
     only: Container[str] | None = None,
 ) -> Iterator[Evidence]:
@@ -208,7 +211,9 @@ SHOWN_UNITS = {"1": "", "mm": " [mm]", "J mm-2": " [J/mmÂ²]", "kg m-2": " [kg/mÂ
 """Units behind a label."""
 
 
-def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None) -> str:
+def effectiveness_text(
+    dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
+) -> str:
     """The measures of `effectiveness` as a table, beside those of the solid plate of equal areal density."""
     measures = effectiveness(dataset, angle=angle, standoff=standoff)
     labels = [measure.label + SHOWN_UNITS[measure.units] for measure in measures]

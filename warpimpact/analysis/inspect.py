@@ -13,7 +13,6 @@ from warpimpact.analysis.effectiveness import effectiveness_text
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
-    UNITS,
     Spread,
     estimated,
     means_of,
@@ -33,8 +32,6 @@ from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.statistics.intervals import Estimate
 
 _QUANTILES = (0.05, 0.5, 0.95)
-_SHOWN = {"Pa": ("GPa", 1e-9)}
-"""Units of rows that are not those of the Dataset, and the factors to them."""
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
@@ -110,7 +107,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
 
 def _row(measure: Measure, estimate: Estimate) -> str:
     name, what = "", f"{measure.share * 100.0:g} % quantile"
-    unit, factor = _SHOWN.get(measure.units, (UNITS[measure.units].strip(), 1.0))
+    unit, factor = measure.display.shown, measure.display.factor
     if measure.kind == "mean":
         at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
         name, what = f"{measure.variable.replace('_', ' ')}{at}, {unit}", "mean"

@@ -17,6 +17,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
+from warpimpact.scene.display import STORED
 from warpimpact.solver.pilot import accuracy_text, errors_text, hits_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
@@ -117,7 +118,7 @@ def _base_depth(dataset: Result) -> Spread | None:
 def _broken(dataset: Result) -> int | None:
     if v.BROKEN not in dataset:
         return None
-    return sum(int(part[v.BROKEN].values.sum()) for part in slices(dataset[[v.BROKEN]]))
+    return sum(int(np.nansum(part[v.BROKEN].values)) for part in slices(dataset[[v.BROKEN]]))
 
 
 def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
@@ -203,20 +204,17 @@ def numerics_note(dataset: Result, velocity: Spread) -> str:
     return f"Intervals are by the hits alone; the numerics may be off by more: {error:.2g} m/s for {hits}."
 
 
-UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "N m": " N m", "Pa": " Pa", "m": " m", "1": ""}
-"""Units as people write them."""
-
-
 def stop_lines(dataset: Result) -> list[str]:
     """What the stop rule asked for, if there was one."""
     told = dataset.attrs
     if attr.STOP_QUANTITY not in told:
         return []
-    (low, high), unit = told[attr.ESTIMATE_INTERVAL], UNITS[told[attr.ESTIMATE_UNITS]]
+    (low, high), unit = told[attr.ESTIMATE_INTERVAL], STORED[told[attr.ESTIMATE_UNITS]]
+    interval = interval_text(unit.factor * low, unit.factor * high, "{:.6g}".format)
     reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told[attr.STOP_REASON]]
     return [
-        f"{told[attr.STOP_QUANTITY]} = {told[attr.ESTIMATE]:.6g}{unit}, {told[attr.CONFIDENCE]:.4g} interval "
-        f"{interval_text(low, high, '{:.6g}'.format)}{unit}; {reason}"
+        f"{told[attr.STOP_QUANTITY]} = {unit.text(told[attr.ESTIMATE], '.6g')}, {told[attr.CONFIDENCE]:.4g} interval "
+        f"{interval}{unit.suffix}; {reason}"
     ]
 
 

@@ -18,18 +18,12 @@ from numpy.typing import NDArray
 
 from warpimpact.results import posterior as files
 from warpimpact.scene import Interaction, Plate, Sampler, Scene, Shots
+from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 
 Array = NDArray[np.float64]
 
-OF_THE_MATERIAL: tuple[Path, ...] = (
-    ("plate", "resistance"),
-    ("plate", "shear_coefficient"),
-    ("plate", "degradation"),
-    *UNITS_OF_EXPOSURE,
-    ("plate", "degradation_length"),
-    *(("interaction", name) for name in Interaction.model_fields),
-)
+OF_THE_MATERIAL: tuple[Path, ...] = tuple((one.table, name) for name, one in QUANTITIES.items() if one.drawn)
 """What a posterior gives; all else stays that of the campaign."""
 MOST_DRAWS = 64
 """Draws that a run uses. Several hits of each tell what the parameters and what the hits scatter; a parameter such as

@@ -21,6 +21,7 @@ from warpimpact.identification.parameters import Parameter
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior as files
 from warpimpact.results.variables import HIT_Y, HIT_Z
+from warpimpact.scene.display import UNITS
 from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
 
 Array = NDArray[np.float64]
@@ -136,8 +137,11 @@ def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
 
 
 def _described(parameter: Parameter) -> dict[str, str]:
-    units = {"rad": "degree", "": "1", "m/s": "m s-1"}.get(parameter.unit, parameter.unit)
-    return {"units": units, files.PATH: json.dumps(parameter.path), "prior": parameter.prior.model_dump_json()}
+    return {
+        "units": UNITS[parameter.unit].stored,
+        files.PATH: json.dumps(parameter.path),
+        "prior": parameter.prior.model_dump_json(),
+    }
 
 
 def _labels(fit: Fit) -> list[tuple[int, int]]:

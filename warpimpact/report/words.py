@@ -18,15 +18,16 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effectiveness
 from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
-from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note, slices
+from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note, slices
 from warpimpact.analysis.survival import draws_note
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import outlines, passed
+from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.outlines import outlines
 from warpimpact.studies.accuracy import QUANTITIES
 from warpimpact.studies.accuracy_text import study_text
 
@@ -201,9 +202,8 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
-            unit = UNITS[measure.units]
-            interval = intervals_text(*ends_of(estimate), "{:.2f}".format)
-            yield Row(f"mean {words(measure.variable)}{at}", f"{estimate.value:.2f}{unit}", interval)
+            interval = intervals_text(*ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
+            yield Row(f"mean {words(measure.variable)}{at}", measure.display.text(estimate.value, ".2f"), interval)
 
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -216,6 +216,8 @@ def _attribute_fault(told: dict[str, Any]) -> str | None:
 
 
 def _is_allowed(name: str, value: Any) -> bool:
+    if name in v.OUTLINE_VARIABLES:
+        return np.asarray(value).dtype.kind == "f"
     if name in _TEXTS:
         return isinstance(value, str) and (name not in _TABLES or _is_table(value))
     if name in _PAIRS:

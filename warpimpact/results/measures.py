@@ -15,6 +15,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
+from warpimpact.scene.display import STORED, Unit
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -24,14 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _KINDS: dict[str, Any] = {
-    "m s-1": Speed,
-    "degree": Angle,
-    "J": Energy,
-    "s": Time,
-    "N m": Moment,
-    "Pa": Stress,
-    "m": Length,
-    "1": Number,
+    quantity(kind).display.stored: kind for kind in (Speed, Angle, Energy, Time, Moment, Stress, Length, Number)
 }
 """Types of the quantities that have these units in the Dataset."""
 _VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in v.SHOT_VARIABLES}
@@ -127,6 +121,11 @@ class Measure:
     def units(self) -> str:
         """Those of the Dataset; "1" for a probability."""
         return "1" if self.is_binary else _VARIABLES[self.variable].units
+
+    @property
+    def display(self) -> Unit:
+        """How its values are shown."""
+        return STORED[self.units]
 
     def in_units(self, value: object) -> float:
         """SI value of a difference of this measure that a user wrote."""

@@ -20,6 +20,7 @@ from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
 from warpimpact.runs.progress import Follow, RunProgress
 from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manifest
@@ -58,7 +59,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
         shards = Shards(extent(total, campaign.at_a_plate))
         end = _fill(campaign, shards, team, progress or (lambda now: None))
     table = joined(shards.load(index) for index in range(end.shards))
-    return table.assign_attrs(_attributes(table, end)).to_xarray()
+    return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
 
 
 def run_to_file(

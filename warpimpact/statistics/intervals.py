@@ -46,6 +46,12 @@ class Estimate:
         """Half of the interval's length."""
         return 0.5 * (self.high - self.low)
 
+    def times(self, factor: float) -> Self:
+        """The estimate in another unit."""
+        value, low, high, spread = (factor * one for one in (self.value, self.low, self.high, self.spread))
+        parameters = self.parameters and (factor * self.parameters[0], factor * self.parameters[1])
+        return replace(self, value=value, low=low, high=high, spread=spread, parameters=parameters)
+
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate of a number that lies between two others: no end of its interval is beyond them."""
         ends = (self.low, self.high, *(self.parameters or ()))

@@ -13,19 +13,26 @@ from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.solver.pilot import hits_text, limit_error_text
 from warpimpact.studies.limit import QUANTILES, quantiles
 
-_UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 _MOST_LISTED = 12
+
+
+def shown_unit(name: str) -> tuple[str, float]:
+    """Unit that people see a limit in, and the factor to it."""
+    shown = reader_of(QUANTITIES[name].type).display
+    return shown.shown, shown.factor
 
 
 def limits_text(dataset: xarray.Dataset) -> str:
     """What a search found, as a short table: V50 and V05, and every hit of a short list."""
     told = dataset.attrs
     quantity = told[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
+    unit, factor = shown_unit(quantity)
     value, lower, upper, runs, converged = (dataset[name].values for name in v.LIMITS[quantity])
     rows = []
     if len(value) <= _MOST_LISTED:
@@ -64,7 +71,7 @@ def _solid_lines(dataset: xarray.Dataset) -> list[str]:
     if reference is None:
         return []
     quantity = dataset.attrs[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
+    unit, factor = shown_unit(quantity)
     value = reference[v.LIMITS[quantity].value].values
     found = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
     density = float(dataset.attrs[attr.AREAL_DENSITY])
@@ -93,7 +100,7 @@ def _proxy_lines(dataset: xarray.Dataset) -> list[str]:
 def promise_line(dataset: xarray.Dataset) -> str:
     """How far off the limits are estimated to be."""
     told = dataset.attrs
-    unit, factor = _UNITS[told[attr.LIMIT]]
+    unit, factor = shown_unit(told[attr.LIMIT])
     of_layer = f"thickness of layer {told[attr.LIMIT_LAYER]}; " if told[attr.LIMIT_LAYER] else ""
     ends = f"{of_layer}ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
     if attr.LIMIT_ERROR not in told:
