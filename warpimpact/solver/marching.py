@@ -127,7 +127,7 @@ class March:
         exposure = np.zeros(math.prod(self.cells))
         if self.variant.degrades and self.arrays.materials[0].weakens:
             exposure = _host(scratch[0].exposure)[: exposure.size]
-        decayed = np.exp(self.arrays.conditions["decay_rate"][-1] * exposure.reshape(self.cells))
+        decayed = np.exp(self.arrays.materials[0].decay_rate[-1] * exposure.reshape(self.cells))
         return np.asarray(self._material * decayed), self._behind(scratch)
 
     def _behind(self, scratch: tuple[Any, ...]) -> dict[int, Weakened]:
@@ -161,7 +161,13 @@ class March:
         wp.launch(
             flight.kernel,
             count,
-            inputs=[self.inputs.shots, contact, self.inputs.put(standoffs, wp.float64), self.arrays.ahead],
+            inputs=[
+                self.inputs.shots,
+                self.inputs.target,
+                contact,
+                self.inputs.put(standoffs, wp.float64),
+                self.arrays.ahead,
+            ],
             outputs=[report],
             device=self.device,
         )
@@ -206,7 +212,8 @@ class March:
         """Names of the fields that a slot needs."""
         if self.variant.window and self.device.is_cuda:  # the others are in shared memory
             return ["filtered"] if self._keeps_fields else []
-        return [name for name in self.stage.Fields.vars if name not in ("cells_y", "cells_z") and self._keeps_fields]
+        members, real = self.stage.Fields.vars.items(), self.variant.real
+        return [name for name, member in members if self._keeps_fields and getattr(member.type, "dtype", None) is real]
 
     @property
     def _keeps_fields(self) -> bool:
@@ -229,10 +236,13 @@ class March:
     def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
-        scratch, touches = self.stage.Fields(), self.stage.Touches()
-        scratch.cells_y, scratch.cells_z = cells_y, cells_z
+        fields, touches, put = self.stage.Fields(), self.stage.Touches(), self.inputs.put
+        sizes = np.array(self._windows(cells_y, cells_z))
+        ends = np.cumsum(sizes.prod(axis=1))
+        fields.nodes, fields.first = int(ends[-1]), put(ends - sizes.prod(axis=1), wp.int32)
+        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in sizes.T)
         for name in self._fields():
-            setattr(scratch, name, empty(slots * self._nodes(cells_y, cells_z)))
+            setattr(fields, name, empty(slots * fields.nodes))
         patches = slots * self._patches()
         for name in ("area", "slope", "shift", "gain", "y", "z"):
             setattr(touches, name, empty(patches))
@@ -244,7 +254,7 @@ class March:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)
         earlier = earlier_hits(self.stage, self.at_a_plate, slots, self._windows(cells_y, cells_z), self.device)
-        return scratch, touches, self.passages.stack(slots), earlier
+        return fields, touches, self.passages.stack(slots), earlier
 
     def _launch(
         self,
@@ -268,11 +278,10 @@ class March:
                 order,
                 inputs.surface,
                 inputs.sections,
-                inputs.plate,
+                inputs.target,
                 inputs.law,
                 inputs.shots,
                 inputs.pace,
-                inputs.target,
                 *scratch,
             ],
             outputs=[outcomes, self.passages.filled, self.bending, self.history],
@@ -283,8 +292,6 @@ class March:
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
         load(self.stage.kernel, self.device)
-        if self.variant.layered:
-            self.inputs.place_windows(self._windows(*self.cells))
         if self.device.is_cpu:
             launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)

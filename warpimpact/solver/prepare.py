@@ -128,7 +128,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
         _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length)
         for plate in target.layers
     ]
-    deepest = float(conditions["thickness"].max())
+    deepest = float((materials[-1].front + materials[-1].thickness).max())
     cells = first_window(core, shots, deepest, grids[0].spacing, grids[0].reach, nodal=nodal)
     if resolution.block:
         check_layout(**{name: getattr(variant, name) for name in SIMPLE_ONLY})
@@ -194,10 +194,9 @@ def half_taps(length: float, spacing: float) -> Array:
 def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: list[Materials]) -> dict[str, Array]:
     """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
 
-    The layer that needs the shortest step sets the step. The law is that of the plate; the thickness is the depth of
-    the whole target.
+    The layer that needs the shortest step sets the step.
     """
-    core, target, body, plate = scene.core, scene.target, scene.core.mass_properties, materials[0]
+    core, target, body = scene.core, scene.target, scene.core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
     passage = _least(resolution.passage(one.thickness) for one in materials)
     times = (
@@ -207,17 +206,10 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
     gaps = sum(target.gaps)
     return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
-        "thickness": depth,
         "mass": mass,
         "inertia_axial": scale * body.inertia_axial,
         "inertia_transverse": scale * body.inertia_transverse,
-        "a0": plate.a0,
-        "a1": plate.a1,
         "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
-        "friction": plate.friction,
-        "decay_rate": plate.decay_rate,
-        "degradation": plate.degradation,
-        "onset_jump": plate.onset_jump,
         "way": resolution.travel * passage,
         "longest_time": _least(times),
         "longest_step": passage,
