@@ -82,7 +82,8 @@ def test_limit_velocity_grows_about_as_the_way_through_an_oblique_plate() -> Non
     # 1, 1.035, 1.155, 1.414 (sec θ); published 1, 1.030, 1.158, 1.433. Measured: 1, 1.036, 1.134, 1.332.
     obliquity = np.array([0.0, 15.0, 30.0, 45.0])
     plate = Plate(thickness=20e-3, resistance=0.93e9, shear_coefficient=0.05)
-    value = found(plate, shots_at(obliquity=obliquity, velocity=600.0), core=AP_CORE, tolerance=1.0).value
+    shots = shots_at(obliquity=obliquity, velocity=600.0)
+    value = found(plate, shots, core=AP_CORE, numerics=None, tolerance=1.0).value
     assert value / value[0] == pytest.approx(1.0 / np.cos(np.deg2rad(obliquity)), rel=0.07)
     assert (np.diff(value) > 0.0).all()
 

@@ -31,7 +31,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.results.growing import Growing
+from warpimpact.results.incremental import IncrementalFile
 from warpimpact.results.netcdf import attribute, read_table
 from warpimpact.results.table import Table
 
@@ -174,7 +174,7 @@ class ShardsOnDisk(Shards):
         self._fingerprint = fingerprint(content)
         self._written = time.monotonic()
         self._grows, self._grown = grows, 0
-        self._growing: Growing | None = None
+        self._growing: IncrementalFile | None = None
 
     @property
     def count(self) -> int:
@@ -364,7 +364,7 @@ class ShardsOnDisk(Shards):
         """Add the shards to the result file that are there and follow those in it, or the first `count` shards."""
         if self._growing is None:
             hits = min(self.total, (self.count if count is None else count) * self.extent)
-            self._growing = Growing(self.output, self.folder / _GROWING, hits)
+            self._growing = IncrementalFile(self.output, self.folder / _GROWING, hits)
         there = self.there()
         while self._grown in there if count is None else self._grown < count:
             self._growing.add(self.load(self._grown))

@@ -10,7 +10,7 @@ import xarray
 
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import best_rows, comparison_text
-from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiveness_text
+from warpimpact.analysis.effectiveness import EffectMeasure, effectiveness, effectiveness_text
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import summary, summary_text
 from warpimpact.campaign.campaign import Campaign
@@ -44,7 +44,7 @@ def layered(
     )
 
 
-def named(dataset: xarray.Dataset) -> dict[str, Measure]:
+def named(dataset: xarray.Dataset) -> dict[str, EffectMeasure]:
     return {measure.name: measure for measure in effectiveness(dataset)}
 
 

@@ -30,7 +30,7 @@ SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 DRAFT = SLOTTED_PLATE.replace('"standard"', '"draft"')
 COUNT = 4000  # sixteen shards, the last one short
-KILLS = 20
+KILLS = 8
 LONG = "count = 1000000"  # minutes of computing, of which a test sees the first shard
 PATIENCE = 600.0
 """Until what must come is missing, however busy the machine [s]."""
@@ -103,13 +103,13 @@ def test_runs_killed_at_any_moment_end_with_the_same_bits(
             completed += 1
             if kills < KILLS:
                 output.unlink()
-    assert completed >= 2  # 20 kills leave some fifty shards behind, and a run has sixteen
+    assert completed >= 1
     assert [path.name for path in tmp_path.iterdir()] == ["a.nc"]
 
 
 def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
-    path.write_text(SLOTTED_PLATE.replace("count = 4096", LONG), encoding="utf-8")
+    path.write_text(DRAFT.replace("count = 4096", LONG), encoding="utf-8")
     command = ["run", str(path), "-o", str(output), "--device", "cpu"]
     with subprocess.Popen(
         [*WARPIMPACT, *command], env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.DEVNULL
@@ -463,7 +463,7 @@ def test_a_disk_that_is_full_at_once_leaves_nothing(size: int, saved: str, campa
 def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: list[str], tmp_path: Path) -> None:
     """A terminal sends Ctrl-C to all processes of the group; a batch system ends the first one."""
     path, output = tmp_path / "long.toml", tmp_path / "a.nc"
-    path.write_text(SLOTTED_PLATE.replace("count = 4096", LONG), encoding="utf-8")
+    path.write_text(DRAFT.replace("count = 4096", LONG), encoding="utf-8")
     # A shell's background job ignores Ctrl-C.
     listen = _after("signal.signal(signal.SIGINT, signal.SIG_DFL)")
     command = [*listen, *WARPIMPACT, "run", str(path), "-o", str(output), "--device", "cpu", *where]

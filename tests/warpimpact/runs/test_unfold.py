@@ -169,6 +169,7 @@ def common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return at, of
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_command_tells_what_was_computed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
