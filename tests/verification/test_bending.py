@@ -107,10 +107,12 @@ def test_parts_without_a_gap_bend_a_core_as_the_whole_does(shares: tuple[float, 
 
 def test_a_core_without_the_mass_of_its_slices_is_refused() -> None:
     core = PAPER_CORE.model_copy(update={"inertia_axial": 2e-8})
-    with pytest.raises(ValueError, match=r"got bending = true beside core.inertia_axial, but a bending moment needs"):
+    with pytest.raises(
+        ValueError, match=r"output.bending = true cannot be combined with core.inertia_axial: it needs the mass"
+    ):
         Scene(core=core, target=paper_plate(), record=Record(bending=True))
 
 
 def test_the_literal_scheme_has_no_bending_moment() -> None:
-    with pytest.raises(ValueError, match=r'got bending = true beside numerics.scheme = "nodal"'):
+    with pytest.raises(ValueError, match=r'output.bending = true cannot be combined with numerics.scheme = "nodal"'):
         bent(paper_plate(), shots_at(), scheme="nodal")

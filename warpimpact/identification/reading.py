@@ -25,13 +25,13 @@ from warpimpact.identification.parameters import (
 )
 from warpimpact.results.measures import Measure, place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
+from warpimpact.scene import exclusions as asked
 from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
-from warpimpact.solver.resolution import check_scheme
 
 _TABLES = ("core", "plate", "interaction")
 _KEYS = ("title", *_TABLES, "record", "numerics", "prior", "discrepancy", "selection", "sampling", "shot")
@@ -238,7 +238,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
         where = f"{name}: shot[{place}]"
         try:
             scene = fit.scene_of(shot)
-            check_scheme(fit.record, fit.numerics)
+            asked.check_together({asked.BENDING: fit.record.bending, asked.NODAL: fit.numerics.scheme == "nodal"})
         except ValueError as error:
             told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
             raise FitError(f"{where}: {told}") from None

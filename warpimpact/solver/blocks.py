@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,31 +16,6 @@ shared memory that a block of every CUDA device has."""
 WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
 """Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
 its fine grid, large windows cost more time than the repetition of some shots."""
-SIMPLE_ONLY: Mapping[str, str] = {
-    "nodal": "the nodal scheme",
-    "double": "double precision",
-    "bends": "the bending moment",
-    "layered": "layers",
-    "burst": "several shots at one plate",
-}
-"""What only the simple layout computes: members of `Variant`, and what they are called."""
-
-
-def check_layout(**wanted: bool) -> None:
-    """Refuse what the block layout does not compute.
-
-    Args:
-        wanted: whether each of SIMPLE_ONLY is asked for.
-
-    Raises:
-        ValueError: names all of it.
-    """
-    found = [SIMPLE_ONLY[name] for name, asked in wanted.items() if asked]
-    if found:
-        raise ValueError(
-            f'got numerics.layout = "block" beside {" and ".join(found)}, but it must be "simple" for that: a block '
-            "computes one hit at a single plate, in single precision"
-        )
 
 
 def first_window(core: Core, shots: Shots, depth: float, spacing: float, reach: int, *, nodal: bool) -> int:

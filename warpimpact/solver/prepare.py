@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
+from warpimpact.scene import exclusions as asked
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.bending import Sections, sections_of
-from warpimpact.solver.blocks import SIMPLE_ONLY, block_window, check_layout, first_window
+from warpimpact.solver.blocks import block_window, first_window
 from warpimpact.solver.materials import Materials, materials_of
-from warpimpact.solver.resolution import Resolution, check_scheme, resolve, weakens
+from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
 from warpimpact.solver.tile import FINER, FINEST, Tile, tent_taps, tile_of
 
@@ -116,10 +117,19 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     core, target, record = scene.core, scene.target, scene.record
     if numerics.explicit is None:
         raise ValueError("got numerics that name an accuracy, for which a pilot finds the resolution, but no pilot did")
-    check_scheme(record, numerics, shots.at_a_plate)
     weakening = weakens(target, shots)
     resolution = resolve(scene, numerics, weakening)
     nodal, around = resolution.nodal, resolution.patches_around
+    asked.check_together(
+        {
+            asked.NODAL: nodal,
+            asked.BLOCK: resolution.block,
+            asked.DOUBLE: resolution.double,
+            asked.BENDING: record.bending,
+            asked.LAYERS: len(target.layers) > 1,
+            asked.BURST: shots.at_a_plate > 1,
+        }
+    )
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
     conditions = _conditions(scene, resolution, shots, materials)
@@ -131,7 +141,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     deepest = float((materials[-1].front + materials[-1].thickness).max())
     cells = first_window(core, shots, deepest, grids[0].spacing, grids[0].reach, nodal=nodal)
     if resolution.block:
-        check_layout(**{name: getattr(variant, name) for name in SIMPLE_ONLY})
         variant = replace(variant, window=block_window(cells))
     return Prepared(
         scene=scene,

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Record, Scene, Shots, Target
+from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import exclusions as asked
 
 Array = NDArray[np.float64]
 
@@ -71,9 +72,6 @@ NODAL: dict[str, Any] = {
     "time_step": 1.0e-6,
 }
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
-
-
-ONE_PLATE = "the nodal scheme knows one plate and no layers behind it; the consistent scheme takes layers"
 
 
 def at_level(index: int, numerics: Numerics) -> Numerics:
@@ -160,18 +158,6 @@ class Resolution:
         return min(self.step_of(impact, plate) for plate in target.layers)
 
 
-def check_scheme(record: Record, numerics: Numerics, at_a_plate: int = 1) -> None:
-    """Refuse numerics that cannot compute what is recorded, or several shots at one plate.
-
-    Raises:
-        ValueError: names the scheme.
-    """
-    wanted = {"bending = true": record.bending, "several shots at one plate": at_a_plate > 1}
-    for what, is_wanted in wanted.items():
-        if is_wanted and numerics.scheme == "nodal":
-            raise ValueError(f'got {what} beside numerics.scheme = "nodal", but it must be "consistent"')
-
-
 def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Resolution:
     """Fill in what the numerics do not give.
 
@@ -191,13 +177,8 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     }
     if nodal:
         defaults = NODAL
-        if len(scene.target.layers) > 1:
-            raise ValueError(ONE_PLATE)
-        if plate.degradation_distance is not None:
-            raise ValueError(
-                "the nodal scheme weakens the plate once per time step: it knows no degradation_distance, which the "
-                "consistent scheme takes"
-            )
+        by_path = plate.degradation_distance is not None
+        asked.check_together({asked.NODAL: True, asked.LAYERS: len(scene.target.layers) > 1, asked.BY_PATH: by_path})
     given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
     travel = level.travel if numerics.travel is None else numerics.travel
     return Resolution(

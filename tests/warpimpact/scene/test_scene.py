@@ -53,7 +53,7 @@ def test_a_plate_alone_is_a_target() -> None:
         ),
         (
             {"core": CORE.model_copy(update={"centre_of_mass": 15e-3}), "record": {"bending": True}},
-            "got bending = true beside core.centre_of_mass, but a bending moment needs the mass of every slice",
+            "output.bending = true cannot be combined with core.centre_of_mass: it needs the mass of every slice",
         ),
     ],
 )
