@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpimpact.kernels.status import LayerStatus
+from warpimpact.kernels.status import Status
 from warpimpact.records.group import Columns, Group, Returned, doubles
 from warpimpact.records.variable import BEHIND_LAYER, HITS, IN_LAYER, Variable
 
 if TYPE_CHECKING:
     from warpimpact.scene import Scene, Shots
 
-LAYER_STATUS = Variable(
-    "layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus, field="status"
-)
+LAYER_STATUS = Variable("layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=Status, field="status")
 LAYER_RESIDUAL_VELOCITY = Variable(
     "layer_residual_velocity",
     IN_LAYER,
