@@ -26,6 +26,7 @@ from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import HitMap, at_solid, described, pilot_of
 from warpimpact.scene import Scene, Shots, Target
+from warpimpact.scene import exclusions as asked
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKEST,
@@ -76,11 +77,9 @@ class LimitMap(HitMap):
         Raises:
             CampaignError: the campaign has no limits, or this search cannot find them.
         """
-        if campaign.stop is not None:
-            raise CampaignError("got a stop rule, but limits are searched for every hit: leave out the table [stop]")
-        if campaign.burst is not None:
-            raise CampaignError("got a burst, but limits are searched for every hit alone: leave out the table [burst]")
         try:
+            given = {asked.STOP: campaign.stop is not None, asked.BURST: campaign.burst is not None}
+            asked.check_together({asked.LIMIT: True} | given)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None
