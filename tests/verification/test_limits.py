@@ -12,10 +12,10 @@ from warpimpact.scene import ConeCore, Core, Interaction, Numerics, OgiveCore, P
 from warpimpact.solver.limit import Limits, limit_thickness, limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
 
-from . import references
+from . import references, scenes
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate
 
-REFERENCE = Numerics(fidelity="reference")
+REFERENCE = Numerics(**scenes.REFERENCE)
 AP_CORE = OgiveCore(diameter=6.248e-3, length=27.5e-3, crh=3.0, mass=5.3e-3)
 
 

@@ -23,7 +23,7 @@ from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.runs import shards
-from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
+from warpimpact.runs.run import Interrupted, RunProgress, run, run_to_file
 from warpimpact.runs.shards import folder_of
 
 SameBits = Callable[[Path, Path], None]
@@ -185,7 +185,7 @@ def test_the_file_is_chunked_and_compressed(undisturbed: Path) -> None:
 def stopped_after(shards: int, error: BaseException) -> object:
     """A progress function that interrupts the run."""
 
-    def follow(standing: Standing) -> None:
+    def follow(standing: RunProgress) -> None:
         if standing.saved >= 256 * shards:
             raise error
 
@@ -207,7 +207,7 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
 ) -> None:
     with pytest.raises(OutputError, match=r"holds a run that has not ended .* --resume or begin anew with --overwrite"):
         run_to_file(campaign, broken_off, device="cpu")
-    standings: list[Standing] = []
+    standings: list[RunProgress] = []
     run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
     assert standings[0].resumed >= 256
     assert standings[-1].done == standings[-1].total == COUNT
@@ -220,7 +220,7 @@ def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
 def test_overwriting_begins_anew(
     broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
 ) -> None:
-    standings: list[Standing] = []
+    standings: list[RunProgress] = []
     run_to_file(campaign, broken_off, device="cpu", overwrite=True, progress=standings.append)
     assert standings[0].resumed == 0
     assert_same_bits(broken_off, undisturbed)
@@ -377,7 +377,7 @@ def test_a_damaged_manifest_is_written_again_and_told(
     harm(folder_of(broken_off) / "manifest.json")
     with pytest.raises(OutputError, match="holds a run that has not ended"):
         run_to_file(campaign, broken_off, device="cpu")
-    standings: list[Standing] = []
+    standings: list[RunProgress] = []
     with pytest.warns(UserWarning, match=r"manifest.json: is damaged; it is written again"):
         run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
     assert standings[0].resumed >= 256  # a shard tells itself which campaign it is of
@@ -389,7 +389,7 @@ def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
 ) -> None:
     output = tmp_path / "a.nc"
 
-    def harm(standing: Standing) -> None:
+    def harm(standing: RunProgress) -> None:
         if standing.done == standing.total and output.with_name("a.nc.parts").exists():
             _cut(_shards(output))
 
@@ -507,7 +507,7 @@ command()
 """
 
 
-@pytest.mark.parametrize("name", ["promise_of", "compute"])
+@pytest.mark.parametrize("name", ["pilot", "compute"])
 @pytest.mark.parametrize("by", [signal.SIGINT, signal.SIGTERM])
 def test_a_first_signal_ends_a_run_that_is_at_work_on_the_host(
     name: str, by: signal.Signals, campaign_file: Path, tmp_path: Path

@@ -15,7 +15,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
+from warpimpact.runs.run import Interrupted, RunProgress, _Watch, run, run_to_file
+from warpimpact.runs.shards import Shards
 from warpimpact.statistics.intervals import estimate_of
 
 SameBits = Callable[[Path, Path], None]
@@ -88,7 +89,7 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
     held, ends = 0, []
     for seed in range(TRIALS):
         reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
-        watch = _Watch(reseeded, 2**16, _Held(256))
+        watch = _Watch(reseeded, 2**16, Shards(256))
         values = surface(reseeded, 0, 2**14)
         while watch.end is None:
             watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
@@ -145,7 +146,7 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
     share = np.array([(dataset["tilt"].values[r::16, 1] > 30.0).mean() for r in range(16)])
     assert told["estimate"] == pytest.approx(share.mean(), rel=1e-12)
 
-    def interrupt(standing: Standing) -> None:
+    def interrupt(standing: RunProgress) -> None:
         if standing.saved >= 256:
             raise KeyboardInterrupt
 
