@@ -171,6 +171,9 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
     status, codes = dataset[v.STATUS], [*Status]
     if not all(np.isin(status[at : at + _SLICE].values, codes).all() for at in range(0, len(status), _SLICE)):
         return f'its variable "{v.STATUS}" has codes that mean nothing'
+    for place in (dataset[name] for name in (v.HIT_Y, v.HIT_Z) if name in dataset.variables):
+        if not all(np.isfinite(place[at : at + _SLICE].values).all() for at in range(0, place.size, _SLICE)):
+            return f'its variable "{place.name}" has places that are no numbers'
     return None
 
 
