@@ -156,4 +156,4 @@ def build(variant: Variant) -> SimpleNamespace:
         nodes = window.cells_y * window.cells_z
         subtract_from(earlier.exposure, row, fields.exposure, window.first, nodes)
 
-    return SimpleNamespace(Earlier=Earlier, begin=begin, recall=recall, keep=keep)
+    return SimpleNamespace(**locals())

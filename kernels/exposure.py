@@ -221,14 +221,4 @@ def build(variant: Variant) -> SimpleNamespace:
         count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * window.cells_z
         take_scaled(fields.exposure, fields.gain, start, count, half)
 
-    return SimpleNamespace(
-        Fields=Fields,
-        own_fields=own_fields,
-        open_window=open_window,
-        gather=gather,
-        scatter=scatter,
-        scatter_plain=scatter_plain,
-        clear=clear,
-        spread=spread,
-        settle=settle,
-    )
+    return SimpleNamespace(**locals())

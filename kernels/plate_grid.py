@@ -196,16 +196,4 @@ def build(variant: Variant) -> SimpleNamespace:
         cell.z = along - column
         return cell
 
-    return SimpleNamespace(
-        Plate=Plate,
-        Window=Window,
-        Cell=Cell,
-        Box=Box,
-        window_at=window_at,
-        within=within,
-        tile_at=tile_at,
-        meet=meet,
-        clearance=clearance,
-        on_plate=on_plate,
-        cell_at=cell_at,
-    )
+    return SimpleNamespace(**locals())

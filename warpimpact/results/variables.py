@@ -1,14 +1,11 @@
 """The variables of the Datasets by their names: those that are recorded of a shot, which records/ declares, and those
-that stand beside them, with their dimensions, units and meanings.
-
-Long because it is one table: each variable stands here once.
-"""
+that stand beside them, with their dimensions, units and meanings."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.records import registry
 from warpimpact.records.bending import *
 from warpimpact.records.broken import *
@@ -105,8 +102,8 @@ OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit c
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 GROUPS = {"plate": OUTLINE_VARIABLES, "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES)}
-"""What is not along "hit" stands in groups of the file. In memory these are coordinates, which no choice of hits
-spreads over the hits."""
+"""What is not along "hit" stands in groups of the file. In memory the solid plate's are coordinates, which no choice of
+hits spreads over the hits; outlines.py says what becomes of the outlines."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
@@ -212,7 +209,7 @@ TIME_STEP = Variable("time_step", _SETTING, "s", "time step at impact velocity")
 HITS_PER_SECOND = Variable("hits_per_second", _SETTING, "s-1", "hits computed per second")
 OTHER_STATUS = Variable("other_status", _SETTING, "1", "hits whose status differs from the converged answer")
 SETTLED = Variable("settled", HITS, "1", "1 where the hit ends with the same status on all levels")
-CONVERGED_STATUS = Variable("status", HITS, "1", "how the shot ended, converged", flags=Status)
+CONVERGED_STATUS = Variable("status", HITS, "1", "how the shot ended, converged", flags=OF_SHOTS)
 CONVERGED_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity, converged")
 CONVERGED_TILT = Variable("tilt", AT_STANDOFF, "degree", "angle between core axis and line of fire, converged")
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
     from warpimpact.scene import Plate
-    from warpimpact.solver.arrays import Arrays
+    from warpimpact.solver.prepare import Prepared
 
 Array = NDArray[np.float64]
 
@@ -22,7 +22,7 @@ DEEP = 0.6
 the core's surface from its centre of mass: the core arrives turned."""
 
 
-def deep_cells(arrays: Arrays, layer: int, cells: int) -> tuple[int, int]:
+def deep_cells(arrays: Prepared, layer: int, cells: int) -> tuple[int, int]:
     """Cells of the window of a layer behind the plate, if the plate's has so many; 0 if the layer keeps no field."""
     if not arrays.materials[layer].weakens:
         return 0, 0
@@ -48,7 +48,7 @@ class Weakened(NamedTuple):
 
 
 def weakened(
-    arrays: Arrays, plates: Sequence[Plate], hit: tuple[float, float], scratch: tuple[Any, ...], cells: Sequence[Any]
+    arrays: Prepared, plates: Sequence[Plate], hit: tuple[float, float], scratch: tuple[Any, ...], cells: Sequence[Any]
 ) -> dict[int, Weakened]:
     """The layers behind the plate that weaken and that the last shot reached, after a march of one slot.
 

@@ -11,7 +11,7 @@ import xarray
 from warpimpact import Campaign, run
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.text import CampaignError
-from warpimpact.kernels.status import LayerStatus
+from warpimpact.kernels.status import Status
 from warpimpact.runs.replay import replay
 from warpimpact.scene import Layer
 
@@ -90,8 +90,16 @@ def test_layers_stand_behind_the_plate_in_order() -> None:
         ('"8 mm"', "{ distribution = 'normal', mean = '1 mm', std = '1 mm' }", r"layer\[1\].thickness: got a normal"),
         ('["2 mm", "0 mm"]', '"2 mm"', r"layer\[0\].offset: got \"2 mm\", but it must be a list"),
         ('["2 mm", "0 mm"]', '["2 mm", {distribution = "x"}]', r"layer\[0\].offset\[1\]"),
-        ("patches_axial = 14", 'scheme = "nodal"', r"got numerics.scheme = \"nodal\" beside 2 \[\[layer\]\]"),
-        ("replicates = 8", "irreducible = true", r"got hits.irreducible = true beside layer\[0\] with a pattern"),
+        (
+            "patches_axial = 14",
+            'scheme = "nodal"',
+            r"\[\[layer\]\] cannot be combined with numerics.scheme = \"nodal\"",
+        ),
+        (
+            "replicates = 8",
+            "irreducible = true",
+            r"hits.irreducible = true cannot be combined with layer\[0\] with a pattern",
+        ),
     ],
 )
 def test_a_message_names_the_layer(old: str, new: str, message: str) -> None:
@@ -114,12 +122,12 @@ def test_a_result_tells_of_every_layer(result: xarray.Dataset) -> None:
     assert result.sizes["layer"] == 3
     assert result["layer_status"].attrs["flag_meanings"].split()[-1] == "not_reached"
     status = result["layer_status"].values
-    left = (status == LayerStatus.PERFORATED) | (status == LayerStatus.MISSED)
+    left = (status == Status.PERFORATED) | (status == Status.MISSED)
     for name in ("layer_residual_velocity", "layer_tilt", "layer_time"):
         np.testing.assert_array_equal(np.isfinite(result[name].values), left, err_msg=name)
     rests = result["stopped_in"].values >= 0
     np.testing.assert_array_equal(np.isfinite(result["depth"]), rests)
-    assert (status[rests, result["stopped_in"].values[rests]] == LayerStatus.ARRESTED).all()
+    assert (status[rests, result["stopped_in"].values[rests]] == Status.ARRESTED).all()
     np.testing.assert_allclose(result["layer_front"], [0.0, 54e-3, 62e-3])
     told = json.loads(result.attrs["layers"])
     assert told["1"]["offset_y"]["distribution"] == "uniform"

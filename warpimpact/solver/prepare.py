@@ -1,10 +1,11 @@
-"""From a scene and its shots to the plain arrays that the kernels read: the one place where it is resolved."""
+"""From a scene, its shots and numerics to the plain arrays that the kernels read: the one place where all choices are
+made, for those who build, march or describe."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TYPE_CHECKING
 
@@ -12,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
+from warpimpact.scene import exclusions as asked
 from warpimpact.scene.quantities import BY_LAYER
-from warpimpact.solver.bending import Sections, check_bending, sections_of
-from warpimpact.solver.blocks import SIMPLE_ONLY, check_layout, in_blocks
+from warpimpact.solver.bending import Sections, sections_of
+from warpimpact.solver.blocks import block_window, first_window
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
@@ -22,7 +24,6 @@ from warpimpact.solver.tile import FINER, FINEST, Tile, tent_taps, tile_of
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core, Numerics, Plate, Scene, Shots
-    from warpimpact.solver.resolution import Fidelity
 
 Array = NDArray[np.float64]
 
@@ -58,11 +59,12 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Arrays:
+class Prepared:
     """A scene and its shots as the kernels see them: SI and radians.
 
     Attributes:
-        resolution: the numerics with every choice made.
+        scene, shots: what was prepared.
+        resolution: its numerics with every choice made.
         variant: the build of the kernels that the scene needs.
         core, rings: the core, and its surface.
         azimuths: of the patches of even rings, then of odd rings [rad], shape [2 around].
@@ -70,12 +72,15 @@ class Arrays:
         grids: the plate, and the layers behind it.
         materials: of the plate, and of the layers behind it.
         onset: κ of the law.
-        shots: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
+        conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
+        cells: nodes of a first window, in each direction.
         rows: of the trace of each shot; 0 for none.
         layer_standoffs: distances behind the rear face of every layer [m].
         ahead: of the centre of mass, the point that passes stand-offs [m].
     """
 
+    scene: Scene
+    shots: Shots
     resolution: Resolution
     variant: Variant
     core: Core
@@ -85,7 +90,8 @@ class Arrays:
     grids: list[Grid]
     materials: list[Materials]
     onset: float
-    shots: dict[str, Array]
+    conditions: dict[str, Array]
+    cells: int
     rows: int
     layer_standoffs: Array
     ahead: float
@@ -96,10 +102,69 @@ class Arrays:
         return self.grids[0]
 
 
-def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
+def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = False) -> Prepared:
+    """Make every choice for some shots.
+
+    Args:
+        numerics: those of a resolution; for an accuracy a pilot finds it first.
+        traced: leave room for the history of every shot.
+
+    Raises:
+        ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
+            several shots at one plate or layers; or the block layout does not compute the scene.
+        MemoryError: the plate's period does not fit at the grid spacing.
+    """
+    core, target, record = scene.core, scene.target, scene.record
+    if numerics.explicit is None:
+        raise ValueError("got numerics that name an accuracy, for which a pilot finds the resolution, but no pilot did")
+    weakening = weakens(target, shots)
+    resolution = resolve(scene, numerics, weakening)
+    nodal, around = resolution.nodal, resolution.patches_around
+    asked.check_together(
+        {
+            asked.NODAL: nodal,
+            asked.BLOCK: resolution.block,
+            asked.DOUBLE: resolution.double,
+            asked.BENDING: record.bending,
+            asked.LAYERS: len(target.layers) > 1,
+            asked.BURST: shots.at_a_plate > 1,
+        }
+    )
+    rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
+    materials = materials_of(scene, shots)
+    conditions = _conditions(scene, resolution, shots, materials)
+    variant = _variant(resolution, scene, shots, degrades=any(weakening))
+    grids = [
+        _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length)
+        for plate in target.layers
+    ]
+    deepest = float((materials[-1].front + materials[-1].thickness).max())
+    cells = first_window(core, shots, deepest, grids[0].spacing, grids[0].reach, nodal=nodal)
+    if resolution.block:
+        variant = replace(variant, window=block_window(cells))
+    return Prepared(
+        scene=scene,
+        shots=shots,
+        resolution=resolution,
+        variant=variant,
+        core=core,
+        rings=rings,
+        azimuths=azimuths_of(around),
+        sections=sections_of(core, rings) if record.bending else None,
+        grids=grids,
+        materials=materials,
+        onset=scene.interaction.onset,
+        conditions=conditions,
+        cells=cells,
+        rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
+        layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
+        ahead=record.ahead(core),
+    )
+
+
+def _variant(resolution: Resolution, scene: Scene, shots: Shots, *, degrades: bool) -> Variant:
     """The build of the kernels that a scene needs."""
     plates, interaction = scene.target.layers, scene.interaction
-    degrades = any(weakens(scene.target, shots))
     return Variant(
         double=resolution.double,
         nodal=resolution.nodal,
@@ -111,48 +176,6 @@ def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
         layered=len(plates) > 1,
         burst=degrades and shots.at_a_plate > 1,
     )
-
-
-def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, traced: bool = False) -> Arrays:
-    """Resolve a scene for its shots.
-
-    Args:
-        traced: leave room for the history of every shot.
-
-    Raises:
-        ValueError: the numerics have no bending moment, which the scene records, or the block layout does not compute
-            the scene.
-        MemoryError: the plate's period does not fit at the grid spacing.
-    """
-    core, target, record = scene.core, scene.target, scene.record
-    check_bending(record, numerics)
-    resolution = resolve(numerics, scene, shots)
-    nodal, around = resolution.nodal, resolution.patches_around
-    rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
-    materials = materials_of(scene, shots)
-    conditions = _conditions(scene, resolution, shots, materials)
-    arrays = Arrays(
-        resolution=resolution,
-        variant=variant_of(resolution, scene, shots),
-        core=core,
-        rings=rings,
-        azimuths=azimuths_of(around),
-        sections=sections_of(core, rings) if record.bending else None,
-        grids=[
-            _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length)
-            for plate in target.layers
-        ],
-        materials=materials,
-        onset=scene.interaction.onset,
-        shots=conditions,
-        rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
-        layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
-        ahead=record.ahead(core),
-    )
-    if resolution.block:
-        check_layout(**{name: getattr(arrays.variant, name) for name in SIMPLE_ONLY})
-        return in_blocks(arrays, shots)
-    return arrays
 
 
 def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:
