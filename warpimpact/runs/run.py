@@ -216,8 +216,8 @@ class _Watch:
     def __init__(self, campaign: Campaign, total: int, shards: Shards, measures: Sequence[str] = ()) -> None:
         self._total, self._shards, self._load = total, -(-total // shards.extent), shards.shard
         self._rule = campaign.stop
-        last = campaign.output.standoffs[-1]
-        measures = measures or ("mean(residual_velocity)", f"mean(tilt@{last * 1e3:.10g}mm)")
+        tilts = [f"mean(tilt@{last * 1e3:.10g}mm)" for last in campaign.output.standoffs[-1:]]
+        measures = measures or ("mean(residual_velocity)", *tilts)
         dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
         self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
         if self._rule is not None:

@@ -209,6 +209,8 @@ class ShardsOnDisk(Shards):
 
     def _read_manifest(self) -> dict[str, Any] | None:
         """What was begun here; None if nothing was, which a missing manifest means; empty if that cannot be known."""
+        if (self.folder / _MANIFEST).is_fifo():  # it would be waited for
+            return {}
         try:
             begun = json.loads((self.folder / _MANIFEST).read_bytes())
             replaces, known = begun.pop("replaces"), begun.pop("fingerprint")
@@ -280,7 +282,7 @@ class ShardsOnDisk(Shards):
             file.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
     def _shards(self) -> list[Path]:
-        return sorted(self.folder.glob(_SHARDS))
+        return sorted(path for path in self.folder.glob(_SHARDS) if not path.is_fifo())
 
     def _stem(self, index: int) -> str:
         return f"hits_{index * self.extent:010d}"
@@ -396,7 +398,7 @@ class ShardsOnDisk(Shards):
 
     def discard(self) -> None:
         """Empty the folder: first of its manifest, without which the rest means nothing."""
-        for path in (self.folder / _MANIFEST, *self._shards(), *self.folder.glob(".*.part")):
+        for path in (self.folder / _MANIFEST, *self.folder.glob(_SHARDS), *self.folder.glob(".*.part")):
             _remove(path)
 
 
