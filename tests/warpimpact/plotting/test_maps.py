@@ -217,9 +217,7 @@ def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered
     points = clear_points(covered, 60)
     matches = [
         np.allclose(
-            picture.colour(y * 1e3, z * 1e3),
-            colours[covered["status"].values[nearest_hit(covered, y, z)]],
-            atol=0.01,
+            picture.colour(y * 1e3, z * 1e3), colours[covered["status"].values[nearest_hit(covered, y, z)]], atol=0.01
         )
         for y, z in points
     ]
