@@ -140,7 +140,7 @@ class Shards:
         """Take in a shard."""
         self._held[index] = table
 
-    def load(self, index: int) -> Table:
+    def shard(self, index: int) -> Table:
         """A shard that is there."""
         return self._held[index]
 
@@ -354,13 +354,13 @@ class ShardsOnDisk(Shards):
             self.flush()
         return len(self._shards())
 
-    def load(self, index: int) -> Table:
+    def shard(self, index: int) -> Table:
         """A shard that is there.
 
         Raises:
             OutputError: it is gone or damaged meanwhile.
         """
-        return super().load(index) if index in self._held else read_table(self._path(index))
+        return super().shard(index) if index in self._held else read_table(self._path(index))
 
     def _grow(self, count: int | None = None) -> None:
         """Add the shards to the result file that are there and follow those in it, or the first `count` shards."""
@@ -369,7 +369,7 @@ class ShardsOnDisk(Shards):
             self._growing = IncrementalFile(self.output, self.folder / _GROWING, hits)
         there = self.there()
         while self._grown in there if count is None else self._grown < count:
-            self._growing.add(self.load(self._grown))
+            self._growing.add(self.shard(self._grown))
             self._grown += 1
 
     def _stop_growing(self) -> None:
@@ -388,7 +388,7 @@ class ShardsOnDisk(Shards):
         Raises:
             OutputError: the file cannot be written, or a shard is damaged meanwhile; the others are still there.
         """
-        told = {**attributes(self.load(0)), attr.FINGERPRINT: self._fingerprint}
+        told = {**attributes(self.shard(0)), attr.FINGERPRINT: self._fingerprint}
         self._grow(count)
         assert self._growing is not None  # there are hits
         self._growing.complete(told)

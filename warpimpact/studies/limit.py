@@ -27,6 +27,7 @@ from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, 
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots, Target
+from warpimpact.scene import exclusions as asked
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -71,11 +72,9 @@ class LimitMap:
         Raises:
             CampaignError: the campaign has no limits, or this search cannot find them.
         """
-        if campaign.stop is not None:
-            raise CampaignError("got a stop rule, but limits are searched for every hit: leave out the table [stop]")
-        if campaign.burst is not None:
-            raise CampaignError("got a burst, but limits are searched for every hit alone: leave out the table [burst]")
         try:
+            given = {asked.STOP: campaign.stop is not None, asked.BURST: campaign.burst is not None}
+            asked.check_together({asked.LIMIT: True} | given)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None
