@@ -51,6 +51,7 @@ from warpimpact.statistics.intervals import Estimate, estimate_of
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
+_UNITS_OF = {quantity: names.value.units for quantity, names in v.LIMITS.items()}
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
 
@@ -224,7 +225,7 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     for name, share in QUANTILES.items():
         estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
         ends = (estimate.value, estimate.low, estimate.high)
-        estimate = over_draws(dataset, estimate, counted, units="m s-1", kind="quantile")
+        estimate = over_draws(dataset, estimate, counted, units=_UNITS_OF[quantity], kind="quantile")
         value_, low, high = (math.inf if end >= highest else end for end in ends)
         found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
     return found
