@@ -134,7 +134,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 block.barrier()
                 memories.spread(plate, fields, window, found.box)
                 block.barrier()
-            sums = touching.sum_patches(surface, law, fields, touches, pose, base, begin, end)
+            sums = touching.sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
             load.force = block.total_triple(sums.force)
             load.moment = block.total_triple(sums.moment)
             slopes = total_slopes(sums.slopes)

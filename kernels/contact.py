@@ -36,7 +36,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
         `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
         that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
-        of the tile and of the grid; `y` and `z` are its place in the grid's cell. `ring_area` is the area of all
+        of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
+        planes. `ring_area` is the area of all
         patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
         `total_area` is the area of a ring in all layers of a target.
         """
@@ -47,6 +48,7 @@ def build(variant: Variant) -> SimpleNamespace:
         gain: wp.array(dtype=real)
         tile: wp.array(dtype=wp.int32)
         cell: wp.array(dtype=wp.int32)
+        x: wp.array(dtype=real)
         y: wp.array(dtype=real)
         z: wp.array(dtype=real)
         ring_area: wp.array(dtype=real)
@@ -101,7 +103,12 @@ def build(variant: Variant) -> SimpleNamespace:
             write(touches.gain, base + j, per_node * area * wp.abs(grips.normal_along_x(pose, patch, face)))
             write_index(touches.tile, base + j, grid.tile_at(plate, window, patch.y, patch.z))
             cell = grid.cell_at(window, patch.y, patch.z)
-            write_index(touches.cell, base + j, wp.clamp(cell.index, window.first, last_cell))
+            index = wp.clamp(cell.index, window.first, last_cell)
+            if wp.static(variant.deep):
+                plane = grid.planes_at(window, patch.x)
+                write(touches.x, base + j, plane - wp.floor(plane))
+                index += wp.int32(wp.floor(plane)) * window.nodes
+            write_index(touches.cell, base + j, index)
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
             if wp.static(variant.window > 0):
@@ -115,7 +122,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
 
     @wp.func
-    def expose(surface: Surface, fields: Fields, touches: Touches, first: wp.int32):
+    def expose(surface: Surface, fields: Fields, window: Window, touches: Touches, first: wp.int32):
         """Add the exposure of a ring's patches to the plate, one patch of each quarter in turn. Neighbours share nodes,
         so a CPU would have to wait between them. A patch that does not touch adds zero, which is faster than a
         branch."""
@@ -125,7 +132,12 @@ def build(variant: Variant) -> SimpleNamespace:
             for k in range(4):
                 i = j + k * quarter
                 cell, y, z = read_index(touches.cell, i), read(touches.y, i), read(touches.z, i)
-                memories.scatter(fields.gain, fields.cells_z, cell, y, z, read(touches.gain, i))
+                gain = read(touches.gain, i)
+                if wp.static(variant.deep):
+                    ahead = read(touches.x, i) * gain
+                    memories.scatter(fields.gain, fields.cells_z, cell + window.nodes, y, z, ahead)
+                    gain -= ahead
+                memories.scatter(fields.gain, fields.cells_z, cell, y, z, gain)
             j += 1
 
     def summing(weakened: bool) -> Any:
@@ -136,6 +148,7 @@ def build(variant: Variant) -> SimpleNamespace:
             surface: Surface,
             law: Law,
             fields: Fields,
+            window: Window,
             touches: Touches,
             pose: Pose,
             base: wp.int32,
@@ -162,7 +175,11 @@ def build(variant: Variant) -> SimpleNamespace:
                 if wp.static(weakened):
                     cell = read_index(touches.cell, base + j)
                     y, z = read(touches.y, base + j), read(touches.z, base + j)
-                    left = laws.remaining(law, memories.gather(fields.exposure, fields.cells_z, cell, y, z))
+                    exposed = memories.gather(fields.exposure, fields.cells_z, cell, y, z)
+                    if wp.static(variant.deep):
+                        ahead = memories.gather(fields.exposure, fields.cells_z, cell + window.nodes, y, z)
+                        exposed = wp.max(zero, exposed + read(touches.x, base + j) * (ahead - exposed))
+                    left = laws.remaining(law, exposed)
                 area = left * read(touches.area, base + j)
                 stress = laws.normal_stress(law, face.closing)
                 slope = left * read(touches.slope, base + j) * stress
@@ -267,8 +284,8 @@ def build(variant: Variant) -> SimpleNamespace:
         begin, end = first * surface.around, (last + 1) * surface.around
         if wp.static(mixed):
             if not window.weakens:
-                return sum_sound(surface, law, fields, touches, pose, base, begin, end)
-        return sum_patches(surface, law, fields, touches, pose, base, begin, end)
+                return sum_sound(surface, law, fields, window, touches, pose, base, begin, end)
+        return sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
 
     @wp.func
     def load_on(
@@ -308,7 +325,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     # stored as vectors.
                     for index in range(first, last + 1):
                         if touches.ring_area[slot * surface.rings + index] > zero:
-                            expose(surface, fields, touches, base + index * surface.around)
+                            expose(surface, fields, window, touches, base + index * surface.around)
                     memories.spread(plate, fields, window, found.box)
             sums = Sums()
             if wp.static(variant.bends):

@@ -1,4 +1,8 @@
-"""The exposure T [s] that each node of a window remembers, and the tent filter that spreads it (docs/model.md §4)."""
+"""The exposure T [s] that each node of a window remembers, and how a contact spreads it (docs/model.md §4): over the
+degradation length in the plane of the plate, by the tent filter, and over the degradation depth through its thickness.
+
+A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth.
+"""
 
 from functools import cache
 from types import SimpleNamespace
@@ -13,15 +17,16 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the exposure for one variant."""
     real = variant.real
-    half = real(0.5)
+    half, one = real(0.5), real(1.0)
+    sharp, blurred = real(0.75), real(-0.125)
     read, write = memory.build(real).read, memory.build(real).write
     grid, block, split = plate_grid.build(variant), lanes.build(variant), lanes.split(variant)
     Plate, Window, Box = grid.Plate, grid.Window, grid.Box
 
     @wp.struct
     class Fields:
-        """Scratch of all slots, each cells_y × cells_z: exposure [s], exposure gained in the step [s], and room for
-        the filter."""
+        """Scratch of all slots, each planes × cells_y × cells_z: exposure [s], exposure gained in the step [s], and
+        room for the filter."""
 
         exposure: wp.array(dtype=real)
         gain: wp.array(dtype=real)
@@ -131,6 +136,23 @@ def build(variant: Variant) -> SimpleNamespace:
         """target[j] += factor × source[j] for start ≤ j < start + count; target and source are different arrays."""
         ...
 
+    @wp.func_native("""
+    assert(start >= 0 && start + count <= target.shape[0] && first >= 0 && first + count <= source.shape[0]);
+    auto* __restrict__ into = target.data + start;
+    const auto* __restrict__ from = source.data + first;
+    for (int j = 0; j < count; ++j) into[j] += factor * from[j];
+    """)
+    def add_from(
+        target: wp.array(dtype=real),
+        start: wp.int32,
+        source: wp.array(dtype=real),
+        first: wp.int32,
+        count: wp.int32,
+        factor: real,
+    ):
+        """target[start + j] += factor × source[first + j] for j < count; the two ranges do not overlap."""
+        ...
+
     @wp.func_native(
         split("""
     assert(start >= 0 && start + count <= source.shape[0]);
@@ -158,7 +180,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def blank(fields: Fields, window: Window):
         """Make the plate untouched: no exposure."""
-        nodes = window.cells_y * window.cells_z
+        nodes = window.planes * window.nodes
         clear(fields.exposure, window.first, nodes)
         clear(fields.gain, window.first, nodes)
 
@@ -177,9 +199,66 @@ def build(variant: Variant) -> SimpleNamespace:
             filter_far(target, source, start, count, k * step, plate.taps[k])
 
     @wp.func
+    def filter_plane(plate: Plate, fields: Fields, start: wp.int32, count: wp.int32, stride: wp.int32):
+        """Filter the gained exposure of some rows, whose first node is `start`, one direction after the other."""
+        above = plate.reach * stride
+        filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
+        if wp.static(variant.window > 0):
+            block.barrier()  # the other direction reads what other lanes have filtered, and overwrites what they read
+        filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
+
+    @wp.func
+    def add_plane(
+        fields: Fields,
+        window: Window,
+        box: Box,
+        into: wp.int32,
+        plane: wp.int32,
+        start: wp.int32,
+        count: wp.int32,
+        factor: real,
+    ):
+        """Add the gained exposure of one plane, as far as the step touches it, to the sum of another."""
+        if plane >= box.plane_low and plane <= box.plane_high:
+            add_from(
+                fields.filtered, start + into * window.nodes, fields.gain, start + plane * window.nodes, count, factor
+            )
+
+    @wp.func
+    def sum_planes(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+        """Sum the gained exposure, from node `start` of each plane on, over the planes up to the plate's reach away.
+        The two at its ends count half, so that the sum is the trapezoidal rule over twice the depth."""
+        reach = plate.plane_reach
+        low = wp.max(0, box.plane_low - reach - 2)
+        high = wp.min(window.planes - 1, box.plane_high + reach + 2)
+        clear(fields.filtered, start + low * window.nodes, count)
+        for plane in range(box.plane_low, wp.min(low + reach, box.plane_high + 1)):
+            add_plane(fields, window, box, low, plane, start, count, one)
+        add_plane(fields, window, box, low, low + reach, start, count, half)
+        for plane in range(low + 1, high + 1):
+            first, before = start + plane * window.nodes, start + (plane - 1) * window.nodes
+            clear(fields.filtered, first, count)
+            add_from(fields.filtered, first, fields.filtered, before, count, one)
+            add_plane(fields, window, box, plane, plane + reach, start, count, half)
+            add_plane(fields, window, box, plane, plane + reach - 1, start, count, half)
+            add_plane(fields, window, box, plane, plane - reach, start, count, -half)
+            add_plane(fields, window, box, plane, plane - reach - 1, start, count, -half)
+        add_sharpened(plate, fields, window, box, start, count)
+
+    @wp.func
+    def add_sharpened(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+        """Add half of the sums over planes to the exposure, less what interpolation between planes blurs."""
+        high = wp.min(window.planes - 2, box.plane_high + plate.plane_reach + 1)
+        for plane in range(wp.max(1, box.plane_low - plate.plane_reach - 1), high + 1):
+            first = start + plane * window.nodes
+            add_from(fields.exposure, first, fields.filtered, first, count, sharp)
+            add_from(fields.exposure, first, fields.filtered, first - window.nodes, count, blurred)
+            add_from(fields.exposure, first, fields.filtered, first + window.nodes, count, blurred)
+
+    @wp.func
     def spread(plate: Plate, fields: Fields, window: Window, box: Box):
-        """Filter the gained exposure with the tent K of the law, one direction after the other, and add half of it to
-        the exposure. The sum is the exposure at mid-step.
+        """Spread the gained exposure by the tent K of the law and over the degradation depth, and add half of it to the
+        exposure. The sum is the exposure at mid-step.
 
         Whole rows are filtered at once. Values that wrap from one row to the next are zero, because the box keeps the
         filter's reach away from the window's edge.
@@ -188,18 +267,25 @@ def build(variant: Variant) -> SimpleNamespace:
         above = plate.reach * stride
         start = window.first + box.y_low * stride
         count = (box.y_high - box.y_low + 1) * stride
-        filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
-        if wp.static(variant.window > 0):
-            block.barrier()  # the other direction reads what other lanes have filtered, and overwrites what they read
-        filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
-        add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
+        if wp.static(variant.deep):
+            for plane in range(box.plane_low, box.plane_high + 1):
+                filter_plane(plate, fields, start + plane * window.nodes, count, stride)
+            sum_planes(plate, fields, window, box, start - above, count + 2 * above)
+        else:
+            filter_plane(plate, fields, start, count, stride)
+            add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
 
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
         """Add the other half of the gained exposure and clear it for the next step."""
         start = window.first + (box.y_low - plate.reach) * window.cells_z
         count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * window.cells_z
-        take_scaled(fields.exposure, fields.gain, start, count, half)
+        if wp.static(variant.deep):
+            add_sharpened(plate, fields, window, box, start, count)
+            for plane in range(box.plane_low, box.plane_high + 1):
+                clear(fields.gain, start + plane * window.nodes, count)
+        else:
+            take_scaled(fields.exposure, fields.gain, start, count, half)
 
     return SimpleNamespace(
         Fields=Fields,

@@ -29,6 +29,7 @@ class Variant:
         bends: the core's largest bending moment is recorded.
         layered: the target has several layers.
         burst: several shots hit one and the same plate.
+        deep: a plate is thicker than the depth over which its material weakens together.
         window: nodes of a shot's window in shared memory, at most, in the block layout: one block of CUDA threads per
             shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
     """
@@ -42,6 +43,7 @@ class Variant:
     bends: bool = False
     layered: bool = False
     burst: bool = False
+    deep: bool = False
     window: int = 0
 
     @property

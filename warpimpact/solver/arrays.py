@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import TYPE_CHECKING
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+FEWEST_PLANES = 2
+"""Per degradation depth."""
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
 STEP_ALLOWANCE = 200
@@ -42,6 +44,9 @@ class Grid:
         period, half_size: extents (y, z) of the period, and half of those of the plate [m]; infinite without a rim.
         spacing: of the window's grid [m].
         taps: the tent's filter from its middle on, and one 0.
+        planes: of the window's grid through the thickness; 1 stands for all of it.
+        plane_spacing: between two of them [m].
+        plane_reach: planes in a degradation depth.
     """
 
     tile: Tile
@@ -49,6 +54,9 @@ class Grid:
     half_size: tuple[float, float]
     spacing: float
     taps: Array
+    planes: int = 1
+    plane_spacing: float = math.inf
+    plane_reach: int = 0
 
     @property
     def reach(self) -> int:
@@ -95,7 +103,7 @@ class Arrays:
         return self.grids[0]
 
 
-def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
+def variant_of(resolution: Resolution, scene: Scene, shots: Shots, materials: list[Materials]) -> Variant:
     """The build of the kernels that a scene needs."""
     plates, interaction, scattered = scene.target.plates, scene.interaction, shots.columns
     degrades = any(weakens(scene.target, scattered))
@@ -107,6 +115,7 @@ def variant_of(resolution: Resolution, scene: Scene, shots: Shots) -> Variant:
         or not scattered.keys().isdisjoint(("shear_coefficient", "layer_shear_coefficient")),
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
         rimmed=any(plate.size is not None for plate in plates),
+        deep=degrades and not resolution.nodal and any(map(_is_deep, plates, materials)),
         bends=scene.record.bending,
         layered=len(plates) > 1,
         burst=degrades and shots.at_a_plate > 1,
@@ -130,17 +139,25 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
+    variant = variant_of(resolution, scene, shots, materials)
     conditions = _conditions(scene, resolution, shots, materials)
     arrays = Arrays(
         resolution=resolution,
-        variant=variant_of(resolution, scene, shots),
+        variant=variant,
         core=core,
         rings=rings,
         azimuths=azimuths_of(around),
         sections=sections_of(core, rings) if record.bending else None,
         grids=[
-            _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length)
-            for plate in target.plates
+            _through(
+                _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length),
+                plate,
+                resolution,
+                float(material.thickness.max()),
+            )
+            if variant.deep
+            else _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length)
+            for plate, material in zip(target.plates, materials, strict=True)
         ],
         materials=materials,
         onset=scene.interaction.onset,
@@ -169,6 +186,20 @@ def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:
         spacing=spacing,
         taps=half_taps(0.0 if nodal else plate.degradation_length, spacing),
     )
+
+
+def _is_deep(plate: Plate, material: Materials) -> bool:
+    """Whether a layer is thicker than the depth over which it weakens together, in any shot."""
+    return material.weakens and bool((material.thickness > plate.degradation_depth).any())
+
+
+def _through(grid: Grid, plate: Plate, resolution: Resolution, thickness: float) -> Grid:
+    """The grid of a layer of this thickness [m] with its planes, about as far apart as a step goes."""
+    reach = max(
+        FEWEST_PLANES, math.ceil(plate.degradation_depth / float(resolution.travel * resolution.passage(thickness)))
+    )
+    spacing = plate.degradation_depth / reach
+    return replace(grid, planes=math.floor(thickness / spacing) + 4, plane_spacing=spacing, plane_reach=reach)
 
 
 def half_taps(length: float, spacing: float) -> Array:

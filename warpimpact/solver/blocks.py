@@ -25,6 +25,7 @@ SIMPLE_ONLY: Mapping[str, str] = {
     "bends": "the bending moment",
     "layered": "layers",
     "burst": "several shots at one plate",
+    "deep": "a plate thicker than its degradation_depth",
 }
 """What only the simple layout computes: members of `Variant`, and what they are called."""
 

@@ -148,6 +148,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
     plate.taps, plate.reach = put(grid.taps), grid.reach
+    plate.planes, plate.per_plane, plate.plane_reach = grid.planes, 1.0 / grid.plane_spacing, grid.plane_reach
     return plate
 
 

@@ -138,8 +138,9 @@ class March:
             return _host(scratch[0].share).reshape(self.cells), {}
         exposure = np.zeros(math.prod(self.cells))
         if self.variant.degrades and self.arrays.materials[0].weakens:
-            exposure = _host(scratch[0].exposure)[: exposure.size]
-        decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure.reshape(self.cells))
+            planes = self.arrays.grid.planes
+            exposure = _host(scratch[0].exposure)[: planes * exposure.size].reshape(planes, -1)
+        decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure).reshape(-1, *self.cells).mean(axis=0)
         return np.asarray(self._material * decayed), self._behind(scratch)
 
     def _behind(self, scratch: tuple[Any, ...]) -> dict[int, Weakened]:
@@ -210,7 +211,8 @@ class March:
 
     def _nodes(self, cells_y: int, cells_z: int) -> int:
         """Nodes of a slot in all its windows."""
-        return sum(y * z for y, z in self._windows(cells_y, cells_z))
+        windows = zip(self._windows(cells_y, cells_z), self.arrays.grids, strict=True)
+        return sum(grid.planes * y * z for (y, z), grid in windows)
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
@@ -218,7 +220,7 @@ class March:
         rings: int = self.inputs.surface.rings * per_ring
         nodes = self._nodes(cells_y, cells_z)
         earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
-        return len(self._fields()) * nodes * size + earlier + self._patches() * (6 * size + 2 * 4) + rings
+        return len(self._fields()) * nodes * size + earlier + self._patches() * (7 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
@@ -252,7 +254,7 @@ class March:
         for name in self._fields():
             setattr(scratch, name, empty(slots * self._nodes(cells_y, cells_z)))
         patches = slots * self._patches()
-        for name in ("area", "slope", "shift", "gain", "y", "z"):
+        for name in ("area", "slope", "shift", "gain", "y", "z", *(["x"] if self.variant.deep else [])):
             setattr(touches, name, empty(patches))
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))

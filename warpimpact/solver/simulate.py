@@ -16,6 +16,7 @@ from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
 from warpimpact.solver.layering import Weakened
 from warpimpact.solver.marching import March, Progress
+from warpimpact.solver.materials import materials_of
 from warpimpact.solver.resolution import Fidelity, resolve
 
 Array = NDArray[np.float64]
@@ -190,7 +191,7 @@ def simulate(
 def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None, device: str = "auto") -> None:
     """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
     resolution = resolve(numerics or Numerics(), scene, shots.columns)
-    variant = variant_of(resolution, scene, shots)
+    variant = variant_of(resolution, scene, shots, materials_of(scene, shots))
     if resolution.block:  # the window is a part of this variant
         variant = arrays_of(scene, numerics or Numerics(), shots).variant
     for stage in (marching, free_flight):

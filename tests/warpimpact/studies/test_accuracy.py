@@ -256,9 +256,7 @@ def test_report_holds_the_study(
     write(make_result(100), tmp_path / "a.nc")
     write(small, tmp_path / "study.nc")
     page = tmp_path / "a.html"
-    assert (
-        main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "study.nc"), "--trajectories", "0"]) == 0
-    )
+    assert main(["report", str(tmp_path / "a.nc"), "--study", str(tmp_path / "study.nc"), "--trajectories", "0"]) == 0
     text = html.unescape(page.read_text())
     for setting in small["setting"].values:
         one = small.sel(setting=setting).isel(standoff=-1)
