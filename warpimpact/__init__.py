@@ -15,12 +15,14 @@ if TYPE_CHECKING:
     from .campaign.stop import Stop
     from .campaign.text import CampaignError
     from .export.table import to_dataframe
+    from .records.outcomes import Outcomes
     from .results.files import OutputError, ResultError, open_result
     from .runs.cluster import cluster_team
     from .runs.replay import replay
     from .runs.run import run, run_to_file
     from .runs.team import ClusterError
     from .scene import (
+        Accuracy,
         CirclePattern,
         ConeCore,
         Core,
@@ -44,17 +46,17 @@ if TYPE_CHECKING:
         SlotPattern,
         SquarePattern,
         Target,
-        Tolerance,
         TrianglePattern,
         make_shots,
     )
     from .solver.device import DeviceError
     from .solver.limit import limit_thickness, limit_velocity
-    from .solver.simulate import Outcomes, simulate
+    from .solver.simulate import simulate
 
     __version__: str
 
 __all__ = [
+    "Accuracy",
     "Campaign",
     "CampaignError",
     "CirclePattern",
@@ -88,7 +90,6 @@ __all__ = [
     "SquarePattern",
     "Stop",
     "Target",
-    "Tolerance",
     "TrianglePattern",
     "__version__",
     "cluster_team",
@@ -112,7 +113,7 @@ _HOMES = {
     "ClusterError": ".runs.team",
     "Comparison": ".analysis.comparison",
     "DeviceError": ".solver.device",
-    "Outcomes": ".solver.simulate",
+    "Outcomes": ".records.outcomes",
     "Output": ".campaign.campaign",
     "OutputError": ".results.files",
     "ResultError": ".results.files",

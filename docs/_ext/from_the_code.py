@@ -226,19 +226,15 @@ class VariableReference(FromTheCode):
     """Variables of a hit map, with dimensions and units."""
 
     def lines(self) -> Iterator[str]:
+        from warpimpact.records.registry import RECORDS
         from warpimpact.results import variables
 
         groups = {
             "Coordinates": variables.COORDINATES,
             "Impact": variables.SHOT_VARIABLES,
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
-            "How the shot ended": variables.OUTCOME_VARIABLES,
-            "With `output.bending`": variables.BENDING_VARIABLES,
-            "With `core.strength`": variables.BROKEN_VARIABLES,
-            "With layers behind the plate": (*variables.LAYER_VARIABLES, *variables.LAYER_FACES),
-            "With `output.layer_standoffs`": (*variables.LAYER_COORDINATES, *variables.LAYER_STANDOFF_VARIABLES),
             "With bursts": variables.BURST_VARIABLES,
-            "With a tolerance": variables.ESTIMATE_VARIABLES,
+            **{group.title: (*group, *group.beside) for group in RECORDS},
         }
         for title, group in groups.items():
             yield from [f"## {title}", ""]

@@ -25,10 +25,11 @@ from floor import work_of
 from matplotlib.figure import Figure
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics, Record, Scene, Shots
 from warpimpact.solver.device import DeviceError, find_device
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 FIDELITIES = ("draft", "standard", "reference")
 LAYOUTS = {"draft": ("simple", "block"), "standard": ("simple", "block"), "reference": ("simple",)}

@@ -1,6 +1,6 @@
-"""Costs of a campaign besides the march (start, compilation, file, memory), and what they depend on.
+"""Costs of a campaign besides the march: start, compilation, file, memory.
 
-    python tests/benchmarks/overheads.py --largest 1000000    # writes results/overheads.json and .png beside it
+    python tests/benchmarks/overheads.py --largest 1000000    # writes results/overheads.json
     python tests/benchmarks/overheads.py --ratios             # the two ratios alone, printed
 
 The commands are run as a user runs them. A slow result is no failure; the targets stand beside the figures. The two
@@ -23,12 +23,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from bench import CAMPAIGN, machine, seconds, shots_of, store
-from matplotlib.figure import Figure
+from bench import CAMPAIGN, machine, store
 
-from warpimpact import Campaign, Plate, Scene, Shots, SlotPattern
 from warpimpact.results import files
-from warpimpact.solver.simulate import simulate
 
 COMMAND = [sys.executable, "-c", "from warpimpact.cli import command; command()"]
 IMPORTS = [sys.executable, "-c", "import warp, numpy, netCDF4, xarray; warp.init()"]
@@ -49,10 +46,6 @@ START_TARGET, CAMPAIGN_TARGET = 1.5, 1.1
 SMALL, COUNTS = 100, (16_384, 65_536)
 """Hits of a run that is all start, and of those whose time is compared with `simulate`."""
 SMALLEST, PER_DECADE = 1000, 2
-PLATE_SIDES = (0.1, 0.3, 1.0, 3.0, 10.0)  # [m]
-LATTICES = (1, 4, 9, 25)  # unit cells of the pattern that the plate calls one
-YAWS = (0.0, 15.0, 30.0, 60.0, 80.0)  # [°], of one shot among many, which widens the window of all
-SCENE_HITS = 1024
 REPEATS = 3
 
 
@@ -67,7 +60,6 @@ class Usage(NamedTuple):
 def main(argv: Sequence[str] | None = None) -> int:
     """Measure, print, store."""
     arguments = _parser().parse_args(argv)
-    campaign = Campaign.from_toml(CAMPAIGN)
     values: dict[str, Any] = {"machine": machine()}
     with tempfile.TemporaryDirectory() as folder:
         values |= _ratios(Path(folder), arguments.repeats)
@@ -75,25 +67,18 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 0
         values |= _starts(Path(folder))
         values["hits"] = _hits(Path(folder), arguments.largest)
-    straight = _shots(campaign, 0.0)
-    values["plate_side"] = _rates(campaign, {side: (_sized(campaign.plate, side), straight) for side in PLATE_SIDES})
-    values["lattice"] = _rates(campaign, {count: (_relabelled(campaign.plate, count), straight) for count in LATTICES})
-    values["widest_yaw"] = _rates(campaign, {yaw: (campaign.plate, _shots(campaign, yaw)) for yaw in YAWS})
     for name, target in TARGETS.items():
         print(f"{name}: {values[name]:.3g} (target: below {target:g})")
     for row in values["hits"]:
         share = row["compute_seconds"] / row["seconds"]
         rate, memory = row["hits_per_second"], row["peak_memory"] / 2**20
         print(f"{row['count']} hits: {rate:.4g} hits/s, {share:.1%} of the time computing, {memory:.0f} MiB at most")
-    for name in ("plate_side", "lattice", "widest_yaw"):
-        rates = ", ".join(f"{key:g}: {rate:.4g}" for key, rate in values[name].items())
-        print(f"hits/s by {name}: {rates}")
-    store("overheads", values, draw(values))
+    store("overheads", values)
     return 0
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(description="costs of a campaign besides the march, and what they depend on")
+    parser = argparse.ArgumentParser(description="costs of a campaign besides the march")
     parser.add_argument("--largest", type=int, default=30_000, metavar="N", help="hits at most (default: 30000)")
     parser.add_argument("--ratios", action="store_true", help="measure and print the two ratios alone")
     parser.add_argument("--repeats", type=int, default=5, metavar="N", help="repetitions of the ratios (default: 5)")
@@ -195,69 +180,6 @@ def _hits(folder: Path, largest: int) -> list[dict[str, float]]:
             }
         )
     return rows
-
-
-def _sized(plate: Plate, side: float) -> Plate:
-    return plate.model_copy(update={"size": (side, side)})
-
-
-def _relabelled(plate: Plate, count: int) -> Plate:
-    """The same plate, with a square of several unit cells as its unit cell."""
-    side, cell = math.isqrt(count), plate.pattern.period
-    steps = np.stack(np.meshgrid(np.arange(side), np.arange(side)), axis=-1).reshape(-1, 2) * cell
-    holes = [tuple(map(float, step + within)) for step in steps for within in ((0.0, 0.0), (cell[0] / 2, cell[1] / 2))]
-    spacing = (side * cell[0], side * cell[1])
-    pattern = SlotPattern(length=plate.pattern.length, width=plate.pattern.width, spacing=spacing, holes=holes)
-    return plate.model_copy(update={"pattern": pattern})
-
-
-def _shots(campaign: Campaign, yaw: float) -> Shots:
-    """SCENE_HITS shots, the last one yawed [°]."""
-    shots = shots_of(campaign, SCENE_HITS)
-    yaws = shots.yaw.copy()
-    yaws[-1] = np.radians(yaw)
-    return Shots(**(vars(shots) | {"yaw": yaws}))
-
-
-def _rates(campaign: Campaign, scenes: dict[float, tuple[Plate, Shots]]) -> dict[float, float]:
-    """Best hits per second of scenes that run in turn."""
-    rates = dict.fromkeys(scenes, 0.0)
-    for _ in range(REPEATS):
-        for name, (plate, shots) in scenes.items():
-
-            def march(plate: Plate = plate, shots: Shots = shots) -> None:
-                simulate(Scene(core=campaign.core, target=plate), shots, numerics=campaign.numerics, device="cpu")
-
-            rates[name] = max(rates[name], len(shots) / seconds(march))
-    return rates
-
-
-def draw(values: dict[str, Any]) -> Figure:
-    """Rate and memory against hits, rate against plate and window."""
-    figure = Figure(figsize=(11, 10), layout="constrained")
-    *panels, spare = figure.subplots(3, 2).flat
-    spare.set_axis_off()
-    count = [row["count"] for row in values["hits"]]
-    curves = [
-        (count, {"march": [row["hits_per_second"] for row in values["hits"]]}, "hits"),
-        (count, {"memory": [row["peak_memory"] / 2**20 for row in values["hits"]]}, "hits"),
-        (list(values["plate_side"]), {"march": list(values["plate_side"].values())}, "side of the plate [m]"),
-        (list(values["lattice"]), {"march": list(values["lattice"].values())}, "lattice cells in one period"),
-        (list(values["widest_yaw"]), {"march": list(values["widest_yaw"].values())}, "yaw of one shot in 1024 [°]"),
-    ]
-    curves[0][1]["whole command"] = [row["count"] / row["seconds"] for row in values["hits"]]
-    for axes, (x, lines, label) in zip(panels, curves, strict=True):
-        for name, y in lines.items():
-            axes.plot(x, y, "o-", label=name)
-        axes.set(xlabel=label, ylabel="largest memory [MiB]" if "memory" in lines else "hits per second")
-        axes.set_xscale("linear" if "yaw" in label else "log")
-        axes.set_ylim(0.0, 1.15 * max(max(y) for y in lines.values()))
-        axes.grid(color="0.9")
-        if len(lines) > 1:
-            axes.legend()
-    what = values["machine"]
-    figure.suptitle(f"Slotted plate, standard fidelity; {what['processor']}, {what['cores']} cores, {what['date']}")
-    return figure
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """warpimpact beside a Numba peer on three scenes, and beside a NumPy peer of the paper's literal scheme on one of them.
 
     pip install -e '.[bench]'
-    python tests/benchmarks/peers.py            # writes results/peers.json and .png beside it
+    python tests/benchmarks/peers.py            # writes results/peers.json
 
 Costs are processor time of one core per hit. All contenders of a scene run in turn, round after round, and the median
 round counts, so the ratios mean something on a busy machine, too. Errors are those of 90 % of the hits against the
@@ -26,7 +26,6 @@ import numpy as np
 import numpy_peer
 from bench import CHECKOUT, copied, machine, shots_of, store
 from floor import measured_peak, work_of
-from matplotlib.figure import Figure
 from random_scenes import FINE, Answer, extrapolated, off, p90, stepped
 
 from warpimpact import Campaign, Numerics, Record, Scene, Shots
@@ -52,7 +51,6 @@ TIMED = 0.15
 """Processor time of one timed run [s]."""
 ROUNDS = 7
 """Runs of each contender, in turn with the others."""
-COLOURS = {"warpimpact": "#0072B2", "Numba": "#D55E00", "NumPy": "0.35"}
 
 Errors = tuple[float, float]
 
@@ -115,7 +113,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "scenes": {bout.name: summary(bout) for bout in bouts},
         "literal_difference": apart,
     }
-    store("peers", values, draw(bouts))
+    store("peers", values)
     standard = LADDER.index(FIDELITIES["standard"])
     wrong = [bout.name for bout in bouts if excess(bout.ours(standard).error, STATED) > SLACK]
     if any(np.array(apart) > SAME):
@@ -311,30 +309,6 @@ def table(bout: Bout) -> str:
     floor = bout.floor
     work = f"{floor['operations']:.3g} operations and {floor['bytes']:.3g} bytes per hit"
     return "\n".join([*lines, f"standard: {work}, {floor['above_floor']:.3g} times the floor"])
-
-
-def draw(bouts: Sequence[Bout]) -> Figure:
-    """Error against cost: a row for every quantity, a column for every scene."""
-    figure = Figure(figsize=(12, 7), layout="constrained")
-    panels = figure.subplots(2, len(bouts), sharex="col")
-    for column, bout in enumerate(bouts):
-        for row, name in enumerate(("residual velocity [m/s]", "tilt at 130 mm [°]")):
-            axes = panels[row, column]
-            axes.set(xscale="log", yscale="log")
-            axes.grid(which="major", color="0.9")
-            for program, colour in COLOURS.items():
-                some = [one for one in bout.contenders if one.program == program and "coarsest" not in one.setting]
-                if some and program != "NumPy":
-                    errors = [one.error[row] for one in some]
-                    axes.plot([1e6 * one.cost for one in some], errors, "o-", color=colour, label=program)
-            axes.axhline(STATED[row], color="0.5", linestyle=":", label="promise of standard")
-            if column == 0:
-                axes.set_ylabel(f"90 % error of {name}")
-        panels[0, column].set_title(bout.name)
-        panels[1, column].set_xlabel("µs of one core per hit")
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(f"{machine()['processor']}, one core, {machine()['date']}")
-    return figure
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from random_scenes import Case, _pattern, draw, p90
 
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import (
     Burst,
     BurstSampler,
@@ -39,7 +40,7 @@ from warpimpact.scene import (
 )
 from warpimpact.solver.promise import PROMISES, changes, keep
 from warpimpact.solver.resolution import LADDER, Fidelity
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -59,7 +60,7 @@ class Layered(Case):
 
     def shots(self, count: int, seed: int = 0) -> Shots:
         """Some `count` hits; whole bursts."""
-        plate = self.scene.target.plate
+        plate = self.scene.target.layers[0]
         if self.burst is None:
             return make_shots(self.impact, Hits(count=count, seed=seed), plate)
         hits = Hits(count=count // BURST, seed=seed)
@@ -69,7 +70,7 @@ class Layered(Case):
 def drawn(seed: int, index: int) -> Layered:
     """The case of an index, a function of (seed, index) alone."""
     front, rng = draw(seed, index), np.random.default_rng([seed, index, 1])
-    core, plate = front.scene.core, front.scene.target.plate
+    core, plate = front.scene.core, front.scene.target.layers[0]
     calibre, several = 2.0 * core.max_radius, index % 3 == 2
     count = int(rng.integers(0 if several else 1, 4))
     # A solid plate without friction takes Y h π R² of the core's energy.
@@ -78,7 +79,7 @@ def drawn(seed: int, index: int) -> Layered:
     layers = tuple(_layer(rng, calibre, share * energy / (math.pi * core.max_radius**2)) for share in shares)
     path = {"degradation_interval": None, "degradation_distance": rng.uniform(0.5e-3, 1e-3)}
     by_path: dict[str, Any] = path if rng.random() < 0.5 else {}
-    target = Target(plate=plate.model_copy(update=by_path), layers=layers)
+    target = Target(layers=(plate.model_copy(update=by_path), *layers))
     spacing = float(rng.uniform(0.5, 3.0)) * calibre
     scene = Scene(core=core, target=target, interaction=Interaction(), record=Record(standoffs=(0.13,)))
     kinds = " + ".join("solid" if isinstance(one.pattern, NoPattern) else "holes" for one in layers)
@@ -152,7 +153,7 @@ def untrue(row: dict[str, Any], name: str) -> list[str]:
 
 def broken(row: dict[str, Any], name: str) -> bool:
     """Whether a promise that is said to be kept is not."""
-    allowed = PROMISES[name].tolerance
+    allowed = PROMISES[name].accuracy
     limits = [allowed.residual_velocity, math.degrees(allowed.tilt), math.inf]
     return row[name]["kept"] and bool(beyond(row[name]["found"], limits, row["uncertain"]))
 

@@ -43,12 +43,10 @@ from warpimpact.scene import (
     SlotPattern,
     SquarePattern,
     Target,
-    Tolerance,
     TrianglePattern,
     make_shots,
 )
 from warpimpact.solver.promise import PROMISES, keep
-from warpimpact.solver.refinement import simulate_to_tolerance
 from warpimpact.solver.resolution import FIDELITIES, LADDER, Fidelity
 from warpimpact.solver.simulate import simulate
 
@@ -74,7 +72,7 @@ class Case:
 
     def shots(self, count: int, seed: int = 0) -> Shots:
         """Hits spread evenly over the cell; the same for every count that holds them."""
-        return make_shots(self.impact, Hits(count=count, seed=seed), self.scene.target.plate)
+        return make_shots(self.impact, Hits(count=count, seed=seed), self.scene.target.layers[0])
 
     @property
     def key(self) -> str:
@@ -123,7 +121,7 @@ def draw(seed: int, index: int) -> Case:
         yaw=angles[2] * math.cos(math.radians(angles[3])) if yawed else 0.0,
     )
     way = ("oblique" if oblique else "normal") + (" yawed" if yawed else "")
-    scene = Scene(core=core, target=Target(plate=plate), record=Record(standoffs=(STANDOFF,)))
+    scene = Scene(core=core, target=Target(layers=(plate,)), record=Record(standoffs=(STANDOFF,)))
     return Case(f"{kind}, {holes}, {way}", scene, impact)
 
 
@@ -248,13 +246,13 @@ def p90(errors: Array) -> float:
 
 @dataclass(frozen=True)
 class Row:
-    """What one name or tolerance came to on one scene.
+    """What one name came to on one scene.
 
     Attributes:
-        level: of LADDER; for a tolerance, the mean over the hits.
-        kept: whether the promise is kept by its own word; for a tolerance, whether all hits converged.
+        level: of LADDER.
+        kept: whether the promise is kept by its own word.
         told, error: errors of 90 % of the hits as told and as found, in residual velocity [m/s] and tilt [degree].
-        within: share of the hits that are within both errors of the name; for a tolerance, of those called converged.
+        within: share of the hits that are within both errors of the name.
         mean, worst_tenth: error of the mean residual velocity and of that of the fastest tenth [m/s].
         tilted: error of the share of the hits that are tilted by more than 30 degrees.
         cost: processor time of one core per hit [s].
@@ -276,28 +274,12 @@ def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
     promise = keep(case.scene, Numerics(fidelity=name), case.shots(PROMISES[name].pilot, seed=77), device="cpu")
     answer, cost = bench.run(case, promise.fidelity)
     velocity, tilt = off(answer, truth)
-    allowed = PROMISES[name].tolerance
+    allowed = PROMISES[name].accuracy
     within = (velocity <= allowed.residual_velocity) & (tilt <= math.degrees(allowed.tilt))
     told = (promise.residual_velocity_error, math.degrees(promise.tilt_error))
     found = (p90(velocity), p90(tilt))
     level = LADDER.index(promise.fidelity)
     return Row(level, promise.kept, told, found, float(within.mean()), *aggregates(answer, truth), cost)
-
-
-def to_tolerance(bench: Bench, case: Case, truth: Answer, velocity: float, tilt: float) -> Row:
-    """Hits refined to a tolerance [m/s] and [degree]."""
-    numerics = Numerics(tolerance=Tolerance(residual_velocity=velocity, tilt=tilt))
-    shots = case.shots(bench.hits)
-    begin = time.process_time()
-    outcomes, estimates = simulate_to_tolerance(case.scene, shots, numerics=numerics, device="cpu", threads=1)
-    cost = (time.process_time() - begin) / bench.hits
-    answer = Answer(outcomes.status, outcomes.residual_velocity, outcomes.tilt[:, 0])
-    errors, done = off(answer, truth), estimates.converged
-    within = (errors[0] <= velocity) & (errors[1] <= tilt)
-    share = float(within[done].mean()) if done.any() else math.nan
-    found = (p90(errors[0]), p90(errors[1]))
-    level = float(estimates.level.mean())
-    return Row(level, bool(done.all()), (velocity, tilt), found, share, *aggregates(answer, truth), cost)
 
 
 def aggregates(answer: Answer, truth: Answer) -> tuple[float, float, float]:
@@ -314,14 +296,12 @@ def aggregates(answer: Answer, truth: Answer) -> tuple[float, float, float]:
 
 
 NAMES = ("draft", "standard", "reference")
-TOLERANCES = ((1.0, 1.0), (0.5, 0.5))
 
 
 def measured(bench: Bench, case: Case) -> dict[str, Any]:
     """All rows of a scene, what its answer is uncertain by, and the cost of the plain standard."""
     truth, before = bench.converged(case)
     rows = {name: named(bench, case, truth, name) for name in NAMES}
-    rows |= {f"tolerance {v:g}; {a:g}": to_tolerance(bench, case, truth, v, a) for v, a in TOLERANCES}
     return {
         "scene": case.name,
         "uncertain": [p90(errors) for errors in off(before, truth)],
@@ -333,7 +313,7 @@ def measured(bench: Bench, case: Case) -> dict[str, Any]:
 
 def held(row: dict[str, Any], name: str, uncertain: Sequence[float]) -> bool:
     """Whether the errors found are within the promise, up to what the answer itself is uncertain by."""
-    allowed = PROMISES[name].tolerance
+    allowed = PROMISES[name].accuracy
     limits = (allowed.residual_velocity, math.degrees(allowed.tilt))
     return all(e <= limit + u for e, limit, u in zip(row["error"], limits, uncertain, strict=True))
 
@@ -343,16 +323,12 @@ def summed_up(scenes: Sequence[dict[str, Any]]) -> str:
     plain = np.array([scene["plain_standard_cost"] for scene in scenes])
     head = ("", "kept", "kept, but false", "median error", "worst tenth", "mean; tenth; P", "cost")
     lines = [f"{len(scenes)} scenes", ("{:20}" + "{:>18}" * 6).format(*head)]
-    for name in (*NAMES, *(name for name in scenes[0] if name.startswith("tolerance"))):
+    for name in NAMES:
         rows = [scene[name] for scene in scenes]
         errors = np.array([row["error"] for row in rows])
-        if name in NAMES:
-            kept = np.array([row["kept"] for row in rows])
-            true = np.array([held(row, name, scene["uncertain"]) for row, scene in zip(rows, scenes, strict=True)])
-            cells = [f"{kept.mean():.0%}", f"{(kept & ~true).mean():.0%}"]
-        else:
-            within = np.array([row["within"] for row in rows])
-            cells = [f"{np.nanmean(within):.1%} of hits", f">= 95 % in {(within >= 0.95).mean():.0%}"]
+        kept = np.array([row["kept"] for row in rows])
+        true = np.array([held(row, name, scene["uncertain"]) for row, scene in zip(rows, scenes, strict=True)])
+        cells = [f"{kept.mean():.0%}", f"{(kept & ~true).mean():.0%}"]
         middle, worst = np.quantile(errors, [0.5, 0.9], axis=0)
         numbers = [np.median([row[key] for row in rows]) for key in ("mean", "worst_tenth", "tilted")]
         cost = np.median([row["cost"] for row in rows] / plain)
@@ -372,7 +348,7 @@ def drawn(scenes: Sequence[dict[str, Any]]) -> Figure:
             error = [max(scene[name]["error"][place], 1e-3) for scene in scenes]
             kept = np.array([scene[name]["kept"] for scene in scenes])
             axis.scatter(cost, error, s=14, color=colour, alpha=np.where(kept, 0.9, 0.25), label=name)
-            allowed = PROMISES[name].tolerance
+            allowed = PROMISES[name].accuracy
             axis.axhline((allowed.residual_velocity, math.degrees(allowed.tilt))[place], color=colour, lw=0.8)
         axis.set(xscale="log", yscale="log", xlabel="processor time per hit [ms]", ylabel=f"error of {label}, 90 %")
     axes[0].legend(title="pale: promise not kept")

@@ -73,7 +73,7 @@ def layers(campaign: Campaign, hits: int) -> dict[str, float]:
     """Cost of a target of two layers over that of its plate alone, at standard."""
     target, shots = campaign.target, shots_of(campaign, hits)
     alone = campaign.scene.model_copy(update={"target": target.model_copy(update={"layers": ()})})
-    return {"hits": hits, "layers": len(target.plates)} | _compared(
+    return {"hits": hits, "layers": len(target.layers)} | _compared(
         {"layered": (_march(campaign.scene, _STANDARD, 1), shots), "single": (_march(alone, _STANDARD, 1), shots)}
     )
 

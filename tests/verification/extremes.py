@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import (
     AnyPattern,
     CirclePattern,
@@ -126,7 +127,7 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
     )
     precision = draw.one_of("single", "single", "single", "double")
     layers = tuple(_layer(draw, plate) for _ in range(draw.one_of(0, 0, 0, 1, 2, 3)))
-    target = Target(plate=Plate(**plate), layers=layers)
+    target = Target(layers=(Plate(**plate), *layers))
     return Extreme(
         Scene(core=core, target=target, interaction=interaction, record=Record(standoffs=(1.0,))), shots, precision
     )
@@ -138,8 +139,8 @@ def found(extreme: Extreme) -> Found:
     numerics = Numerics(fidelity="draft", precision=precision)
     march = March(scene, numerics, shots, find_device("cpu"), threads=1, traced=True)
     contact = march.march()
-    report, traces = march.report(contact), march.traces(contact)
-    statuses = [Status(int(code)) for code in report["status"]]
+    report, traces = Outcomes.collected(scene, shots, march.report(contact)), march.traces(contact)
+    statuses = [Status(int(code)) for code in report.status]
     properties = scene.core.mass_properties
     rises, steep, gains, stretches = [0.0], [0.0], [0.0], [0.0]
     epsilon = np.finfo(np.float32 if precision == "single" else np.float64).eps
@@ -180,16 +181,18 @@ def _steepness(history: History, properties: MassProperties) -> NDArray[np.float
     return np.maximum(after, np.append(after[0], after[:-1]))
 
 
-def _defined(report: dict[str, Any], shot: int, status: Status) -> bool:
+def _defined(report: Outcomes, shot: int, status: Status) -> bool:
     """Whether an outcome has the values that its status promises, and no other ones."""
-    scalars = np.array([report[name][shot] for name in ("residual_velocity", "energy_loss", "contact_duration")])
-    seen = np.isfinite(report["tilt"][shot]).all()
+    scalars = np.array(
+        [getattr(report, name)[shot] for name in ("residual_velocity", "energy_loss", "contact_duration")]
+    )
+    seen = np.isfinite(report.tilt[shot]).all()
     if status.failed:
         return bool(np.isnan(scalars).all() and not seen)
     passed = status is Status.PERFORATED
     return bool(
         np.isfinite(scalars).all()
-        and np.isfinite(report["angular_velocity"][shot]).all()
+        and np.isfinite(report.angular_velocity[shot]).all()
         and (seen == passed or status is Status.MISSED)
     )
 

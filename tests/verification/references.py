@@ -214,7 +214,7 @@ def depth_of_degradation_residual(
     plate. With D_u(p) the tent K around p integrated over the disc r < r(u), 0 for u < 0 and D_{s_R} for u > s_R,
     and A_u = ∫_{−∞}^u D du', the surface at station s meets at depth x
 
-        S = A_{x + s − max(x − d, 0)} − A_{x + s − min(x + d, h)},        work = Y ∫₀^h dx ∫ 2πr (dr/ds + η) β^(S/Δs) ds,
+        S = A_{x + s − max(x − d, 0)} − A_{x + s − min(x + d, h)},   work = Y ∫₀^h dx ∫ 2πr (dr/ds + η) β^(S/Δs) ds,
 
     the nose disc a station s = 0 of its own. T and the mean over a circle as in `nonlocal_degradation_residual`.
 

@@ -43,7 +43,6 @@ CAMPAIGNS: dict[str, dict[str, Any]] = {
     "slots, draft": {"numerics": {"fidelity": "draft", "patches_axial": 14}},
     "slots, double": {"numerics": {"fidelity": "draft", "patches_axial": 14, "precision": "double"}},
     "slots, nodal": {"numerics": {"scheme": "nodal", "grid_spacing": 5e-5}, "hits": ONE_NET | {"count": 6}},
-    "slots, to a tolerance": {"numerics": {"tolerance": {"tilt": "2 deg"}}, "hits": ONE_NET | {"count": 8}},
     "slots, with bending and the nose": {"output": {"bending": True, "standoff_point": "nose"}},
     "slots, irreducible": {"hits": ONE_NET | {"count": 32, "irreducible": True}},
     "shank through round holes, oblique and yawed": {

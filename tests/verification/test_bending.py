@@ -1,28 +1,26 @@
 """Bending of a core as a rigid beam: conditions that every shot must meet."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Core, Layer, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import arrays
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.bending import Sections, sections_of
 from warpimpact.solver.rings import Rings
-from warpimpact.solver.simulate import BentOutcomes, Outcomes
 
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate
 
 COUNT = 32
 
 
-def bent(target: Plate | Target, shots: Shots, device: str = "cpu", **numerics: Any) -> BentOutcomes:
+def bent(target: Plate | Target, shots: Shots, device: str = "cpu", **numerics: Any) -> Outcomes:
     scene = Scene(core=PAPER_CORE, target=target, record=Record(bending=True))
-    outcomes = simulation.simulate(scene, shots, numerics=Numerics(precision="double", **numerics), device=device)
-    assert isinstance(outcomes, BentOutcomes)
-    return outcomes
+    return simulation.simulate(scene, shots, numerics=Numerics(precision="double", **numerics), device=device)
 
 
 def slanted_shots() -> Shots:
@@ -71,8 +69,8 @@ def test_asking_for_it_changes_nothing_else(device: str) -> None:
     scene = Scene(core=PAPER_CORE, target=paper_plate())
     plain = simulation.simulate(scene, slanted_shots(), numerics=numerics, device=device)
     asked = bent(paper_plate(), slanted_shots(), device)
-    for field in fields(Outcomes):  # another build of the kernels may round differently
-        np.testing.assert_allclose(getattr(asked, field.name), getattr(plain, field.name), rtol=1e-9, atol=1e-6)
+    for name, values in vars(plain).items():  # another build of the kernels may round differently
+        np.testing.assert_allclose(getattr(asked, name), values, rtol=1e-9, atol=1e-6)
 
 
 def test_bending_of_a_core_settles_as_the_numerics_get_finer() -> None:
@@ -97,7 +95,7 @@ def test_parts_without_a_gap_bend_a_core_as_the_whole_does(shares: tuple[float, 
     layers = tuple(Layer(**{name: getattr(part, name) for name in part.model_fields_set}) for part in parts[1:])
     shots = slanted_shots()
     expected = bent(whole, shots, device, time_step=1e-6)
-    got = bent(Target(plate=parts[0], layers=layers), shots, device, time_step=1e-6)
+    got = bent(Target(layers=(parts[0], *layers)), shots, device, time_step=1e-6)
     alone = bent(parts[0], shots, device, time_step=1e-6)
     for name in ("largest_bending_moment", "bending_stress"):
         np.testing.assert_allclose(getattr(got, name), getattr(expected, name), rtol=1e-3)

@@ -9,9 +9,10 @@ import pytest
 from warpimpact import Campaign, run
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.scene import Record, Scatter, Scene, Shots, make_shots
-from warpimpact.solver.simulate import BrokenOutcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at
 
@@ -35,12 +36,10 @@ bending = true
 WEIBULL = '{ distribution = "weibull", shape = 8, scale = "2 GPa" }'
 
 
-def outcomes(strength: float, shots: Shots, **scene: Any) -> BrokenOutcomes:
+def outcomes(strength: float, shots: Shots, **scene: Any) -> Outcomes:
     core = PAPER_CORE.model_copy(update={"strength": strength})
     record = Record(standoffs=(0.05,), bending=True)
-    ended = simulate(Scene(core=core, target=paper_plate(), record=record, **scene), shots, device="cpu")
-    assert isinstance(ended, BrokenOutcomes)
-    return ended
+    return simulate(Scene(core=core, target=paper_plate(), record=record, **scene), shots, device="cpu")
 
 
 @pytest.fixture(scope="module")

@@ -10,12 +10,11 @@ import pytest
 import warp as wp
 from numpy.typing import ArrayLike
 
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import blocks, marching
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.marching import March
-from warpimpact.solver.refinement import simulate_to_tolerance
-from warpimpact.solver.simulate import Outcomes
 
 from . import references
 from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, solid_plate
@@ -52,7 +51,7 @@ def near_bursts() -> Shots:
 
 
 def scene_of(plate: Plate, behind: tuple[Layer, ...] = ()) -> Scene:
-    return Scene(core=PAPER_CORE, target=Target(plate=plate, layers=behind), record=Record(standoffs=STANDOFFS))
+    return Scene(core=PAPER_CORE, target=Target(layers=(plate, *behind)), record=Record(standoffs=STANDOFFS))
 
 
 def simulate(
@@ -174,7 +173,8 @@ def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
     scratch = march._scratch(slots, *march.cells)
     for first, number in marching.turns(len(shots), COUNT, slots):
         march._launch(order, outcomes, scratch, slots, first, number)
-    assert_identical(type(expected := simulate(paper_plate(), shots, behind))(**march.report(outcomes)), expected)
+    got = Outcomes.collected(march.scene, shots, march.report(outcomes))
+    assert_identical(got, simulate(paper_plate(), shots, behind))
 
 
 def test_a_shot_that_leaves_its_window_is_repeated_with_its_burst(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -210,13 +210,6 @@ def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
     assert found.max() == 1.0
     assert (found.min() < 0.3) == (order > 0)
     assert (np.diff(again.resistance_share, axis=0) <= 1e-6).all()
-
-
-def test_a_tolerance_refines_whole_bursts() -> None:
-    shots = near_bursts()[: 3 * COUNT]
-    loose = Numerics(tolerance={"residual_velocity": 3.0, "tilt": "3 deg"})
-    _, estimates = simulate_to_tolerance(scene_of(paper_plate()), shots, numerics=loose, device="cpu")
-    assert (np.ptp(estimates.level.reshape(-1, COUNT), axis=1) == 0).all()
 
 
 def test_the_literal_scheme_takes_no_burst() -> None:

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Shots
 from warpimpact.solver import marching
-from warpimpact.solver.simulate import Outcomes
 
 from .scenes import paper_plate, scattered_hits, shots_at, simulate
 
@@ -57,8 +57,7 @@ def test_same_shots_twice(shots: Shots, numerics: dict[str, Any], device: str) -
 @pytest.mark.parametrize("size", [1, 7, 32, 33, 64])
 def test_any_split(shots: Shots, numerics: dict[str, Any], size: int, device: str) -> None:
     parts = [outcomes_of(shots[k : k + size], device, numerics) for k in range(0, COUNT, size)]
-    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])}
-    assert_identical(Outcomes(**joined), outcomes_of(shots, device, numerics))
+    assert_identical(Outcomes.joined(parts), outcomes_of(shots, device, numerics))
 
 
 @KINDS

@@ -31,7 +31,7 @@ def alone(plate: Any, shots: Shots, point: str, device: str) -> Any:
 
 @pytest.mark.parametrize("point", ["centre_of_mass", "nose"])
 def test_behind_the_first_layer_they_are_those_of_the_plate_alone(point: str, device: str) -> None:
-    target = Target(plate=paper_plate(), layers=(layer(BASE, gap=GAP + 0.05),))
+    target = Target(layers=(paper_plate(), layer(BASE, gap=GAP + 0.05)))
     shots = shots_at(Y, Z, **TURNED)
     got = behind_layers(target, shots, point, device=device, time_step=1e-6)
     expected = alone(paper_plate(), shots, point, device)
@@ -44,7 +44,7 @@ def test_behind_the_first_layer_they_are_those_of_the_plate_alone(point: str, de
 
 @pytest.mark.parametrize("point", ["centre_of_mass", "nose"])
 def test_behind_the_last_layer_they_are_those_of_the_target(point: str, device: str) -> None:
-    target = Target(plate=paper_plate(), layers=(layer(BASE, gap=GAP + 0.05),))
+    target = Target(layers=(paper_plate(), layer(BASE, gap=GAP + 0.05)))
     got = behind_layers(target, shots_at(Y, Z, **TURNED), point, device=device)
     assert np.degrees(got.layer_deflection[:, 1]) == pytest.approx(np.degrees(got.deflection), abs=1e-3)
     for name in ("tilt", "pitch", "yaw"):
@@ -54,7 +54,7 @@ def test_behind_the_last_layer_they_are_those_of_the_target(point: str, device: 
 
 def test_there_is_no_value_where_free_flight_ends_or_a_core_does_not_get_there(device: str) -> None:
     hard = layer(solid_plate(thickness=60e-3, resistance=8e9, degradation=1.0), gap=GAP)
-    target = Target(plate=paper_plate(), layers=(layer(paper_plate(), gap=0.06), hard))
+    target = Target(layers=(paper_plate(), layer(paper_plate(), gap=0.06), hard))
     got = behind_layers(target, shots_at(Y[:4], Z[:4]), device=device)
     known = ~np.isnan(got.layer_standoff_tilt)
     # 18 mm of core and a stand-off of 70 mm need 88 mm, more than the first gap has; no core leaves the last layer.
@@ -65,7 +65,7 @@ def test_there_is_no_value_where_free_flight_ends_or_a_core_does_not_get_there(d
 
 
 def test_stand_offs_behind_layers_change_no_bit_of_anything_else(device: str) -> None:
-    target = Target(plate=paper_plate(), layers=(layer(BASE, gap=GAP),))
+    target = Target(layers=(paper_plate(), layer(BASE, gap=GAP)))
     shots = shots_at(Y, Z, **TURNED)
     plain = simulate(target, shots, standoffs=(NEAR, FAR), device=device)
     asked = behind_layers(target, shots, device=device)
@@ -83,6 +83,6 @@ def test_stand_offs_behind_layers_change_no_bit_of_anything_else(device: str) ->
     ],
 )
 def test_stand_offs_without_free_flight_are_refused(standoff: float, gap: float, message: str) -> None:
-    target = Target(plate=paper_plate(), layers=(layer(BASE, gap=gap),))
+    target = Target(layers=(paper_plate(), layer(BASE, gap=gap)))
     with pytest.raises(ValueError, match=message):
         Scene(core=PAPER_CORE, target=target, record=Record(layer_standoffs=(standoff,)))

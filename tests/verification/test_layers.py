@@ -1,6 +1,5 @@
 """Targets of several layers: closed forms, and targets that say the same thing in two ways (docs/model.md §6.10)."""
 
-from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -10,9 +9,9 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from warpimpact.kernels.status import LayerStatus, Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, NoPattern, Plate, Target
 from warpimpact.solver import arrays
-from warpimpact.solver.simulate import LayeredOutcomes, Outcomes
 
 from . import references
 from .scenes import PAPER_CORE, SLOTS, histories, paper_plate, scattered_hits, shots_at, simulate, solid_plate
@@ -30,11 +29,9 @@ def layer(plate: Plate, **changes: Any) -> Layer:
     return Layer(**{name: getattr(plate, name) for name in plate.model_fields_set} | changes)
 
 
-def layered(plate: Plate, *layers: Layer, **shots: Any) -> LayeredOutcomes:
+def layered(plate: Plate, *layers: Layer, **shots: Any) -> Outcomes:
     """Outcomes of a target."""
-    outcomes = simulate(Target(plate=plate, layers=layers), **shots)
-    assert isinstance(outcomes, LayeredOutcomes)
-    return outcomes
+    return simulate(Target(layers=(plate, *layers)), **shots)
 
 
 def assert_alike(got: Outcomes, expected: Outcomes, velocity: float, angle: float) -> None:
@@ -182,11 +179,11 @@ def test_speed_behind_a_layer_is_that_of_the_instant_when_the_core_leaves_it(dev
 
 
 STACK = Target(
-    plate=paper_plate(),
     layers=(
+        paper_plate(),
         layer(paper_plate(), gap=6e-3, offset=(2e-3, 1e-3)),
         layer(solid_plate(degradation=1.0), gap=40e-3, thickness=5e-3),
-    ),
+    )
 )
 
 
@@ -207,15 +204,15 @@ def test_kinetic_energy_never_grows_and_momentum_is_the_impulse(device: str) -> 
 
 def mirrored(target: Target) -> Target:
     """A target of patterns that are their own mirror images, mirrored in y."""
-    layers = tuple(one.model_copy(update={"offset": (-one.offset[0], one.offset[1])}) for one in target.layers)
-    return Target(plate=target.plate, layers=layers)
+    layers = tuple(one.model_copy(update={"offset": (-one.offset[0], one.offset[1])}) for one in target.layers[1:])
+    return Target(layers=(target.layers[0], *layers))
 
 
 def test_mirror_image(device: str) -> None:
     scene: dict[str, Any] = {"device": device, "precision": "double"}
     plain = simulate(STACK, shots_at(Y, Z, **TURNED), **scene)
     got = simulate(mirrored(STACK), shots_at(-Y, Z, obliquity=15.0, azimuth=140.0, pitch=4.0, yaw=6.0), **scene)
-    assert_alike(got, replace(plain, yaw=-plain.yaw), velocity=1e-9, angle=1e-9)
+    assert_alike(got, plain.assign(yaw=-plain.yaw), velocity=1e-9, angle=1e-9)
     np.testing.assert_array_equal(got.layer_status, plain.layer_status)
     assert got.layer_tilt == pytest.approx(plain.layer_tilt, abs=1e-10, nan_ok=True)
 
@@ -227,9 +224,9 @@ def test_hit_and_layers_shifted_by_a_lattice_vector(device: str) -> None:
         got = simulate(STACK, shots_at(Y + shift[0], Z + shift[1], **TURNED), **scene)
         assert_alike(got, plain, velocity=1e-7, angle=1e-7)
     moved = tuple(
-        one.model_copy(update={"offset": (one.offset[0] + 8e-3, one.offset[1] - 8e-3)}) for one in STACK.layers
+        one.model_copy(update={"offset": (one.offset[0] + 8e-3, one.offset[1] - 8e-3)}) for one in STACK.layers[1:]
     )
-    got = simulate(Target(plate=STACK.plate, layers=moved), shots_at(Y, Z, **TURNED), **scene)
+    got = simulate(Target(layers=(STACK.layers[0], *moved)), shots_at(Y, Z, **TURNED), **scene)
     assert_alike(got, plain, velocity=1e-7, angle=1e-7)
 
 
@@ -238,12 +235,12 @@ def test_target_turned_by_90_degrees_with_its_shot(device: str) -> None:
     rows = SLOTS.model_copy(update={"staggered": False})
     columns = rows.model_copy(update={"rotation": "90 deg", "spacing": (16e-3, 8e-3)})
     offset = (2e-3, 1e-3)
-    target = Target(
-        plate=paper_plate(pattern=rows), layers=(layer(paper_plate(pattern=rows), gap=6e-3, offset=offset),)
-    )
+    target = Target(layers=(paper_plate(pattern=rows), layer(paper_plate(pattern=rows), gap=6e-3, offset=offset)))
     turned = Target(
-        plate=paper_plate(pattern=columns),
-        layers=(layer(paper_plate(pattern=columns), gap=6e-3, offset=(-offset[1], offset[0])),),
+        layers=(
+            paper_plate(pattern=columns),
+            layer(paper_plate(pattern=columns), gap=6e-3, offset=(-offset[1], offset[0])),
+        )
     )
     scene: dict[str, Any] = {"device": device, "precision": "double"}
     plain = simulate(target, shots_at(Y, Z, **TURNED), **scene)

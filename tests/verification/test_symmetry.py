@@ -1,14 +1,13 @@
 """Mirrored, shifted and turned scenes have mirrored, shifted and turned outcomes (docs/model.md §6.7)."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MaskPattern, Shots, SlotPattern
-from warpimpact.solver.simulate import Outcomes
 
 from .scenes import paper_plate, scattered_hits, shots_at, simulate
 
@@ -50,7 +49,7 @@ def test_mirror_image_in_y(precision: str, device: str) -> None:
     plain = simulate(paper_plate(), shots(), **scene)
     mirrored = simulate(paper_plate(), shots(y=-Y, azimuth=150.0, yaw=3.0, spin=-1.7e4), **scene)
     # ω is an axial vector: its components in the mirror plane change sign.
-    expected = replace(plain, yaw=-plain.yaw, angular_velocity=plain.angular_velocity * [-1, 1, -1])
+    expected = plain.assign(yaw=-plain.yaw, angular_velocity=plain.angular_velocity * [-1, 1, -1])
     assert_same(mirrored, expected, precision)
 
 
@@ -59,7 +58,7 @@ def test_mirror_image_in_z(precision: str, device: str) -> None:
     scene: dict[str, Any] = {"precision": precision, "device": device}
     plain = simulate(paper_plate(), shots(), **scene)
     mirrored = simulate(paper_plate(), shots(z=-Z, azimuth=-30.0, pitch=-2.0, spin=-1.7e4), **scene)
-    expected = replace(plain, pitch=-plain.pitch, angular_velocity=plain.angular_velocity * [-1, -1, 1])
+    expected = plain.assign(pitch=-plain.pitch, angular_velocity=plain.angular_velocity * [-1, -1, 1])
     assert_same(mirrored, expected, precision)
 
 
@@ -98,5 +97,5 @@ def test_plate_turned_by_90_degrees_with_its_shot(precision: str, device: str, t
     plain = simulate(plates[0], shots(), **scene)
     turned = simulate(plates[1], shots(y=-Z, z=Y, azimuth=120.0, pitch=-3.0, yaw=-2.0), **scene)
     x, y, z = plain.angular_velocity.T
-    expected = replace(plain, pitch=plain.yaw, yaw=-plain.pitch, angular_velocity=np.stack([x, -z, y], axis=1))
+    expected = plain.assign(pitch=plain.yaw, yaw=-plain.pitch, angular_velocity=np.stack([x, -z, y], axis=1))
     assert_same(turned, expected, precision)

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import netCDF4
@@ -12,6 +11,7 @@ import xarray
 
 from warpimpact import ConeCore, Plate, Record, Scene, SquarePattern
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.dataset import to_dataset
 from warpimpact.results.variables import SHOT_VARIABLES
 from warpimpact.runs import shards
@@ -44,14 +44,14 @@ def shots_at(hits: np.ndarray) -> Shots:
     )
 
 
-def outcomes_of(status: np.ndarray) -> SimpleNamespace:
+def outcomes_of(status: np.ndarray) -> Outcomes:
     """Outcomes that differ from hit to hit; NaN where a status has no value."""
     n = len(status)
     ramp = np.linspace(0.1, 1.0, n)
     moves = np.isin(status, [Status.PERFORATED, Status.MISSED, Status.RICOCHETED])
     behind = np.isin(status, [Status.PERFORATED, Status.MISSED])[:, None]
     angles = np.where(behind, ramp[:, None] * [0.5, 1.5], np.nan)
-    return SimpleNamespace(
+    return Outcomes(
         status=status.astype(np.int8),
         residual_velocity=np.where(moves, 700.0 + 100.0 * ramp, 0.0),
         deflection=np.where(moves, 0.1 * ramp, np.nan),

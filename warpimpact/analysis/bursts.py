@@ -137,9 +137,12 @@ def label_of(measure: Measure) -> str:
     return f"{measure.variable.replace('_', ' ')}{at} [{UNITS[measure.units].strip()}]"
 
 
+PASSED_ALONE = "velocity and tilt are those of the cores that passed"
+
+
 def orders_text(result: Bursts) -> str:
     """The table of hits by their order."""
-    return "\n".join(_table(result.measures, "hit of a burst", result.orders))
+    return "\n".join([*_table(result.measures, "hit of a burst", result.orders), f"({PASSED_ALONE})"])
 
 
 def bursts_text(result: Bursts) -> str:

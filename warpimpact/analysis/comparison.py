@@ -26,11 +26,10 @@ import xarray
 from warpimpact.analysis.base import base_thickness, has_base, solid_note
 from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
-from warpimpact.analysis.summary import sampling_note
+from warpimpact.analysis.questions import check_same_question, other_shots
+from warpimpact.analysis.summary import breaks_promise, sampling_note
 from warpimpact.analysis.survival import Survival, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
-from warpimpact.results import variables as v
-from warpimpact.results.files import ResultError
 from warpimpact.results.measures import dealing
 from warpimpact.runs.shards import first_difference
 from warpimpact.statistics.comparisons import (
@@ -42,9 +41,6 @@ from warpimpact.statistics.comparisons import (
 )
 from warpimpact.statistics.intervals import Array, Estimate, estimate_of
 
-_SAME_PLACE = 1e-9
-"""Rounding of a place in units of the cell."""
-_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
 _MATERIAL_UNITS = {"resistance": " Pa", "degradation_interval": " s", "degradation_length": " m", "density": " kg/m³"}
@@ -119,14 +115,28 @@ class Comparison:
     notes: tuple[str, ...]
 
     def ranks(self, measure: str) -> dict[str, int]:
-        """Name of each plate → one more than the number of plates that are better by more than can be chance."""
-        (up,) = {told.higher_is_better for told in self.plates[0].measures if told.name == measure}
-        worse = [
-            (pair.one if (pair.value > 0.0) != up else pair.other)
-            for pair in self.differences
-            if pair.measure == measure and pair.told_apart
-        ]
-        return {plate.name: 1 + worse.count(plate.name) for plate in self.plates}
+        """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
+        the rank of a group is one more than the number of plates before it."""
+        told = {(pair.one, pair.other) for pair in self.differences if pair.measure == measure and pair.told_apart}
+        group: list[str] = []
+        ranks: dict[str, int] = {}
+        for place, name in enumerate(self.ordered(measure), start=1):
+            if not group or any({(name, other), (other, name)} & told for other in group):
+                group, rank = [], place
+            group.append(name)
+            ranks[name] = rank
+        return ranks
+
+    def ordered(self, measure: str) -> list[str]:
+        """Names of the plates, the best value first: of the ratio to the solid plate where that counts."""
+        by_ratio = measure in (self.at_equal_weight or ())
+
+        def worse(plate: Contestant) -> float:
+            (told,) = (told for told in plate.measures if told.name == measure)
+            value = told.ratio if by_ratio else told.value
+            return math.inf if math.isnan(value) else -value if told.higher_is_better else value
+
+        return [plate.name for plate in sorted(self.plates, key=worse)]
 
 
 def compare(
@@ -150,7 +160,7 @@ def compare(
         ResultError: core, impact or stand-offs differ, so that the plates were not asked the same.
     """
     for dataset, name in zip(datasets[1:], names[1:], strict=True):
-        _check_same_question(datasets[0], names[0], dataset, name)
+        check_same_question(datasets[0], names[0], dataset, name)
     pairs = list(combinations(range(len(datasets)), 2))
     used = [_used(datasets[i], names[i], datasets[j], names[j]) for i, j in pairs]
     differ_in_weight, by_ratio = _differ_in_weight(datasets), set()
@@ -222,7 +232,7 @@ def _notes_of_bases(datasets: Sequence[xarray.Dataset], plates: Sequence[Contest
 def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> Pair:
     """How the hits of two results are used."""
     common = min(one.sizes["hit"], other.sizes["hit"])
-    why = _other_shots(one.isel(hit=slice(common)), other.isel(hit=slice(common)))
+    why = other_shots(one.isel(hit=slice(common)), other.isel(hit=slice(common)))
     return Pair(name, other_name, 0 if why else common, why)
 
 
@@ -267,50 +277,6 @@ def _difference(one: _Side, other: _Side, dealt: dict[str, Any], *, paired: bool
     return estimate.value, estimate.low, estimate.high
 
 
-def _check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
-    asked, asked_other = _question(one, name), _question(other, other_name)
-    if (found := first_difference(asked, asked_other)) is not None:
-        place, was, now = found
-        raise ResultError(f"{other_name}: cannot be compared with {name}: {place} is {now} here and {was} there")
-
-
-def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
-    """What must be the same for plates to be compared."""
-    told = dataset.attrs
-    if not {attr.CORE, attr.IMPACT} <= told.keys():
-        raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
-    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
-    told_of = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
-    told_of |= {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
-    return told_of | {
-        "core": json.loads(told[attr.CORE]),
-        "impact": _in_degrees(json.loads(told[attr.IMPACT])),
-        "output": output,
-    }
-
-
-def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
-    """An impact with the angles that it gives as numbers as a person reads them."""
-    return {
-        name: f"{math.degrees(value)!r} deg" if name in _ANGLES and isinstance(value, float) else value
-        for name, value in impact.items()
-    }
-
-
-def _other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
-    """Why the shots of two results are not the same ones; empty where they are."""
-    if dealing(one) != dealing(other):
-        return "their shots have other replicates or symmetries"
-    for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
-        here, there = (dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (one, other))
-        if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
-            return "their shots hit other places of the cell"
-    for name in (*v.SHOT_VARIABLES, v.MASS):
-        if name in one and not (name in other and np.array_equal(one[name], other[name])):
-            return f"their shots differ in {name}"
-    return ""
-
-
 def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
     if _differ_in_weight(datasets):
         densities = [dataset.attrs[attr.AREAL_DENSITY] for dataset in datasets]
@@ -328,6 +294,8 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
     differing = (first_difference(one, other) for one, other in pairwise(asked))
     if (found := next(filter(None, differing), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
+    if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
+        yield f"The numerics are less exact than the fidelity promises: {', '.join(broken)} (warpimpact inspect)."
     yield from dict.fromkeys(note for d in datasets for note in (solid_note(d), sampling_note(d)) if note)
 
 

@@ -12,7 +12,7 @@ from warpimpact.analysis.numbers import number_text as number
 from warpimpact.analysis.survival import survival_text
 
 if TYPE_CHECKING:
-    from warpimpact.analysis.comparison import Comparison, Contestant, Difference
+    from warpimpact.analysis.comparison import Comparison, Difference
     from warpimpact.analysis.effectiveness import Measure
 
 
@@ -95,8 +95,17 @@ def best_rows(comparison: Comparison) -> list[tuple[str, str]]:
         first = [name for name, rank in comparison.ranks(measure.name).items() if rank == 1]
         told_apart = len(first) < len(comparison.plates)
         neither = "cannot be told apart" if is_ranked(comparison, measure.name) else "not ranked"
-        rows.append((measure.label, _listed(first) + _doubt(comparison, measure.name) if told_apart else neither))
+        told = _listed(first) + _as_good(comparison, measure.name, first) + _doubt(comparison, measure.name)
+        rows.append((measure.label, told if told_apart else neither))
     return rows
+
+
+def _as_good(comparison: Comparison, measure: str, first: Sequence[str]) -> str:
+    """What to say of plates behind the best that no difference tells from all of these; mostly empty."""
+    apart = [{pair.one, pair.other} for pair in comparison.differences if pair.measure == measure and pair.told_apart]
+    others = [plate.name for plate in comparison.plates if plate.name not in first]
+    open_ = [name for name in others if not all({name, one} in apart for one in first)]
+    return f" (not told apart for certain from {_listed(open_)})" if open_ else ""
 
 
 def _doubt(comparison: Comparison, measure: str) -> str:
@@ -107,8 +116,8 @@ def _doubt(comparison: Comparison, measure: str) -> str:
 
 
 def is_ranked(comparison: Comparison, measure: str) -> bool:
-    """Whether the plates are compared in a measure: the notes say why not."""
-    return any(pair.measure == measure for pair in comparison.differences)
+    """Whether the plates are compared in a measure; if not, the notes or the missing interval say why."""
+    return any(pair.measure == measure and not math.isnan(pair.low) for pair in comparison.differences)
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -124,14 +133,10 @@ def rankings(comparison: Comparison) -> list[Ranking]:
 def _ranking(comparison: Comparison, measure: Measure) -> Ranking:
     place = comparison.plates[0].measures.index(measure)
     ranks, better = comparison.ranks(measure.name), "higher" if measure.higher_is_better else "lower"
-    sign, by_ratio = -1.0 if measure.higher_is_better else 1.0, measure.name in (comparison.at_equal_weight or ())
-
-    def order(plate: Contestant) -> tuple[int, float]:
-        told = plate.measures[place]
-        return ranks[plate.name], sign * (told.ratio if by_ratio else told.value)
-
+    by_ratio = measure.name in (comparison.at_equal_weight or ())
+    plates = {plate.name: plate for plate in comparison.plates}
     rows: list[tuple[str, ...]] = []
-    for plate in sorted(comparison.plates, key=order):
+    for plate in (plates[name] for name in ranks):
         told = plate.measures[place]
         against = "" if math.isnan(told.ratio_low) else interval_text(told.ratio_low, told.ratio_high)
         value = (f"{plate.areal_density:.2f}", number(told.value), interval_text(told.low, told.high))
@@ -165,6 +170,9 @@ def weighed(comparison: Comparison, measure: str) -> str:
 
 def _in_words(pair: Difference, measure: Measure, what: str) -> str:
     """Such as "a better than b by 0.1 (0.05 to 0.15)"; `what` follows the difference."""
+    if math.isnan(pair.low):
+        told = f"difference{what} {number(pair.value)}"
+        return f"{pair.one} and {pair.other}: {told}, of which these hits give no interval"
     if not pair.told_apart:
         interval = f"({interval_text(pair.low, pair.high)})"
         return f"{pair.one} and {pair.other} cannot be told apart: difference{what} {number(pair.value)} {interval}"

@@ -148,7 +148,7 @@ def _averaged(
     effect: Effect, statistic: _Statistic, numbers: Array, solid: Array | None, dealt: dict[str, Any]
 ) -> Evidence:
     """The measure that is the mean of some numbers."""
-    estimate = estimate_of(effect.kind, numbers, **dealt)
+    estimate = estimate_of(effect.kind, numbers, **dealt).within(0.0, 1.0 if effect.units == "1" else math.inf)
     if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
         estimate = _without_interval(estimate.value)
     against = Ratio.of(estimate, numbers, solid, dealt)

@@ -104,7 +104,7 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
         )
     yield Effect(
         name="tilted_share",
-        label=f"P(inclined > {degrees:g}° at {at}, or stopped)",
+        label=f"P(inclined > {degrees:g}° at {at}, either end first, or stopped)",
         units="1",
         definition=f"Share of the shots that {at} behind the plate are inclined to the line of fire by more than "
         f"{degrees:g}°, tilt beyond 90° counted back from 180°, or that do not get there because they were arrested "

@@ -30,8 +30,6 @@ from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.statistics.intervals import Estimate
 
 _QUANTILES = (0.05, 0.5, 0.95)
-_WORST = 5
-"""Most hits that are named of those that did not reach a tolerance."""
 _SHOWN = {"Pa": ("GPa", 1e-9)}
 """Units of rows that are not those of the Dataset, and the factors to them."""
 
@@ -87,8 +85,9 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
     """Means and quantiles of the cores that passed the plate, or the target, with intervals."""
     what = "target" if v.LAYER_STATUS in dataset else "plate"
-    if any(passed(part).any() for part in slices(dataset[[v.STATUS]])):
-        yield f"{f'passed the {what}':<43}{'':>10}   95 % interval"
+    if count := sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])):
+        of_how_many = f"{count} of {dataset.sizes['hit']} hits passed the {what}"
+        yield f"{of_how_many:<43}{'':>10}   95 % interval"
     else:
         yield f"no core passed the {what}"
     shown = [name for name in v.shown_by("inspect") if name in dataset]
@@ -101,23 +100,6 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
     if note := sampling_note(dataset):
         yield note
     yield from stop_lines(dataset)
-    yield from _unconverged(dataset)
-
-
-def _unconverged(dataset: xarray.Dataset) -> Iterator[str]:
-    """Of a run to a tolerance, the number of hits that did not converge, and the worst of them."""
-    if v.CONVERGED not in dataset:
-        return
-    names = [v.CONVERGED, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR]
-    found: list[tuple[float, float, int]] = []
-    for part in slices(dataset[names]):
-        velocity, tilt = part[v.RESIDUAL_VELOCITY_ERROR].values, part[v.TILT_ERROR].values.max(axis=1)
-        places = np.flatnonzero(part[v.CONVERGED].values == 0)
-        numbers = hit_numbers(part)
-        found += [(float(velocity[place]), float(tilt[place]), int(numbers[place])) for place in places]
-    yield f"{len(found)} of {dataset.sizes['hit']} hits did not reach the tolerance at the finest level"
-    for velocity_error, tilt_error, hit in sorted(found, reverse=True)[:_WORST]:
-        yield f"  hit {hit}: estimated errors {velocity_error:.2g} m/s and {tilt_error:.2g} deg"
 
 
 def _row(measure: Measure, estimate: Estimate) -> str:

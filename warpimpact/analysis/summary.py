@@ -68,16 +68,21 @@ def promise_text(dataset: Result) -> str | None:
         return None
     given = json.loads(told[attr.NUMERICS_GIVEN])
     if attr.PROMISE_KEPT not in told:
-        fixed = ("tolerance", "time_step", "patches_axial", "patches_around", "grid_spacing")
+        fixed = ("time_step", "patches_axial", "patches_around", "grid_spacing")
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
-    tolerance = PROMISES[given["fidelity"]].tolerance
-    stated = f"{tolerance.residual_velocity:g} m/s and {math.degrees(tolerance.tilt):g} deg for 90 % of the hits"
+    accuracy = PROMISES[given["fidelity"]].accuracy
+    stated = f"{accuracy.residual_velocity:g} m/s and {math.degrees(accuracy.tilt):g} deg for 90 % of the hits"
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
     found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR_P90, math.nan))}"
     if told[attr.PROMISE_KEPT]:
         return f"{given['fidelity']} keeps its promise ({stated}); {found}"
     return f"{given['fidelity']} does not keep its promise ({stated}) at the level that it may use; {found}"
+
+
+def breaks_promise(dataset: Result) -> bool:
+    """Whether the numerics of a result are less exact than its fidelity promises."""
+    return any(dataset.attrs.get(name) == 0 for name in (attr.PROMISE_KEPT, attr.LIMIT_PROMISE_KEPT))
 
 
 def summary(dataset: Result) -> Summary:
@@ -163,14 +168,14 @@ def summary_text(dataset: Result) -> str:
         rows.append(_count_row("broken", result.broken, hits))
     rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<18}  spread")
     rows += [
-        _spread_row("residual velocity", result.residual_velocity, "m/s"),
-        _spread_row("deflection", result.deflection, "°"),
+        _spread_row("residual velocity", result.residual_velocity, "m/s", hits),
+        _spread_row("deflection", result.deflection, "°", hits),
     ]
-    rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°") for standoff, tilt in result.tilt.items()]
+    rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°", hits) for standoff, tilt in result.tilt.items()]
     if (depth := result.base_depth) is not None and depth.count:
         shown = replace(depth, mean=1e3 * depth.mean, standard_deviation=1e3 * depth.standard_deviation)
         low, high = depth.interval
-        rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm"))
+        rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm", hits))
     return "\n".join([*rows, *stop_lines(dataset)])
 
 
@@ -203,8 +208,9 @@ def _count_row(meaning: str, count: int, hits: int) -> str:
     return f"{meaning.replace('_', ' '):<20}{count:>8d}   {count / hits:.1%}"
 
 
-def _spread_row(name: str, spread: Spread, unit: str) -> str:
+def _spread_row(name: str, spread: Spread, unit: str, hits: int) -> str:
     if spread.count == 0:
         return f"{name:<20}{'-':>8}   no core behind the plate"
     interval = interval_text(*spread.interval, "{:.2f}".format)
-    return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}"
+    some = f"   of {spread.count} hits" if spread.count < hits else ""
+    return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}{some}"

@@ -35,7 +35,8 @@ from ..scene import (
 from ..scene.distributions import EDGE
 from ..scene.files import InputFile
 from ..scene.model import Model
-from ..scene.scatter import QUANTITIES, check_range
+from ..scene.quantities import QUANTITIES
+from ..scene.scatter import check_range
 from ..scene.symmetry import check_layers, check_scatter
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
@@ -172,7 +173,7 @@ class Campaign(Model):
     @property
     def target(self) -> Target:
         """The plate and the layers behind it."""
-        return Target(plate=self.plate, layers=self.layer)
+        return Target(layers=(self.plate, *self.layer))
 
     @property
     def replicates(self) -> int:
@@ -213,8 +214,8 @@ class Campaign(Model):
         except ResultError as error:
             raise ValueError(f"posterior: {error}") from None
         drawn.check(self.plate, self.interaction)
-        given = [name for name in self.scatter.given if ("plate", name) in drawn.values]
-        given += ["degradation"] * ("degradation" in self.scatter.given)
+        scattered = [name for name, layer in self.scatter.given if not layer]
+        given = [name for name in scattered if ("plate", name) in drawn.values or name == "degradation"]
         if given:
             raise ValueError(f"got a distribution of plate.{given[0]} beside a posterior, which gives it")
         return self
@@ -326,7 +327,7 @@ class Campaign(Model):
     @model_validator(mode="after")
     def _shots_are_possible(self) -> Self:
         ranges = {name: (value, value) for name, value in self.impact}
-        for name, distribution in self.scatter.given.items():
+        for (name, _), distribution in self.scatter.given.items():
             low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
             ranges[name] = (float(low), float(high))
         for name, column in (self.hits.listed or {}).items():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible
-from ..scene.scatter import QUANTITIES
+from ..scene.quantities import QUANTITIES
 
 if TYPE_CHECKING:
     from .campaign import Campaign
@@ -29,7 +29,7 @@ def warn_of(campaign: Campaign) -> None:
     usual = USUAL | {"hits": hit_bounds(campaign.plate.sampled_cell, campaign.plate.size)}
     for sentence in implausible(_values(campaign), usual):
         warnings.warn(sentence, Implausible, stacklevel=2)
-    if campaign.burst is not None and campaign.plate.degradation == 1.0 and campaign.scatter.degradation is None:
+    if campaign.burst is not None and campaign.plate.degradation == 1.0 and not campaign.scatter.degradation:
         told = "burst: the plate does not weaken (plate.degradation = 1), so earlier hits change nothing"
         warnings.warn(told, Implausible, stacklevel=2)
 

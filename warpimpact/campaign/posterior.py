@@ -106,7 +106,8 @@ class Posterior:
         own: dict[str, dict[str, float]] = {"plate": {}, "interaction": {}}
         for table, key in self.of_scene:
             own[str(table)][str(key)] = float(self.values[table, key][draw])
-        target = scene.target.model_copy(update={"plate": scene.target.plate.model_copy(update=own["plate"])})
+        front, *behind = scene.target.layers
+        target = scene.target.model_copy(update={"layers": (front.model_copy(update=own["plate"]), *behind)})
         return scene.model_copy(
             update={"target": target, "interaction": scene.interaction.model_copy(update=own["interaction"])}
         )
@@ -125,8 +126,8 @@ class DrawnSampler(Sampler):
         numbers = np.arange(first, first + len(shots)) // self._images
         chosen = self._posterior.which(self._seed, int(numbers[0]), int(np.ptp(numbers)) + 1)[numbers - numbers[0]]
         drawn = {path: column[chosen] for path, column in self._posterior.values.items()}
-        columns = columns_of(drawn, self._plate)
-        return DrawnShots(**shots.columns | columns, posterior_draw=chosen.astype(np.float64))
+        shots = shots.with_own(columns_of(drawn, self._plate))
+        return DrawnShots(**shots.columns, posterior_draw=chosen.astype(np.float64))
 
 
 def read_posterior(path: FilePath) -> Posterior:

@@ -24,7 +24,8 @@ def _place(problem: ErrorDetails, data: Any) -> str:
         if isinstance(data, dict) and part not in data and part in (data.get("shape"), data.get("distribution")):
             continue
         place += f"[{part}]" if isinstance(part, int) else f".{part}"
-        data = data.get(part) if isinstance(data, dict) else None
+        inner = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        data = data[part] if inner else data.get(part) if isinstance(data, dict) else None
     if problem["type"].startswith("union_tag"):
         place += f".{problem['ctx']['discriminator'].strip(chr(39))}"
     return brief(place.removeprefix("."))

@@ -1,12 +1,14 @@
 """Distributions of a campaign file, taken out of the places of the values that they replace."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from ..scene import Scatter
-from ..scene.scatter import OF_A_LAYER, QUANTITIES, LayerScatter
+from ..scene.distributions import Distribution
+from ..scene.quantities import QUANTITIES
 from ..scene.units import quantity
 from .problems import sentence
 from .text import CampaignError
@@ -14,45 +16,42 @@ from .text import CampaignError
 
 def with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
     """Distributions moved from the places of their values to `scatter`, their medians in the places."""
-    data, scatter = dict(data), {}
-    for field, (table, kind) in QUANTITIES.items():
-        value = data[table].get(field) if isinstance(data.get(table), dict) else None
-        if isinstance(value, dict):
-            try:
-                scatter[field] = getattr(Scatter.model_validate({field: value}), field)
-            except ValidationError as error:
-                raise CampaignError(f"{name}: {table}.{sentence(error, {field: value})}") from None
-            median = float(scatter[field].quantile(np.array(0.5)))
-            data[table] = data[table] | {field: quantity(kind).as_read(median)}
-    if layers := _layers_apart(data, name):
-        scatter["layers"] = layers
+    data = {key: dict(table) if isinstance(table, dict) else table for key, table in data.items()}
+    if isinstance(tables := data.get("layer"), list):
+        data["layer"] = [dict(table) if isinstance(table, dict) else table for table in tables]
+    scatter: dict[str, Any] = {}
+    for field, known in QUANTITIES.items():
+        layers = [_taken(table, field, f"{name}: {place}", k) for k, place, table in _tables(data, field)]
+        if any(layers):
+            scatter[field] = layers if known.by_layer else layers[0]
     return data | {"scatter": scatter} if scatter else data
 
 
-def _layers_apart(data: dict[str, Any], name: str) -> list[LayerScatter]:
-    """The distributions in the tables of the layers, whose places get the medians; empty if there are none."""
-    tables = data.get("layer")
-    if not isinstance(tables, list):
-        return []
-    data["layer"] = tables = [dict(table) if isinstance(table, dict) else table for table in tables]
-    found = [_layer_apart(table, f"{name}: layer[{k}]") for k, table in enumerate(tables)]
-    return found if any(one.given for one in found) else []
+def _tables(data: dict[str, Any], field: str) -> Iterator[tuple[int, str, Any]]:
+    """Number, place and table of everything that has a quantity: its table, or the layers from the plate on."""
+    known, behind = QUANTITIES[field], data.get("layer")
+    yield 0, known.table, data.get(known.table)
+    if known.by_layer and isinstance(behind, list):
+        yield from ((k, f"layer[{k - 1}]", table) for k, table in enumerate(behind, start=1))
 
 
-def _layer_apart(table: Any, place: str) -> LayerScatter:
-    scatter: dict[str, Any] = {}
-    for field, (_, kind) in OF_A_LAYER.items() if isinstance(table, dict) else ():
-        key, at = (field[:-2], "yz".index(field[-1])) if field.startswith("offset") else (field, None)
-        value = table.get(key)
-        pair = isinstance(value, list) and len(value) == 2
-        one = value[at] if at is not None and pair else None if at is not None else value
-        if not isinstance(one, dict):
-            continue
-        try:
-            scatter[field] = getattr(LayerScatter.model_validate({field: one}), field)
-        except ValidationError as error:
-            label = key if at is None else f"{key}[{at}]"
-            raise CampaignError(f"{place}.{label}{sentence(error, {field: one}).removeprefix(field)}") from None
-        median = quantity(kind).as_read(float(scatter[field].quantile(np.array(0.5))))
-        table[key] = median if at is None else [median if k == at else old for k, old in enumerate(value)]
-    return LayerScatter(**scatter)
+def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | None:
+    """The distribution of a quantity in a table, which keeps its median."""
+    if not isinstance(table, dict):
+        return None
+    key, at = (field[:-2], "yz".index(field[-1])) if field.startswith("offset") else (field, None)
+    value: Any = table.get(key)
+    pair = isinstance(value, list) and len(value) == 2
+    one = value if at is None else value[at] if pair else None
+    if not isinstance(one, dict):
+        return None
+    known, label = QUANTITIES[field], key if at is None else f"{key}[{at}]"
+    given = [*[None] * layer, one] if known.by_layer else one
+    try:
+        ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
+    except ValidationError as error:
+        told = sentence(error, {field: given}).removeprefix(field).removeprefix(f"[{layer}]")
+        raise CampaignError(f"{place}.{label}{told}") from None
+    median = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
+    table[key] = median if at is None else [median if k == at else old for k, old in enumerate(value or ())]
+    return distribution

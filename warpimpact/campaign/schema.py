@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from ..scene.distributions import PURE_NUMBERS, Distribution
 from ..scene.model import Model
-from ..scene.scatter import OF_A_LAYER, QUANTITIES
+from ..scene.quantities import QUANTITIES
 from .campaign import Campaign
 
 Schema = dict[str, Any]
@@ -132,12 +132,12 @@ def _take_distributions(schema: Schema) -> None:
         "oneOf": [{"$ref": f"#/$defs/{name}"} for name in kinds],
     }
     # A file has its distributions in the places of values.
-    del schema["properties"]["scatter"], definitions["Scatter"], definitions["LayerScatter"]
+    del schema["properties"]["scatter"], definitions["Scatter"]
     for name, quantity in QUANTITIES.items():
-        for definition in _referred(schema, schema["properties"][quantity.table]):
-            _let_scatter(definition["properties"], name)
-    for name in OF_A_LAYER.keys() & definitions["Layer"]["properties"].keys():
-        _let_scatter(definitions["Layer"]["properties"], name)
+        for table in (schema["properties"][quantity.table], {"$ref": "#/$defs/Layer"} if quantity.by_layer else {}):
+            for definition in _referred(schema, table):
+                if name in definition["properties"]:
+                    _let_scatter(definition["properties"], name)
     offset = definitions["Layer"]["properties"]["offset"]
     offset["prefixItems"] = [{"anyOf": [one, {"$ref": "#/$defs/Distribution"}]} for one in offset["prefixItems"]]
 

@@ -11,8 +11,6 @@ from .plain import Plain, say
 if TYPE_CHECKING:
     from warpimpact.results.measures import Measure
     from warpimpact.runs.progress import Standing
-    from warpimpact.scene import Numerics
-    from warpimpact.solver.refinement import Refining
     from warpimpact.statistics.intervals import Estimate
 
 _SILENCE, _LONGEST_SILENCE = 5.0, 60.0
@@ -97,8 +95,6 @@ def _log_standing() -> "Callable[[Standing], None]":
         if (fresh := standing.done - standing.resumed) > 0 and elapsed > 0.0:
             left = (standing.total - standing.done) * elapsed / fresh
             line += f", {fresh / elapsed:.4g} hits/s, {left:.0f} s left; {_running(standing)}"
-        elif standing.refining is not None:
-            line += f"; {_refining(standing.refining)}"
         print(line, file=sys.stderr, flush=True)
 
     return show
@@ -119,35 +115,9 @@ def _running(standing: "Standing") -> str:
         for measure, estimate in standing.estimates.items()
         if estimate.count > 1
     ]
-    if standing.refining is not None:
-        parts.append(_refining(standing.refining))
     if standing.promise is not None:
         parts.append(standing.promise.phrase)
     return ", ".join([*parts, f"{standing.failed} failed"])
-
-
-def _refining(found: "Refining") -> str:
-    """How far hits are on their way to a tolerance."""
-    line = f"level {found.level} of {found.levels} for {found.pending} hits"
-    return line if found.seconds_left is None else f"{line}, at most some {found.seconds_left:.3g} s left for them"
-
-
-def tell_tolerance(numerics: "Numerics") -> None:
-    """Say before a run to a tolerance what its hits may cost, and where they stop."""
-    import numpy as np
-
-    from warpimpact.solver.refinement import GROWTH, LEVELS
-    from warpimpact.solver.resolution import LADDER
-
-    tolerance, finest = numerics.tolerance, LADDER[LEVELS[-1]]
-    if tolerance is not None:
-        dearest = sum(GROWTH**k for k in range(len(LEVELS)))
-        say(
-            f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg: every hit is "
-            f"computed on two levels and on finer ones until it has converged, at most on {len(LEVELS)} levels, up to "
-            f"{finest.patches_axial} by {finest.patches_around} patches. All levels cost some {dearest:.0f} times as "
-            "much as the first one"
-        )
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
 from .paths import check_place, check_suffix
 from .plain import say
-from .progress import show_standing, tell_tolerance, warn
+from .progress import show_standing, warn
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -54,7 +54,6 @@ def _run(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
     check_suffix(output, "a result", ".nc")
-    tell_tolerance(campaign.numerics)
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)

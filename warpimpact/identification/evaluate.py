@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.hits import Aim, Place, aim
 from warpimpact.identification.likelihood import Data, Score, score
-from warpimpact.identification.measured import WithLimit
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.solver.limit import limit_velocity
-from warpimpact.solver.simulate import Outcomes, simulate
-from warpimpact.solver.unfold import unfolded
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -78,14 +77,14 @@ def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iter
     of_scene = {path: column for path, column in own.items() if path not in columns}
     for rows in _of_one_scene(of_scene, len(alike)):
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in of_scene.items()})
-        targets = aim(bench.shot, scene.target.plate, scene.core, fit.sampling)
+        targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling)
         per_call = max(1, AT_A_TIME // len(targets.computed))
         for first in range(0, len(rows), per_call):
             some = rows[first : first + per_call]
-            of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.plate)
+            of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.layers[0])
             shots = repeated(targets.computed, of_sets, len(some))
             outcomes = _outcomes(fit, bench, scene, shots, device)
-            yield Run(alike[some], scene, targets, unfolded(outcomes, targets.group))
+            yield Run(alike[some], scene, targets, outcomes.unfolded(targets.group))
 
 
 def _alike(points: Array) -> NDArray[np.int64]:
@@ -106,8 +105,7 @@ def _outcomes(fit: Fit, bench: Bench, scene: Scene, shots: Shots, device: str) -
     limits = limit_velocity(scene, shots, numerics=fit.numerics, device=device)
     other = fit.selection or any(shot.status for shot in measured) or not all(one.is_limit for one in observations)
     outcomes = simulate(scene, shots, numerics=fit.numerics, device=device) if other else limits.outcomes
-    plain = {one.name: getattr(outcomes, one.name) for one in fields(Outcomes)}
-    return WithLimit(**plain, limit_velocity=limits.value)
+    return outcomes.assign(limit_velocity=limits.value)
 
 
 def _as_columns(fit: Fit, own: Mapping[Path, Array]) -> dict[Path, Array]:
@@ -169,7 +167,7 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
         for run in runs(fit, bench, points, device=device):
             for place in bench.which:
                 shot = fit.shots[place]
-                own = run.aim.of(shot.hit, run.scene.target.plate, run.scene.core)
+                own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
                 for which in run.which.T:
                     some = {kind: scale[which] for kind, scale in scales.items()}
                     scored[place].append((which, score(data_of(fit, shot), own, run.outcomes, some, rng)))

@@ -117,5 +117,5 @@ def scene_from(tables: Mapping[str, Any], record: Record, folder: FilePath) -> S
     context = {"folder": folder}
     plate = Plate.model_validate(tables["plate"], context=context)
     interaction = Interaction.model_validate(tables.get("interaction", {}), context=context)
-    wanted = {"core": tables["core"], "target": Target(plate=plate), "interaction": interaction, "record": record}
+    wanted = {"core": tables["core"], "target": Target(layers=(plate,)), "interaction": interaction, "record": record}
     return Scene.model_validate(wanted, context=context)

@@ -138,7 +138,7 @@ class Aim:
 def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling) -> Aim:
     """Points for a shot: the same numbers at every set of parameters, spread over the cell of the plate."""
     placed = isinstance(shot.hit, Place)
-    turned = any(name != "velocity" for name in shot.scatter.given)
+    turned = any(name != "velocity" for name, _ in shot.scatter.given)
     solid = plate.open_area == 0.0 and plate.size is None
     alone = not shot.scatter.given and (solid or (isinstance(shot.hit, Place) and shot.hit.is_exact))
     count = 1 if alone else sampling.hits

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from warpimpact.identification.hits import Aim
 from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES, Measure
-from warpimpact.solver.simulate import Outcomes
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.identification.parameters import FitError
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
 from warpimpact.results.measures import STATUSES
 from warpimpact.scene.units import Angle, Speed, quantity, quoted
-from warpimpact.solver.simulate import Outcomes
 
 Array = NDArray[np.float64]
 
@@ -26,13 +26,6 @@ LIMIT_VELOCITY = v.Variable("limit_velocity", ("hit",), "m s-1", "impact velocit
 MEASURABLE = {
     str(one): one for one in (v.RESIDUAL_VELOCITY, v.DEFLECTION, v.TILT, v.PITCH, v.YAW, v.TOTAL_YAW, LIMIT_VELOCITY)
 }
-
-
-@dataclass(frozen=True)
-class WithLimit(Outcomes):
-    """Outcomes with the limit velocity of every shot [m/s], shape [shots]; infinite where no velocity is enough."""
-
-    limit_velocity: Array
 
 
 @dataclass(frozen=True)

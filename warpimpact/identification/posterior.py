@@ -229,7 +229,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
 
 def _material(fit: Fit) -> str:
     scene = fit.scene_of(fit.shots[0])
-    plate = scene.target.plate.model_dump(include={str(name) for name in _OF_PLATE})
+    plate = scene.target.layers[0].model_dump(include={str(name) for name in _OF_PLATE})
     return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump()})
 
 

@@ -27,7 +27,7 @@ from warpimpact.results.measures import Measure
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
 from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
-from warpimpact.scene.scatter import QUANTITIES
+from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.bending import check_bending
 from warpimpact.solver.columns import Path
@@ -74,8 +74,6 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     tables = with_medians(tables, prior, parameters)
     record = _model(Record, data.get("record", {}), f"{name}: record")
     numerics = _model(Numerics, {"fidelity": "draft"} | _table(data, "numerics", name), f"{name}: numerics")
-    if numerics.tolerance is not None:
-        raise FitError(f"{name}: numerics.tolerance: a fit computes all hits with one resolution; name a fidelity")
     shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
     selection = tuple(_condition(one, f"{name}: selection") for one in _selection(data, name))
     if any(one.variable == "bending_stress" for one in selection):
@@ -265,7 +263,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
 
 
 def _check_hit(shot: MeasuredShot, scene: Scene, where: str) -> None:
-    if isinstance(shot.hit, str) and not _some(shot.hit, scene.target.plate, scene.core):
+    if isinstance(shot.hit, str) and not _some(shot.hit, scene.target.layers[0], scene.core):
         raise FitError(f'{where}: hit: got "{shot.hit}", but no place of this plate is')
 
 

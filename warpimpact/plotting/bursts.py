@@ -9,7 +9,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.bursts import Bursts, bursts, label_of
+from warpimpact.analysis.bursts import PASSED_ALONE, Bursts, bursts, label_of
 from warpimpact.plotting.cell import shots_text
 from warpimpact.results import attributes as attr
 
@@ -47,7 +47,7 @@ def bursts_figure(dataset: xarray.Dataset) -> Figure:
     below_left.margins(x=0.1)
     below_right.set_xlabel("distance to the nearest earlier hit [mm]")
     figure.suptitle(dataset.attrs.get(attr.TITLE, ""))
-    figure.supxlabel(f"{shots_text(dataset)}; 95 % intervals", fontsize="small", color="0.3")
+    figure.supxlabel(f"{shots_text(dataset)}; 95 % intervals; {PASSED_ALONE}", fontsize="small", color="0.3")
     return figure
 
 

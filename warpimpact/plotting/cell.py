@@ -21,6 +21,7 @@ from matplotlib.transforms import ScaledTranslation
 from scipy.spatial import KDTree
 
 from warpimpact.analysis.hit_map import chosen, hit_points
+from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import LayerStatus
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -41,8 +42,9 @@ FEWEST_HITS = 64  # fewer are drawn as points: an image would suggest detail tha
 WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacings; random hits reach about 2
 GREY = "0.62"  # for hits without a value
 # Colours of Okabe and Ito: they differ in every kind of colour blindness.
-STATUS_COLOURS = ("#56B4E9", "#D55E00", "#F0E442", "#009E73", "#000000", "#CC79A7", "#E69F00", "#0072B2", "#FFFFFF")
-"""By the codes of `LayerStatus`: white where the core did not reach the layer."""
+STATUS_COLOURS = ("#D55E00", "#56B4E9", "#009E73", "#E69F00", "#000000", "#CC79A7", "#F0E442", "#0072B2", "#FFFFFF")
+"""By the codes of `LayerStatus`: warm where the core comes through, cool where it is stopped or turned back, white
+where it did not reach the layer."""
 
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW, v.LAYER_STANDOFF_PITCH, v.LAYER_STANDOFF_YAW}
 _BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them, too, but in front of the plate
@@ -106,7 +108,7 @@ def _number(dataset: xarray.Dataset, layer: int | None) -> int:
 
 
 def _selected(dataset: xarray.Dataset, variable: str, standoff: float | None, layer: int | None) -> xarray.DataArray:
-    numbers = (*v.HIT_NUMBERS, v.RESIDUAL_VELOCITY_ERROR, v.TILT_ERROR, *v.LAYER_NUMBERS)
+    numbers = (*v.HIT_NUMBERS, *v.LAYER_NUMBERS)
     mapped = [name for name in numbers if name in dataset]
     if variable not in mapped:
         raise ValueError(f'"{variable}" cannot be mapped; choose one of {", ".join(mapped)}')
@@ -123,9 +125,12 @@ def words(name: str) -> str:
 
 
 def shots_text(dataset: xarray.Dataset) -> str:
-    """Number of hits, velocity and obliquity."""
+    """Number of hits and the share that passed, velocity and obliquity; whether the numerics break their promise."""
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
-    return f"{dataset.sizes['hit']} hits, {velocity}, obliquity {obliquity}"
+    share = float(passed(dataset).mean())
+    some = "" if share == 1.0 else f" ({share:.1%} passed the {struck(dataset)})"
+    broken = "; numerics less exact than the fidelity promises" if breaks_promise(dataset) else ""
+    return f"{dataset.sizes['hit']} hits{some}, {velocity}, obliquity {obliquity}{broken}"
 
 
 def range_text(array: xarray.DataArray) -> str:
@@ -151,8 +156,8 @@ def scale_of(columns: Sequence[Array], *, signed: bool = False) -> Scale:
         lowest = -highest
     else:
         lowest, highest = (finite.min(), finite.max()) if finite.size else (0.0, 1.0)
-        if np.isclose(lowest, highest):
-            lowest = highest  # do not show rounding as a pattern
+        if np.isclose(lowest, highest):  # a scale from 0: it shows no rounding as a pattern
+            lowest, highest = min(0.0, highest), max(0.0, highest) or 1.0
     colours = colormaps["RdBu_r" if signed else "viridis"].with_extremes(bad=GREY)
     return colours, Normalize(lowest, highest)
 
@@ -165,7 +170,7 @@ def draw_values(
     artist = _paint(axes, dataset, values, *scale)
     exists = np.isfinite(values)
     grey = [] if exists.all() else [Patch(facecolor=GREY, label=_without_value(dataset, exists, layer))]
-    _furnish(axes, dataset, grey)
+    _furnish(axes, dataset, grey, layer)
     return artist
 
 
@@ -179,18 +184,19 @@ def draw_status(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -
     names = {code: words(code.name.lower()) for code in found}
     told = {code: f"{names[code]} {np.mean(status == code):.1%}" for code in found}
     labels, shares = (told, "status") if layer is None else (names, f"layer {layer}\n{', '.join(told.values())}")
-    _furnish(axes, dataset, [Patch(facecolor=STATUS_COLOURS[code], label=labels[code]) for code in found])
+    _furnish(axes, dataset, [Patch(facecolor=STATUS_COLOURS[code], label=labels[code]) for code in found], layer)
     axes.set_title(shares, fontsize="medium")
 
 
-def draw_holes(axes: Axes, dataset: xarray.Dataset) -> list[Artist]:
-    """Draw the edges of holes, visible on any colour, and set the axes to the cell, to scale.
+def draw_holes(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -> list[Artist]:
+    """Draw the edges of the holes of one layer (None: the plate), visible on any colour, and set the axes to the cell,
+    to scale.
 
-    Returns the entry of a legend; no entry for a solid plate.
+    Returns the entry of a legend; no entry for a layer without holes.
     """
     (left, right), (bottom, top) = limits(dataset)
     axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="hit y [mm]", ylabel="hit z [mm]", aspect="equal")
-    holes = outlines(dataset)
+    holes = outlines(dataset, layer or 0)
     if not len(holes["y"]):
         return []
     (edge,) = axes.plot(
@@ -269,9 +275,9 @@ def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_], layer: in
     return fill(f"no value: {', '.join(words(code.name.lower()) for code in LayerStatus if code in found)}", 30)
 
 
-def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist]) -> None:
+def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist], layer: int | None) -> None:
     """Add the holes, and a legend below the axes."""
-    entries = [*entries, *draw_holes(axes, dataset)]
+    entries = [*entries, *draw_holes(axes, dataset, layer)]
     if entries:
         below = axes.transAxes + ScaledTranslation(0.0, -0.5, axes.figure.dpi_scale_trans)
         axes.legend(

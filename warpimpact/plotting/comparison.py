@@ -141,6 +141,7 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
     axes.grid(axis="x", color="0.9")
     axes.margins(x=0.08)
     axes.locator_params(axis="x", nbins=5)
+    axes.ticklabel_format(axis="x", useOffset=False)
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)
     axes.tick_params(axis="y", length=0.0)

@@ -22,7 +22,8 @@ _MM = 1e3
 _NEAREST_HOLES = 40
 """Holes about the middle among which the smallest ligament is looked for."""
 _CLOSE = 1.01
-"""A ligament that is longer than the smallest by this factor is another one."""
+"""A ligament that is longer than the smallest by this factor is another one. Outlines are polygons, so its length is
+that of the plate's own number."""
 _BESIDE, _BELOW = 0.1, 0.05
 """Distance of the dimensions of a hole from it, in periods."""
 _COLOUR = "#0072B2"
@@ -66,7 +67,8 @@ def smallest_ligament(plate: Plate) -> Dimension | None:
     lines = [shapely.shortest_line(*pairs[place]) for place in np.flatnonzero(lengths <= _CLOSE * lengths.min())]
     line = min(lines, key=lambda line: line.distance(shapely.Point(0.0, 0.0)))
     start, end = np.asarray(line.coords)
-    return _dimension(start, end)
+    own = plate.ligament
+    return _dimension(start, end, own if lengths.min() <= _CLOSE * own else None)
 
 
 def draw_dimensions(axes: Axes, plate: Plate) -> None:
@@ -77,9 +79,12 @@ def draw_dimensions(axes: Axes, plate: Plate) -> None:
         _draw(axes, ligament, _LIGAMENT_COLOUR)
 
 
-def _dimension(start: tuple[float, float] | Array, end: tuple[float, float] | Array) -> Dimension:
+def _dimension(
+    start: tuple[float, float] | Array, end: tuple[float, float] | Array, length: float | None = None
+) -> Dimension:
+    """With its length [m] where that is known better than by the distance of its ends."""
     start, end = np.asarray(start), np.asarray(end)
-    return Dimension(start, end, f"{float(np.linalg.norm(end - start)) * _MM:.3g}")
+    return Dimension(start, end, f"{(float(np.linalg.norm(end - start)) if length is None else length) * _MM:.3g}")
 
 
 def _holes(plate: Plate) -> list[shapely.Polygon]:

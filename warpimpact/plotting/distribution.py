@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,8 +42,6 @@ _BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
 _PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
 _FINE = 100  # pixels along the longer side of a smoothed map
-_ERRORS: dict[str, str] = {v.RESIDUAL_VELOCITY: v.RESIDUAL_VELOCITY_ERROR, v.TILT: v.TILT_ERROR}
-"""Estimates of numerical error, of a run to a tolerance."""
 _MOST_POINTS = 4000  # more are drawn as a density
 
 
@@ -83,7 +82,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
     figure = Figure(figsize=(7.5, 6.5), layout="constrained")
-    figure.suptitle(dataset.attrs.get(attr.TITLE, ""))
+    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\ncores that passed the {struck(dataset)}")
     grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
     (above, corner), (centre, beside) = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     corner.remove()
@@ -122,11 +121,9 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
 
 
 def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
-    """A map beside what makes it uncertain.
+    """A map of the mean of the hits nearby, and half the width of its 95 % interval (`analysis.local.plane_fit`).
 
-    Where shots scatter, so that two at one place differ, that is the mean of the hits nearby and half the width of its
-    95 % interval (`analysis.local.plane_fit`). Of a run to a tolerance it is the value of each hit and the estimate of
-    its numerical error. A map of shots that all arrive alike has no uncertainty that hits nearby could tell.
+    Shots must scatter, so that two at one place differ. Where all arrive alike, hits nearby tell no uncertainty.
 
     Args:
         dataset: a result whose hits cover the cell.
@@ -137,30 +134,24 @@ def uncertainty(dataset: xarray.Dataset, variable: str, standoff: float | None =
     """
     column = shown(dataset, variable, standoff)
     unit = f"[{column.label.partition('[')[2]}"
-    if shots_scatter(dataset):
-        images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
-        labels = f"local mean of {column.label}", f"half width of its 95 % interval {unit}"
-        method = "plane through the {} nearest hits, Student's interval; bends of the map widen it"
-        return _two_maps(dataset, images, labels, column.title, method)
-    if (error := _ERRORS.get(variable)) is None or error not in dataset:
+    if not shots_scatter(dataset):
         raise ValueError(
-            f'got "{variable}" of shots that all arrive alike, with no estimate of its numerical error, so nothing is '
-            "uncertain that a map could show"
+            f'got "{variable}" of shots that all arrive alike, so nothing is uncertain that a map could show'
         )
-    nearest = _covered(dataset)
-    errors = np.where(np.isfinite(column.values), shown(dataset, error, standoff).values, np.nan)
-    labels = column.label, f"estimated numerical error {unit}"
-    return _two_maps(dataset, np.stack([column.values[nearest], errors[nearest]]), labels, column.title, "nearest hit")
+    images = _local(dataset, column.values, _covered(dataset), lambda near: plane_fit(*near)[:2])
+    labels = f"local mean of {column.label}", f"half width of its 95 % interval {unit}"
+    method = "plane through the {} nearest hits, Student's interval; bends of the map widen it"
+    return _local_maps(dataset, images, labels, column.title, method)
 
 
-def is_uncertain(dataset: xarray.Dataset, variable: str) -> bool:
-    """Whether `uncertainty` has something to show of a variable."""
-    return nearest_hits(dataset) is not None and (shots_scatter(dataset) or _ERRORS.get(variable, "") in dataset)
+def is_uncertain(dataset: xarray.Dataset) -> bool:
+    """Whether `uncertainty` has something to show."""
+    return nearest_hits(dataset) is not None and shots_scatter(dataset)
 
 
 def shots_scatter(dataset: xarray.Dataset) -> bool:
-    """Whether shots differ in more than where they hit."""
-    return any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
+    """Whether shots differ in more than where they hit: in their conditions, or in the hits before."""
+    return v.BURST_ORDER in dataset or any(np.ptp(dataset[name].values) > 0.0 for name in v.shot_variables(dataset))
 
 
 def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
@@ -178,9 +169,13 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
         raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
     if measure.kind == "probability" and measure.variable not in dataset:
         raise ValueError(f'got "{quantity}", but the result has no {measure.variable}')
-    images = _local(dataset, measure.values(dataset), _covered(dataset), lambda near: share_of(near[1]))
+    values, nearest = measure.values(dataset), _covered(dataset)
+    if not shots_scatter(dataset):
+        note = "each hit has one outcome, 1 or 0; nearest hit"
+        return _local_maps(dataset, values[nearest][None], [measure.text], measure.text, note)
+    images = _local(dataset, values, nearest, lambda near: share_of(near[1]))
     labels = f"{measure.text}", "half width of its 95 % interval"
-    return _two_maps(dataset, images, labels, measure.text, "share of the {} nearest hits, Wilson's interval")
+    return _local_maps(dataset, images, labels, measure.text, "share of the {} nearest hits, Wilson's interval")
 
 
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
@@ -191,17 +186,19 @@ def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
     return nearest
 
 
-def _two_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], title: str, method: str) -> Figure:
-    """Maps of a local value and of half the width of its interval."""
+def _local_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], title: str, method: str) -> Figure:
+    """A map of each image, shape [maps, pixels_z, pixels_y]: of a local value, and of how uncertain it is. The scale of
+    a probability is that of all of them."""
     width, height = _map_size(dataset)
-    figure = Figure(figsize=(2.0 * width + 4.0, height + 1.9), layout="constrained")
+    figure = Figure(figsize=(len(images) * (width + 2.0) + (len(images) < 2), height + 1.9), layout="constrained")
     figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{title}")
-    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    panels = figure.subplots(1, len(images), sharex=True, sharey=True, squeeze=False)[0]
     for axes, image, label in zip(panels, images, labels, strict=True):
-        figure.colorbar(paint_pixels(axes, dataset, image, scale_of([image.ravel()])), ax=axes, label=label)
+        scale = scale_of([np.array([0.0, 1.0])] if label.startswith("P(") else [image.ravel()])
+        figure.colorbar(paint_pixels(axes, dataset, image, scale), ax=axes, label=label)
         draw_holes(axes, dataset)
     note = f"{method.format(NEIGHBOURS)}; {shots_text(dataset)}; seen from behind the plate"
-    figure.supxlabel(note, fontsize="small", color="0.3")
+    figure.supxlabel(fill(note, int(15 * figure.get_figwidth())), fontsize="small", color="0.3")
     return figure
 
 

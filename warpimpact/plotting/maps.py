@@ -135,7 +135,7 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
             name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
             figures[name] = hit_map(dataset, variable, standoff)
     figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
-    if is_uncertain(dataset, v.RESIDUAL_VELOCITY):
+    if is_uncertain(dataset):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
     if v.LAYER_STATUS in dataset:
         figures["layers"] = layers_figure(dataset)

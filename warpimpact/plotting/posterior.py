@@ -150,11 +150,11 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
         axes = panels[place]
         scene = fit.scene_of(shot, medians)
         y, z = (_MM * posterior[name].values[..., place].ravel() for name in files.HITS)
-        half = [0.55 * side * _MM for side in scene.target.plate.sampled_cell]
+        half = [0.55 * side * _MM for side in scene.target.layers[0].sampled_cell]
         half = [max(one, float(np.abs(at).max()) * 1.05) for one, at in zip(half, (y, z), strict=True)]
         ranges = [(-one / _MM, one / _MM) for one in half]
         axes.set_facecolor("0.85")
-        for outline in scene.target.plate.pattern.outlines(*ranges):
+        for outline in scene.target.layers[0].pattern.outlines(*ranges):
             axes.fill(*(_MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
         axes.scatter(y, z, s=5, color=_BLUE, alpha=0.35, lw=0, label="posterior")
         at = (_MM * float(best[name][place]) for name in files.HITS)

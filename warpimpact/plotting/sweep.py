@@ -44,7 +44,10 @@ def sweep_figure(sweep: xarray.Dataset) -> Figure:
     for number, (label, line) in enumerate(lines):
         found = [estimated(point, measures) for point in points_along(line, along)]
         for axes, measure in zip(panels.flat, measures, strict=True):
-            _draw(axes, line[along], [one[measure] for one in found], _COLOURS[number % len(_COLOURS)], label)
+            colour, estimates = _COLOURS[number % len(_COLOURS)], [one[measure] for one in found]
+            _draw(axes, line[along], estimates, colour, label)
+            if not measure.is_binary:
+                _tell_shares(axes, line[along], estimates, [one[measures[-1]].count for one in found], colour)
     for axes, measure in zip(panels.flat, measures, strict=True):
         axes.set_ylabel(_label(measure))
         axes.grid(color="0.9")
@@ -55,9 +58,11 @@ def sweep_figure(sweep: xarray.Dataset) -> Figure:
     if others:
         handles, labels = panels[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False)
+    counted = "; beside a mean: the share of the hits that it counts, where that is not all"
     left_out = _product(sweep.sizes[name] for name in others) - len(lines)
     note = f"; {left_out} more combinations are not shown" if left_out > 0 else ""
-    figure.suptitle(f"{sweep.attrs[attr.TITLE]}\n{sweep.sizes['hit']} hits at every point, 95 % intervals{note}")
+    hits = f"{sweep.sizes['hit']} hits at every point, 95 % intervals"
+    figure.suptitle(f"{sweep.attrs[attr.TITLE]}\n{hits}{counted}{note}")
     return figure
 
 
@@ -82,7 +87,7 @@ def _label(measure: Measure) -> str:
     if measure.kind == "share":
         return f"share {words(measure.variable)}"
     at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-    return f"mean {words(measure.variable)}{at} [{UNITS[measure.units].strip()}]"
+    return f"mean {words(measure.variable)}{at} [{UNITS[measure.units].strip()}]\nof the cores that passed"
 
 
 def _axis_label(values: xarray.DataArray) -> str:
@@ -97,6 +102,17 @@ def _lines(sweep: xarray.Dataset, others: Sequence[str]) -> Iterator[tuple[str, 
     for places in itertools.product(*(range(sweep.sizes[name]) for name in others)):
         label = ", ".join(f"{words(name)} {told[name][place]}" for name, place in zip(others, places, strict=True))
         yield label, sweep.isel(dict(zip(others, places, strict=True)))
+
+
+def _tell_shares(
+    axes: Axes, places: xarray.DataArray, estimates: Sequence[Estimate], hits: Sequence[int], colour: str
+) -> None:
+    """Write the share of the hits that a mean counts beside it, where that is not all of them."""
+    x = places.values if places.dtype.kind == "f" else np.arange(len(estimates))
+    for at, one, all_ in zip(x, estimates, hits, strict=True):
+        if 0 < one.count < all_:
+            style: dict[str, Any] = {"fontsize": "x-small", "color": colour, "textcoords": "offset points"}
+            axes.annotate(f"{one.count / all_:.0%}", (at, one.value), (5.0, 4.0), **style)
 
 
 def _draw(axes: Axes, places: xarray.DataArray, estimates: Sequence[Estimate], colour: str, label: str) -> None:

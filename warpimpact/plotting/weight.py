@@ -134,5 +134,6 @@ def _furnish(axes: Axes, measure: Measure, label: str) -> None:
         axes.set_ylim(-0.04, 1.04)
     axes.grid(color="0.92")
     axes.margins(x=0.18)
+    axes.ticklabel_format(axis="both", useOffset=False)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

@@ -16,12 +16,12 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import depth_note, effectiveness
 from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note
+from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note, slices
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import outlines
+from warpimpact.results.dataset import outlines, passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.studies.accuracy import QUANTITIES
@@ -59,6 +59,7 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
         "hits": dataset.sizes["hit"],
+        "passed": sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])),
         "asked": _asked(dataset),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise_text(dataset),

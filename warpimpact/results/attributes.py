@@ -15,8 +15,6 @@ REFERENCES = "references"
 
 # The campaign, and how it was computed
 CAMPAIGN = "campaign"
-CAMPAIGN_ANGLES = "campaign_angles"
-"""Unit of the angles that the campaign gives as numbers; not there where they are radians (version 0.1.0)."""
 WARPIMPACT_VERSION = "warpimpact_version"
 WARP_VERSION = "warp_version"
 PYTHON_VERSION = "python_version"
@@ -33,8 +31,6 @@ PATCHES_AXIAL = "patches_axial"
 PATCHES_AROUND = "patches_around"
 GRID_SPACING = "grid_spacing"
 TIME_STEP = "time_step"
-TOLERANCE_RESIDUAL_VELOCITY = "tolerance_residual_velocity"
-TOLERANCE_TILT = "tolerance_tilt"
 PRECISION = "precision"
 NUMERICS_GIVEN = "numerics_given"
 RESOLUTION = "resolution"
@@ -122,8 +118,6 @@ UNITS = {
     DEPTH_ERROR_P90: "m",
     GRID_SPACING: "m",
     TIME_STEP: "s",
-    TOLERANCE_RESIDUAL_VELOCITY: "m s-1",
-    TOLERANCE_TILT: "degree",
     OPEN_AREA: "1",
     AREAL_DENSITY: "kg m-2",
     LIMIT_DENSITY: "kg m-3",

@@ -20,7 +20,7 @@ _LABELS = (v.AXIS, v.QUATERNION, v.SETTING, v.SCHEME, v.STUDY_LEVEL)
 _TEXTS = (
     *(attr.TITLE, attr.HISTORY, attr.REFERENCES, attr.CAMPAIGN, attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
     *(attr.DEVICE, attr.NUMERICS, attr.NUMERICS_GIVEN, attr.FINGERPRINT, attr.SAMPLING, attr.SYMMETRIES, attr.CORE),
-    *(attr.MATERIAL, attr.CAMPAIGN_ANGLES, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
+    *(attr.MATERIAL, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
     *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.LAYERS, attr.PRECISION, attr.MACHINE),
     *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION, attr.SWEEP),
     attr.BURST,
@@ -38,7 +38,7 @@ _NUMBERS = (
     *(attr.LIMIT_LAYER, attr.LIMIT_DENSITY, attr.LIMIT_ELSEWHERE, attr.LIMIT_TOLERANCE, attr.LIMIT_HIGHEST),
     *(attr.SOLID_LIMIT_TIME, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST),
     *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.DEPTH_ERROR_P90),
-    *(attr.GRID_SPACING, attr.TIME_STEP, attr.TOLERANCE_RESIDUAL_VELOCITY, attr.TOLERANCE_TILT),
+    *(attr.GRID_SPACING, attr.TIME_STEP),
     *(attr.PATCHES_AXIAL, attr.PATCHES_AROUND),
 )
 _PAIRS = (attr.PLATE_PERIOD, attr.ESTIMATE_INTERVAL)
@@ -55,13 +55,6 @@ _TOGETHER = (
 """Attributes of which the first needs the others."""
 
 
-_WHOLE = (
-    v.LAYER_VARIABLES + v.LAYER_FACES,
-    v.LAYER_COORDINATES + v.LAYER_STANDOFF_VARIABLES,
-    v.OUTLINE_VARIABLES,
-    tuple(v.SOLID_VARIABLES),
-)
-"""Variables of which a result has all or none."""
 _OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)
 """Attributes of a study."""
 _DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
@@ -171,7 +164,7 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
             continue
         if one in dataset.variables and dataset.variables[one].dims != one.dims:
             return f'its variable "{one}" is along {dataset.variables[one].dims}, not {one.dims}'
-    for names in _WHOLE:
+    for names in v.whole_groups():
         there = [name for name in names if name in dataset.variables]
         if there and (missing := [name for name in names if name not in there]):
             return f'it has no variable "{missing[0]}" beside "{there[0]}"'

@@ -7,6 +7,7 @@ and opens with plain ``xarray.open_dataset``.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.layers import fields, of_layers, sections
+from warpimpact.results.layers import faces, fields, own_columns, sections
 from warpimpact.results.table import Table
 from warpimpact.scene import Plate
 
@@ -23,10 +24,10 @@ if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
+    from warpimpact.records.outcomes import Outcomes
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.refinement import Estimates
-    from warpimpact.solver.simulate import Outcomes, Replay
+    from warpimpact.solver.simulate import Replay
 
 
 _ATTRIBUTES = {
@@ -51,7 +52,6 @@ def to_table(
     *,
     period: tuple[float, float],
     attributes: Mapping[str, Any],
-    estimates: Estimates | None = None,
     double: bool = False,
 ) -> Table:
     """Gather shots and outcomes into the columns of the hit map.
@@ -64,7 +64,6 @@ def to_table(
         outcomes: Their outcomes, of shape (n,) or (n, m), SI and radians; NaN where there is no value.
         period: Extent (y, z) of the unit cell [m], centred on the origin, over which hits and holes are drawn.
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
-        estimates: Estimated errors of a run to a tolerance, SI and radians.
         double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
     """
@@ -75,35 +74,20 @@ def to_table(
         v.STANDOFF: np.array(scene.record.standoffs),
         v.AXIS: ["x", "y", "z"],
     }
-    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
-    of_shots = (*v.SCATTER_VARIABLES, *v.BURST_VARIABLES, *v.POSTERIOR_VARIABLES)
-    values |= {name: shots.columns[name] for name in of_shots if name in shots.columns}
-    layered: tuple[v.Variable, ...] = v.LAYER_VARIABLES
-    along: tuple[v.Variable, ...] = (*v.COORDINATES, *v.OUTLINE_VARIABLES)
-    if scene.target.layers and scene.record.layer_standoffs:
-        layered = (*layered, *v.LAYER_STANDOFF_VARIABLES)
-        along = (*along, *v.LAYER_COORDINATES)
+    if v.LAYER_STANDOFF_TILT in outcomes:
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
-    ended = (*v.OUTCOME_VARIABLES, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES, *layered)
-    values |= {name: getattr(outcomes, name) for name in ended if hasattr(outcomes, name)}
-    values |= of_layers(scene, shots)
-    if v.EXIT_POSITION in values:
-        zero = np.zeros(len(shots))
-        values[v.EXIT_POSITION] = values[v.EXIT_POSITION] + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
-    coordinates |= outlines_in(scene.target.plate, *((-0.5 * side, 0.5 * side) for side in period))
-    told = (*of_shots, *v.EXIT_VARIABLES, *v.BENDING_VARIABLES, *v.BROKEN_VARIABLES)
-    optional = (*told, *layered, *v.LAYER_FACES)
-    variables = [*v.VARIABLES, *(name for name in optional if name in values)]
-    if estimates is not None:
-        variables += v.ESTIMATE_VARIABLES
-        values |= {name: getattr(estimates, name) for name in v.ESTIMATE_VARIABLES}
-        values[v.CONVERGED] = estimates.converged.astype(np.int8)
-    columns = described(variables, values)
-    if not double:
-        columns |= _in_single(columns, (*ended, *v.ESTIMATE_VARIABLES))
+    coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES)
+    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    own = own_columns(scene.target, shots)
+    values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    values |= vars(outcomes) | faces(scene.target)
+    zero = np.zeros(len(shots))
+    values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
+    columns = described((name for name in v.hit_variables() if name in values), values)
     return Table.of(
-        columns,
-        described(along, coordinates),
+        columns if double else columns | _in_single(columns, v.computed_variables()),
+        described((name for name in along if name in coordinates), coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
@@ -121,7 +105,7 @@ def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, 
         outcomes: SI and radians.
         double: as in `to_dataset`.
     """
-    values: dict[str, Any] = {variable: getattr(outcomes, variable.field) for variable in v.SOLID_VARIABLES}
+    values: dict[str, Any] = {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
     columns = described(v.SOLID_VARIABLES, values)
     return columns if double else columns | _in_single(columns, v.SOLID_VARIABLES)
 
@@ -207,10 +191,10 @@ def history_dataset(
         replay: the shot's history.
         attributes: global attributes, which override those of `hit`.
     """
-    core, plate = scene.core, scene.target.plate
+    core, plate = scene.core, scene.target.layers[0]
     hit_y, hit_z = float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
     history, stations = replay.history, np.union1d(np.linspace(0.0, core.length, _STATIONS), core.breaks)
-    farthest = np.abs(history.position[:, 1:]).max() if scene.target.layers else 0.0
+    farthest = np.abs(history.position[:, 1:]).max() if len(scene.target.layers) > 1 else 0.0
     section = np.linspace(-4.0, 4.0, _SECTION_POINTS) * (core.bounding_radius + 0.25 * farthest)
     values: dict[str, Any] = {name: getattr(history, name) for name in v.HISTORY_VARIABLES if hasattr(history, name)}
     values |= {
@@ -239,7 +223,7 @@ def history_dataset(
         .assign_coords(described(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
-    layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if scene.target.layers else ()
+    layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if len(scene.target.layers) > 1 else ()
     layered = (*layered, *(name for name in v.LAYER_FIELDS if name in behind))
     return dataset.assign(described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
@@ -252,25 +236,30 @@ def described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dic
 
 
 def _in_units(variable: v.Variable, values: Any) -> Any:
+    if getattr(values, "dtype", None) == np.bool_:
+        return values.astype(np.int8)  # netCDF has no truth values
     return np.degrees(values) if variable.units == "degree" else values
 
 
-def outlines(dataset: xarray.Dataset) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes [m], each of shape (vertex,), by the axis "y" and "z", with a NaN between one and the next.
+def outlines(dataset: xarray.Dataset, layer: int = 0) -> dict[str, NDArray[np.float64]]:
+    """Outlines of the holes of a layer, 0 the plate, [m], each of shape (vertex,), by the axis "y" and "z", with a NaN
+    between one and the next.
 
-    Those of a Dataset that was read or chosen without them follow from its plate. Only those of a mask cannot: they
-    are empty then.
+    Those of a Dataset that was read or chosen without them follow from its plate, as those of layers do. Only those of
+    a mask cannot: they are empty then.
     """
-    if v.OUTLINE_Y not in dataset.variables:
-        period = dataset.attrs[attr.PLATE_PERIOD]
-        try:
-            plate = Plate.model_validate_json(dataset.attrs.get(attr.PLATE, ""))
-        except ValueError:  # without a plate, or the file of its mask
-            plate = None
-        ranges = [(-0.5 * float(side), 0.5 * float(side)) for side in period]
-        found = {} if plate is None else outlines_in(plate, *ranges)
-        return {axis: found.get(name, np.empty(0)) for axis, name in v.OUTLINE.items()}
-    return {axis: dataset[name].values for axis, name in v.OUTLINE.items()}
+    if not layer and v.OUTLINE_Y in dataset.variables:
+        return {axis: dataset[name].values for axis, name in v.OUTLINE.items()}
+    told = json.loads(dataset.attrs.get(attr.LAYERS, "{}")).get(str(layer), {})
+    offset = told.get("offset", (0.0, 0.0))
+    text = json.dumps({name: told[name] for name in Plate.model_fields if name in told}) if layer else None
+    try:
+        plate = Plate.model_validate_json(text or dataset.attrs.get(attr.PLATE, ""))
+    except ValueError:  # without a plate, or the file of its mask
+        return dict.fromkeys(v.OUTLINE, np.empty(0))
+    halves = [0.5 * float(side) for side in dataset.attrs[attr.PLATE_PERIOD]]
+    found = outlines_in(plate, *((-half - at, half - at) for half, at in zip(halves, offset, strict=True)))
+    return {axis: found[name] + at for (axis, name), at in zip(v.OUTLINE.items(), offset, strict=True)}
 
 
 def outlines_in(
@@ -306,7 +295,4 @@ def shots_at_a_plate(dataset: Result) -> int:
 
 def images(dataset: Result) -> int:
     """How many hits in a row are images of each other; 1 without `hits.irreducible`."""
-    told = dataset.attrs
-    if attr.IMAGES in told or attr.SYMMETRIES not in told:
-        return int(told.get(attr.IMAGES, 1))
-    return str(told[attr.SYMMETRIES]).count("(")  # files of version 0.1.0 name the symmetries, but not their number
+    return int(dataset.attrs.get(attr.IMAGES, 1))

@@ -203,17 +203,8 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         else:
             if found := unusable(dataset):
                 raise ResultError(f"{path}: {found}")
-            optional = (
-                *v.SCATTER_VARIABLES,
-                *v.POSTERIOR_VARIABLES,
-                *v.BURST_VARIABLES,
-                *v.ESTIMATE_VARIABLES,
-                *v.LAYER_VARIABLES,
-                *v.LAYER_STANDOFF_VARIABLES,
-                *v.LAYER_FACES,
-                *(name for names in v.GROUPS.values() for name in names),
-            )
-            _check(dataset, path, (*v.COORDINATES, *v.VARIABLES, *optional))
+            in_groups = (name for names in v.GROUPS.values() for name in names)
+            _check(dataset, path, (*v.COORDINATES, *v.hit_variables(), *in_groups))
         yield dataset
 
 
@@ -295,15 +286,14 @@ def _opened(path: Path) -> xarray.Dataset:
 def _joined(path: Path) -> xarray.Dataset:
     """The root of a file with the contents of its groups as coordinates.
 
-    Numbers of hits have no index, which would be in memory as a whole. Files of version 0.1.0 have no groups; theirs
-    are variables of the root.
+    Numbers of hits have no index, which would be in memory as a whole.
     """
     import xarray
 
     root = xarray.open_dataset(path, engine="netcdf4", create_default_indexes=False)
+    dataset = root.copy()
     with netCDF4.Dataset(path) as file:
         groups = [group for group in v.GROUPS if group in file.groups]
-    dataset = root.set_coords([name for names in v.GROUPS.values() for name in names if name in root.variables])
     for group in groups:
         with xarray.open_dataset(path, engine="netcdf4", group=group) as inner:
             dataset = dataset.assign_coords({name: array.variable for name, array in inner.load().data_vars.items()})

@@ -7,47 +7,51 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.results import variables as v
-from warpimpact.scene.target import value_in
+from warpimpact.scene.quantities import BY_LAYER
 
 if TYPE_CHECKING:
     import xarray
     from numpy.typing import NDArray
 
-    from warpimpact.scene import Scene, Shots
+    from warpimpact.scene import Scene, Shots, Target
     from warpimpact.solver.layering import Weakened
 
 
-def of_layers(scene: Scene, shots: Shots) -> dict[str, NDArray[np.float64]]:
-    """Faces of the layers, and what differs in them from shot to shot; empty if the plate stands alone."""
-    target = scene.target
-    if not target.layers:
-        return {}
-    values = dict(zip(v.LAYER_FACES, target.faces.T, strict=True))
-    for variable in v.LAYER_SCATTER:
-        if variable in shots.columns:
-            name = variable.removeprefix("layer_")
-            own = [shots.own(name, value_in(target.plate, name))]
-            own += [shots.own_of_layer(name, k, value_in(layer, name)) for k, layer in enumerate(target.layers)]
-            values[variable] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
-    return values
+def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
+    """What differs from shot to shot under the names of a result: of what every layer has, the plate's own as
+    `thickness`; those of all layers as `layer_thickness`, if a layer behind the plate differs."""
+    columns: dict[str, NDArray[Any]] = {name: own for name, own in shots.columns.items() if name not in BY_LAYER}
+    for name in BY_LAYER:
+        own = [shots.own_of(target, name, k) for k in range(len(target.layers))]
+        if shots.differs(name, 0):
+            columns[name] = own[0]
+        if any(shots.differs(name, k) for k in range(1, len(own))):
+            columns[f"layer_{name}"] = np.stack(np.broadcast_arrays(*own, np.empty(len(shots)))[:-1], axis=1)
+    return columns
+
+
+def values_of(target: Target, hit: xarray.Dataset, name: str) -> list[float]:
+    """A quantity of every layer in a hit of a result, which has it under the names of `own_columns`."""
+    if f"layer_{name}" in hit:
+        return [float(one) for one in hit[f"layer_{name}"]]
+    values = [target.value(name, k) for k in range(len(target.layers))]
+    return [float(hit[name]), *values[1:]] if name in hit else values
+
+
+def faces(target: Target) -> dict[str, NDArray[np.float64]]:
+    """Faces of the layers; empty if the plate stands alone."""
+    return dict(zip(v.LAYER_FACES, target.faces.T, strict=True)) if len(target.layers) > 1 else {}
 
 
 def sections(scene: Scene, hit: xarray.Dataset, section: NDArray[np.float64]) -> dict[str, NDArray[Any]]:
     """Faces of the layers for one hit, and where each is solid along y and z through the hit point; empty if the plate
     stands alone."""
     target, hit_y, hit_z = scene.target, float(hit[v.HIT_Y]), float(hit[v.HIT_Z])
-    if not target.layers:
+    if len(target.layers) == 1:
         return {}
-
-    def own(name: str) -> list[float]:
-        means = [value_in(plate, name) for plate in target.plates]
-        return hit[f"layer_{name}"].values.tolist() if f"layer_{name}" in hit else means
-
-    thickness = own("thickness")
-    if v.THICKNESS in hit:
-        thickness[0] = float(hit[v.THICKNESS])
+    thickness, offset_y, offset_z = (values_of(target, hit, name) for name in ("thickness", "offset_y", "offset_z"))
     front = np.array(target.fronts([np.array(one) for one in thickness]))
-    places = list(zip(target.plates, own("offset_y"), own("offset_z"), strict=True))
+    places = list(zip(target.layers, offset_y, offset_z, strict=True))
     along_y = [plate.is_solid(hit_y - y + section, np.array(hit_z - z)) for plate, y, z in places]
     along_z = [plate.is_solid(np.array(hit_y - y), hit_z - z + section) for plate, y, z in places]
     return {
@@ -65,7 +69,7 @@ def fields(scene: Scene, behind: dict[int, Weakened]) -> dict[str, NDArray[Any]]
         return {}
     snapshots = len(next(iter(behind.values())).share)
     rows = max(len(layer.cell_y) for layer in behind.values())
-    columns, layers = max(len(layer.cell_z) for layer in behind.values()), len(scene.target.plates)
+    columns, layers = max(len(layer.cell_z) for layer in behind.values()), len(scene.target.layers)
     cell_y, cell_z = np.full((layers, rows), np.nan), np.full((layers, columns), np.nan)
     share = np.full((snapshots, layers, rows, columns), np.nan)
     for number, layer in behind.items():

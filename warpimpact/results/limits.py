@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,19 +16,6 @@ if TYPE_CHECKING:
 
     from warpimpact.results.table import AResult
     from warpimpact.solver.limit import Limits
-
-
-def with_limits(dataset: AResult, quantity: str, limits: Limits, images: int) -> AResult:
-    """The Dataset of shots that just perforate, with their limits.
-
-    Args:
-        quantity: of the limits, a key of LIMITS.
-        limits: of the first of every `images` shots, SI.
-    """
-    names = v.LIMITS[quantity]
-    values: dict[str, Any] = {name: np.repeat(getattr(limits, name.field), images) for name in names}
-    values[names.converged] = values[names.converged].astype(np.int8)
-    return dataset.assign(described(names, values))
 
 
 def with_solid_limits(dataset: AResult, quantity: str, limits: Limits) -> AResult:

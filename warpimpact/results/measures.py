@@ -35,6 +35,8 @@ _KINDS: dict[str, Any] = {
 """Types of the quantities that have these units in the Dataset."""
 _VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in v.SHOT_VARIABLES}
 MEASURED = tuple(_VARIABLES)
+_SIGNED = {v.PITCH, v.YAW, v.BROKEN_X}
+"""Those that may be negative."""
 STATUSES = {status.name.lower(): status for status in Status if not status.failed}
 
 _VARIABLE = r"(?P<variable>[a-z_]+)(?:\s*@\s*(?P<standoff>[^<>,]+?))?"
@@ -170,7 +172,8 @@ class Tally:
 
     def estimate(self) -> Estimate:
         """The estimate from the shots so far."""
-        return self._dealt.estimate()
+        found = self._dealt.estimate()
+        return found if self.measure.variable in _SIGNED else found.within(0.0)
 
 
 def dealing(dataset: Result) -> dict[str, Any]:

@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import logging
-import math
 import signal
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict
 from typing import Any, NamedTuple
-from uuid import uuid4
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import HitMap, made_by
-from warpimpact.runs.team import HIT_MAP, ClusterError, Team, awaited, longest, task_size
+from warpimpact.runs.team import HIT_MAP, ClusterError, Team, awaited, task_size
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores
-from warpimpact.solver.refinement import Refining
 
 LONELY = 120.0
 """Seconds for which a scheduler may be without workers."""
-_LISTEN_EVERY, _TELL_EVERY = 0.2, 1.0
-"""Seconds between two looks for a signal while a worker prepares, and between two words of a task on its levels."""
+_LISTEN_EVERY = 0.2
+"""Seconds between two looks for a signal while a worker prepares."""
 
 
 class _How(NamedTuple):
@@ -33,13 +29,11 @@ class _How(NamedTuple):
     Attributes:
         device, threads: as in `simulate`.
         kind: what all of them must be, as `made_by` says.
-        topic: of what they tell of their levels; empty where hits have no tolerance.
     """
 
     device: str
     threads: int | None
     kind: dict[str, str]
-    topic: str = ""
 
 
 @contextmanager
@@ -87,15 +81,13 @@ def cluster_team(
             raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
-        executor, levels = client.get_executor(pure=False), dict[str, Refining]()
+        executor = client.get_executor(pure=False)
         reached = _Reached(client, address)
         asked = reached.asked
         try:
             kind = awaited(asked(executor.submit, made_by, device), _LISTEN_EVERY, reached.threads)
             campaign = awaited(asked(executor.submit, _looked_at, campaign), _LISTEN_EVERY, reached.threads)
-            how = _How(device, threads, kind, f"warpimpact-{uuid4().hex}" if campaign.numerics.tolerance else "")
-            if how.topic:
-                asked(client.subscribe_topic, how.topic, lambda event: _hear(levels, event[1]))
+            how = _How(device, threads, kind)
             yield Team(
                 job=job,
                 pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
@@ -104,7 +96,6 @@ def cluster_team(
                 task=lambda rate: task_size(kind),
                 made_by=kind | dict(job.content),
                 underway=lambda: 0,
-                refining=lambda: longest(levels),
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
             raise _lost(address, error) from None
@@ -176,9 +167,7 @@ def _compute_alike(
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    with _telling(how.topic) as refining:
-        given: dict[str, Any] = {"promise": promise, "solid": solid, "device": how.device, "threads": how.threads}
-        return job.compute(campaign, shots, **given, refining=refining)
+    return job.compute(campaign, shots, promise=promise, solid=solid, device=how.device, threads=how.threads)
 
 
 def _looked_at(campaign: Campaign) -> Campaign:
@@ -186,34 +175,3 @@ def _looked_at(campaign: Campaign) -> Campaign:
     tells it."""
     _ = campaign.plate.ligament
     return campaign
-
-
-@contextmanager
-def _telling(topic: str) -> Iterator[Callable[[Refining], None]]:
-    """What tells those who listen to the topic how far the hits of a task of this worker are on their way to a
-    tolerance; no topic, no word."""
-    if not topic:
-        yield lambda found: None
-        return
-    from distributed import get_worker
-
-    worker, who, last = get_worker(), uuid4().hex, -math.inf
-
-    def tell(found: Refining) -> None:
-        nonlocal last
-        if (now := time.monotonic()) - last >= _TELL_EVERY:
-            last = now
-            worker.log_event(topic, {"who": who, "refining": asdict(found)})
-
-    try:
-        yield tell
-    finally:
-        worker.log_event(topic, {"who": who, "refining": None})
-
-
-def _hear(levels: dict[str, Refining], told: dict[str, Any]) -> None:
-    """Take in what a worker has told."""
-    if told["refining"] is None:
-        levels.pop(told["who"], None)
-    else:
-        levels[told["who"]] = Refining(**told["refining"])

@@ -8,30 +8,28 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.posterior import Posterior
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_coordinates, to_table
 from warpimpact.results.table import Table
 from warpimpact.scene import Burst, Numerics, Scene, Shots, Symmetry
-from warpimpact.scene.scatter import QUANTITIES
+from warpimpact.scene.quantities import BY_LAYER, QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.promise import PROMISES, Promise, keep
-from warpimpact.solver.refinement import LEVELS, Estimates, Refining, simulate_to_tolerance
-from warpimpact.solver.resolution import LADDER, Fidelity, resolve
-from warpimpact.solver.simulate import Outcomes, build, simulate
-from warpimpact.solver.unfold import unfolded, unfolded_estimates
+from warpimpact.solver.resolution import Fidelity, resolve
+from warpimpact.solver.simulate import build, simulate
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -49,7 +47,6 @@ def compute(
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
-    refining: Callable[[Refining], None] | None = None,
 ) -> Table:
     """Compute some shots of a campaign. If it uses symmetry, only the first shot of each group of images is computed.
 
@@ -58,7 +55,6 @@ def compute(
         promise: the finding of a pilot (`promise_of`); None to compute with the numerics as they are given.
         solid: shots at the solid plate of equal areal density; None for no such shots.
         device, threads, progress: as in `simulate`.
-        refining: as in `simulate_to_tolerance`; not called without a tolerance.
 
     Returns:
         The columns of results/dataset.py, one entry per shot; they are a complete result.
@@ -72,7 +68,7 @@ def compute(
     numerics = campaign.numerics if promise is None else promise.fidelity
     _build(scene, computed, numerics, device)
     begin = time.perf_counter()
-    outcomes, estimates = _outcomes(scene, computed, numerics, device, threads, follow, refining, campaign.drawn)
+    outcomes = _outcomes(scene, computed, numerics, device, threads, follow, campaign.drawn)
     elapsed = time.perf_counter() - begin
     table = described(
         campaign,
@@ -82,13 +78,12 @@ def compute(
         device=device,
         elapsed=elapsed,
         attributes={} if promise is None else _promised(promise),
-        estimates=estimates,
     )
     if solid is None:
         return table
     solid, reference = at_solid(campaign, solid), scene.model_copy(update={"target": campaign.target.solid})
     follow = progress and (lambda done, total: progress(len(shots), len(shots)))  # nothing new, but a place to stop
-    outcomes, _ = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
+    outcomes = _outcomes(reference, solid, numerics, device, threads, follow, drawn=campaign.drawn)
     return table.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
 
 
@@ -101,13 +96,12 @@ def described(
     device: str,
     elapsed: float,
     attributes: Mapping[str, Any],
-    estimates: Estimates | None = None,
 ) -> Table:
     """The columns of some shots of a campaign.
 
     Args:
         shots: whole groups of images.
-        outcomes: of the first shot of every group; the estimates likewise.
+        outcomes: of the first shot of every group.
         numerics: with which they were computed.
         elapsed: time that this took [s].
         attributes: global attributes beside those of any campaign.
@@ -117,13 +111,12 @@ def described(
     table = to_table(
         scene,
         shots,
-        unfolded(outcomes, group),
+        outcomes.unfolded(group),
         period=campaign.hits.covered(campaign.plate),
         attributes={
             attr.TITLE: campaign.title,
             attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
             attr.CAMPAIGN: campaign.text,
-            attr.CAMPAIGN_ANGLES: "degree",
             **attr.versions(),
             **attr.machine(),
             attr.DEVICE: f"{chosen.alias} ({chosen.name})",
@@ -139,7 +132,7 @@ def described(
             attr.MATERIAL: _material(campaign),
             attr.NUMERICS: _numerics(campaign, numerics, shots),
             **_numbers_of(campaign, numerics, shots),
-            attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics), default=lambda tolerance: tolerance.model_dump()),
+            attr.NUMERICS_GIVEN: json.dumps(dict(campaign.numerics)),
             attr.FAILED_SHARE: campaign.output.failed_share,
             attr.COMPUTE_TIME: elapsed,
             attr.HITS_PER_SECOND: computed / elapsed,
@@ -150,7 +143,6 @@ def described(
         | (_symmetry(group, computed) if campaign.hits.irreducible else {})
         | ({} if campaign.burst is None else _burst(campaign.burst))
         | dict(attributes),
-        estimates=None if estimates is None else unfolded_estimates(estimates, group),
         double=is_double(campaign),
     )
     return table if campaign.output.exit_state else table.drop_vars(v.EXIT_VARIABLES)
@@ -196,14 +188,14 @@ def is_double(campaign: Campaign) -> bool:
 def at_solid(campaign: Campaign, shots: Shots) -> Shots:
     """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
     target, plate = campaign.target, campaign.plate
-    own: dict[str, Any] = {name: None for name in shots.columns if name.startswith("layer_")}
-    if shots.thickness is None and shots.layer_thickness is None:
-        return replace(shots, **own)
-    thickness = shots.own("thickness", plate.thickness) * (plate.solid.thickness / plate.thickness)
-    for k, layer in enumerate(target.layers):
-        share = layer.areal_density / layer.thickness / plate.density
-        thickness = thickness + share * shots.own_of_layer("thickness", k, layer.thickness)
-    return replace(shots, **own, thickness=np.broadcast_to(thickness, len(shots)).copy())
+    own: dict[str, Any] = {name: shots.columns[name][:, :1] if shots.differs(name, 0) else None for name in BY_LAYER}
+    if shots.thickness is not None:
+        thickness = shots.own_of(target, "thickness", 0) * (plate.solid.thickness / plate.thickness)
+        for k, layer in enumerate(target.layers[1:], start=1):
+            share = layer.areal_density / layer.thickness / plate.density
+            thickness = thickness + share * shots.own_of(target, "thickness", k)
+        own["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
+    return replace(shots, **own)
 
 
 def promise_of(campaign: Campaign, device: str = "auto", progress: Progress | None = None) -> Promise | None:
@@ -263,8 +255,6 @@ def promise_in(dataset: Result) -> Promise | None:
 
 def _build(scene: Scene, shots: Shots, numerics: Numerics | Fidelity, device: str) -> None:
     """Build the kernels first, so that the measured time is that of computing alone."""
-    if isinstance(numerics, Numerics) and numerics.tolerance is not None:
-        numerics = Numerics(precision=numerics.precision, layout=numerics.layout)
     build(scene, shots, numerics=numerics, device=device)
 
 
@@ -275,54 +265,32 @@ def _outcomes(
     device: str,
     threads: int | None,
     progress: Progress | None = None,
-    refining: Callable[[Refining], None] | None = None,
     drawn: Posterior | None = None,
-) -> tuple[Outcomes, Estimates | None]:
-    """Outcomes, and estimates of their errors if the numerics have a tolerance."""
+) -> Outcomes:
     if drawn is not None and drawn.of_scene:
         return _outcomes_of_scenes(scene, shots, (numerics, device, threads, progress), drawn)
-    if isinstance(numerics, Numerics) and numerics.tolerance is not None:
-        return simulate_to_tolerance(
-            scene,
-            shots,
-            numerics=numerics,
-            device=device,
-            threads=threads,
-            progress=progress,
-            refining=refining,
-        )
-    return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress), None
+    return simulate(scene, shots, numerics=numerics, device=device, threads=threads, progress=progress)
 
 
-def _outcomes_of_scenes(
-    scene: Scene, shots: Shots, how: tuple[Any, ...], drawn: Posterior
-) -> tuple[Outcomes, Estimates | None]:
+def _outcomes_of_scenes(scene: Scene, shots: Shots, how: tuple[Any, ...], drawn: Posterior) -> Outcomes:
     """Outcomes of shots whose draws of the posterior need scenes of their own."""
     numerics, device, threads, progress = how
     places: list[Any] = []
-    parts: list[tuple[Outcomes, Estimates | None]] = []
+    parts: list[Outcomes] = []
     for which, own in drawn.scenes(scene, shots):
         before = sum(map(len, places))
         follow = progress and (lambda done, _, before=before: progress(before + done, len(shots)))
         parts.append(_outcomes(own, shots[which], numerics, device, threads, follow))
         places.append(which)
     order = np.argsort(np.concatenate(places), kind="stable")
-    outcomes, estimates = zip(*parts, strict=True)
-    return _joined(outcomes, order), None if estimates[0] is None else _joined(estimates, order)
-
-
-def _joined(parts: Sequence[Any], order: NDArray[np.int64]) -> Any:
-    """Outcomes or estimates one after the other, then in this order."""
-    columns = {one.name: [getattr(part, one.name) for part in parts] for one in fields(parts[0])}
-    return type(parts[0])(**{name: np.concatenate(values)[order] for name, values in columns.items()})
+    return Outcomes.joined(parts)[order]
 
 
 def _impact(campaign: Campaign) -> str:
     """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
-    scatter = {name: given.model_dump() for name, given in campaign.scatter.given.items()}
-    return json.dumps(
-        dict(campaign.impact) | {name: given for name, given in scatter.items() if QUANTITIES[name].table != "plate"}
-    )
+    scatter = campaign.scatter.given.items()
+    given = {name: one.model_dump() for (name, _), one in scatter if not QUANTITIES[name].by_layer}
+    return json.dumps(dict(campaign.impact) | given)
 
 
 def _material(campaign: Campaign) -> str:
@@ -342,8 +310,9 @@ def _plate(campaign: Campaign) -> str:
 def _layers(campaign: Campaign) -> str:
     """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
     layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
-    for (name, k), given in campaign.scatter.of_layers.items():
-        layers[str(k + 1)][name] = given.model_dump()
+    for (name, k), given in campaign.scatter.given.items():
+        if k:
+            layers[str(k)][name] = given.model_dump()
     return json.dumps(layers)
 
 
@@ -368,14 +337,7 @@ def made_by(device: str) -> dict[str, str]:
 
 def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -> str:
     """The numerics in force, every choice made, as one line."""
-    tolerance = campaign.numerics.tolerance
-    if tolerance is not None:
-        finest = LADDER[LEVELS[-1]]
-        return (
-            f"tolerance of {tolerance.residual_velocity:g} m/s and {np.degrees(tolerance.tilt):g} deg, "
-            f"at most {finest.patches_axial} by {finest.patches_around} patches"
-        )
-    resolution = resolve(numerics, campaign.scene, shots.columns)
+    resolution = resolve(numerics, campaign.scene, shots)
     impact = campaign.impact
     return (
         f"{campaign.numerics.fidelity} fidelity, {campaign.numerics.scheme} scheme, "
@@ -387,14 +349,9 @@ def _numerics(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -
 
 def _numbers_of(campaign: Campaign, numerics: Numerics | Fidelity, shots: Shots) -> dict[str, Any]:
     """The numerics in force as numbers, by the names of attributes."""
-    precision = {attr.PRECISION: "double" if is_double(campaign) else "single"}
-    if (tolerance := campaign.numerics.tolerance) is not None:
-        return precision | {
-            attr.TOLERANCE_RESIDUAL_VELOCITY: tolerance.residual_velocity,
-            attr.TOLERANCE_TILT: math.degrees(tolerance.tilt),
-        }
-    resolution = resolve(numerics, campaign.scene, shots.columns)
-    return precision | {
+    resolution = resolve(numerics, campaign.scene, shots)
+    return {
+        attr.PRECISION: "double" if is_double(campaign) else "single",
         attr.PATCHES_AXIAL: resolution.patches_axial,
         attr.PATCHES_AROUND: resolution.patches_around,
         attr.GRID_SPACING: resolution.grid_spacing,

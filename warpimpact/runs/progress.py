@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpimpact.results.measures import Measure
-from warpimpact.solver.refinement import Refining
 from warpimpact.statistics.intervals import Estimate
 
 
@@ -22,7 +21,6 @@ class Standing:
         failed: shots whose computation failed.
         estimates: running estimates of the main quantities, over the shots from the first on without a gap.
         promise: the finding of the pilot; None if the campaign fixes the resolution.
-        refining: how far the hits of a task are on their way to a tolerance; None without one.
     """
 
     done: int
@@ -32,7 +30,6 @@ class Standing:
     failed: int
     estimates: dict[Measure, Estimate]
     promise: Any = None
-    refining: Refining | None = None
 
 
 Follow = Callable[[Standing], None]

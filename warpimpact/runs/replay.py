@@ -10,16 +10,16 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.former import in_present_terms
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
 from warpimpact.results.files import ResultError
+from warpimpact.results.layers import values_of
 from warpimpact.runs.compute import is_double, promise_in
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver import simulate
 from warpimpact.solver.limit import with_thickness, with_velocity
-from warpimpact.solver.resolution import Fidelity, level
+from warpimpact.solver.resolution import Fidelity
 from warpimpact.solver.unfold import image_of
 
 ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
@@ -70,7 +70,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     computed, shot = images[: 1 + before], images[image + before :][:1]
     if campaign.drawn is not None:
         ((_, scene),) = campaign.drawn.scenes(scene, computed)
-    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result, place), snapshots=snapshots)
+    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
     home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
     period, double = campaign.hits.covered(campaign.plate), is_double(campaign)
@@ -78,10 +78,8 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     end = numbered(ended, hit).isel(hit=0)
     stored = result.isel(hit=place)
     if not _same(end, stored, (v.HIT_Y, v.HIT_Z, *v.shot_variables(end))):
-        former = campaign.hits.file is not None and attr.CAMPAIGN_ANGLES not in result.attrs
-        why = "; angles in a hit list are degrees now, and were radians when the result was computed" if former else ""
         raise ResultError(
-            f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one{why}"
+            f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
         )
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
         attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
@@ -100,14 +98,12 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
     layer = int(result.attrs[attr.LIMIT_LAYER])
     if result.attrs[attr.LIMIT] == "velocity":
         return with_velocity(shots, np.full(len(shots), float(result[v.IMPACT_VELOCITY][place])))
-    stored = result[v.THICKNESS][place] if layer == 0 else result["layer_thickness"][place, layer]
-    return with_thickness(scene, layer, shots, np.full(len(shots), float(stored)))
+    stored = values_of(scene.target, result.isel(hit=place), "thickness")[layer]
+    return with_thickness(layer, shots, np.full(len(shots), stored))
 
 
-def _numerics(campaign: Campaign, result: xarray.Dataset, place: int) -> Numerics | Fidelity:
-    """What the hit was computed with: of a run to a tolerance, the level that it ended on."""
-    if campaign.numerics.tolerance is not None:
-        return level(int(result[v.LEVEL][place]), campaign.numerics)
+def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics | Fidelity:
+    """What the hits were computed with."""
     if attr.LIMIT_RESOLUTION in result.attrs:
         return Fidelity(**json.loads(result.attrs[attr.LIMIT_RESOLUTION]))
     promise = promise_in(result)
@@ -118,11 +114,9 @@ def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
     if attr.CAMPAIGN not in result.attrs:
         raise ResultError("the result does not contain its campaign")
     count = int(result.attrs[attr.COUNT]) if attr.COUNT in result.attrs else None  # a list of hits has none
-    text, name = result.attrs[attr.CAMPAIGN], "the campaign in the result"
-    if attr.CAMPAIGN_ANGLES not in result.attrs:
-        text = in_present_terms(text, name)
-    campaign = Campaign.from_text(text, name=name, folder=folder, count=count)
-    dealt = int(result.attrs.get(attr.REPLICATES, 1))
+    name = "the campaign in the result"
+    campaign = Campaign.from_text(result.attrs[attr.CAMPAIGN], name=name, folder=folder, count=count)
+    dealt = int(result.attrs[attr.REPLICATES])
     if campaign.replicates == dealt:
         return campaign
     # A result computed under another default of the replicates keeps its own hits.
@@ -130,8 +124,8 @@ def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:
 
 
 def _same(one: xarray.Dataset, other: xarray.Dataset, names: tuple[str, ...]) -> bool:
-    """Whether variables agree in every bit of the first; NaN equals NaN. Version 0.1.0 stored singles as doubles."""
-    return all(np.array_equal(one[name], other[name].astype(one[name].dtype), equal_nan=True) for name in names)
+    """Whether variables agree in every bit; NaN equals NaN."""
+    return all(np.array_equal(one[name], other[name], equal_nan=True) for name in names)
 
 
 def _agreement(end: xarray.Dataset, stored: xarray.Dataset) -> str:

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -183,7 +183,7 @@ def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End
                 for index, shard in _split(future.result(), task, store.extent):
                     store.save(index, shard)
                     watch.add(index, shard)
-            follow(replace(watch.standing(team.underway()), refining=team.refining()))
+            follow(watch.standing(team.underway()))
     finally:
         for future in waiting:
             future.cancel()
@@ -197,7 +197,7 @@ def _solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
     plate = campaign.plate
     if not campaign.output.solid_reference or campaign.target.solid == plate:
         return None
-    elsewhere = (v.HIT_Y, v.HIT_Z, "layer_offset_y", "layer_offset_z")
+    elsewhere = (v.HIT_Y, v.HIT_Z, "offset_y", "offset_z")
     conditions = [values for name, values in shots.columns.items() if name not in elsewhere]
     alike = plate.size is None and not any(np.nan_to_num(np.ptp(values, axis=0)).any() for values in conditions)
     if alike and campaign.burst is None:

@@ -17,7 +17,6 @@ from warpimpact.results.table import Table
 from warpimpact.runs.compute import HitMap, made_by
 from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, find_device
-from warpimpact.solver.refinement import Refining
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill."""
@@ -47,7 +46,6 @@ class Team:
         task: shots per task, for a rate of shots per second; 0 where that is not known yet.
         made_by: versions, kind of device and the job's content, which decide the bits.
         underway: how many shots of unfinished tasks are done.
-        refining: the task that has the longest way to its tolerance, None if there is none or it is not known.
     """
 
     job: HitMap
@@ -57,7 +55,6 @@ class Team:
     task: Callable[[float], int]
     made_by: dict[str, str]
     underway: Callable[[], int]
-    refining: Callable[[], Refining | None]
 
 
 def awaited(future: Future[Any], every: float, tick: Callable[[], object]) -> Any:
@@ -81,7 +78,7 @@ def local_team(campaign: Campaign, device: str, job: HitMap = HIT_MAP) -> Iterat
     """
     devices = _devices(device)
     idle, done, stopping = SimpleQueue[str](), dict[int, int](), threading.Event()
-    levels, begun = dict[int, Refining](), list[Future[Any]]()
+    begun = list[Future[Any]]()
     for chosen in devices:
         idle.put(str(chosen))
 
@@ -100,11 +97,9 @@ def local_team(campaign: Campaign, device: str, job: HitMap = HIT_MAP) -> Iterat
                 solid=solid,
                 device=name,
                 progress=progress,
-                refining=lambda found: levels.update({threading.get_ident(): found}),
             )
         finally:
             done[threading.get_ident()] = 0
-            levels.pop(threading.get_ident(), None)
             idle.put(name)
 
     def begin(task: Callable[..., Any], *arguments: Any) -> Future[Any]:
@@ -122,7 +117,6 @@ def local_team(campaign: Campaign, device: str, job: HitMap = HIT_MAP) -> Iterat
             task=lambda rate: task_size(kind) or min(CPU_SHOTS, int(CPU_SECONDS * rate)),
             made_by=kind | dict(job.content),
             underway=lambda: sum(done.copy().values()),
-            refining=lambda: longest(levels),
         )
     finally:
         stopping.set()
@@ -133,11 +127,6 @@ def local_team(campaign: Campaign, device: str, job: HitMap = HIT_MAP) -> Iterat
 def task_size(kind: dict[str, str]) -> int:
     """Shots per task; 0 where the rate decides."""
     return 0 if kind[attr.DEVICE] == "cpu" else CUDA_SHOTS
-
-
-def longest(levels: dict[Any, Refining]) -> Refining | None:
-    """The one that has the longest way to go."""
-    return max(levels.copy().values(), key=lambda one: one.seconds_left or 0.0, default=None)
 
 
 def _devices(names: str) -> list[Any]:

@@ -7,7 +7,7 @@ imports no other room: neither a kernel nor a Dataset.
 from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction
-from .numerics import Numerics, Tolerance
+from .numerics import Accuracy, Numerics
 from .patterns import (
     AnyPattern,
     CirclePattern,
@@ -22,8 +22,9 @@ from .patterns import (
     TrianglePattern,
 )
 from .plate import Plate
+from .quantities import OF_THE_SCENE
 from .sampling import Sampler, make_shots
-from .scatter import OF_THE_SCENE, Scatter
+from .scatter import Scatter
 from .scene import Record, Scene
 from .shots import Hits, Impact, Shots
 from .symmetry import IDENTITY, Symmetry, symmetries_used
@@ -32,6 +33,7 @@ from .target import Layer, Target
 __all__ = [
     "IDENTITY",
     "OF_THE_SCENE",
+    "Accuracy",
     "AnyCore",
     "AnyPattern",
     "Burst",
@@ -64,7 +66,6 @@ __all__ = [
     "SquarePattern",
     "Symmetry",
     "Target",
-    "Tolerance",
     "TrianglePattern",
     "make_shots",
     "symmetries_used",

@@ -11,15 +11,16 @@ from pydantic import Field, field_validator, model_validator
 from .distributions import EDGE, AnyDistribution, Distribution
 from .model import Array
 from .plate import Plate
+from .quantities import DRAWN, QUANTITIES, Quantity, drawn_column
 from .sampling import Sampler, stream
-from .scatter import QUANTITIES, Quantity, Scatter, Scattering
+from .scatter import Scatter, Scattering
 from .shots import Hits, Impact, Shots
 from .units import Length
 
 _BURST = 2**20
 """First part of the keys of all that is drawn for the later shots of bursts. The others have their columns there."""
-_DISTANCE, _DIRECTION, _ALONG_Y, _ALONG_Z = range(len(QUANTITIES), len(QUANTITIES) + 4)
-"""Columns of the draws that place the hits; those of QUANTITIES come before."""
+_DISTANCE, _DIRECTION, _ALONG_Y, _ALONG_Z = range(DRAWN, DRAWN + 4)
+"""Columns of the draws that place the hits; those of the quantities come before."""
 _NonNegativeLength = Annotated[Length, Field(ge=0)]
 
 
@@ -166,10 +167,10 @@ class BurstSampler(Sampler):
             name: np.where(
                 order == 0,
                 shots.columns[name],
-                distribution.quantile(draws(self._hits.seed, list(QUANTITIES).index(name), first, len(shots))),
+                distribution.quantile(draws(self._hits.seed, drawn_column(name), first, len(shots))),
             )
-            for name, distribution in self._scatter.items()
-            if QUANTITIES[name].table != "plate" and name not in listed
+            for (name, _), distribution in self._scatter.items()
+            if not QUANTITIES[name].by_layer and name not in listed
         }
 
 

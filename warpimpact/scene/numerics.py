@@ -16,12 +16,12 @@ class _AsGiven(Model):
         return {name: value for name, value in write(self).items() if name in self.model_fields_set}
 
 
-class Tolerance(_AsGiven):
-    """Largest error that an outcome may have; a quantity that is not given has no limit.
+class Accuracy(_AsGiven):
+    """Errors that a share of the hits must stay within; a quantity that is not given has no limit.
 
     Attributes:
         residual_velocity: of the residual velocity [m/s].
-        tilt: of the tilt at every stand-off [rad].
+        tilt: of the tilt at the largest stand-off [rad].
     """
 
     residual_velocity: PositiveSpeed = float("inf")
@@ -50,7 +50,6 @@ class Numerics(_AsGiven):
         layout: of the work on a CUDA device. "simple" computes a shot per thread. "block" computes a shot per block of
             32 threads, with its window of the plate in shared memory; no device has measured it yet. It computes single
             plates in single precision, one hit each, without the bending moment.
-        tolerance: replaces the fidelity: each hit is refined until its estimated error is within the tolerance.
     """
 
     fidelity: Literal["draft", "standard", "reference"] = "standard"
@@ -61,18 +60,10 @@ class Numerics(_AsGiven):
     grid_spacing: PositiveLength | None = None
     precision: Literal["single", "double"] | None = None
     layout: Literal["simple", "block"] = "simple"
-    tolerance: Tolerance | None = None
 
     @property
     def explicit(self) -> str | None:
         """The first setting that fixes the resolution, so that nothing is promised; None if the fidelity chooses it."""
-        fixed = ("time_step", "patches_axial", "patches_around", "grid_spacing", "tolerance")
+        fixed = ("time_step", "patches_axial", "patches_around", "grid_spacing")
         given = [name for name in fixed if getattr(self, name) is not None]
         return "scheme" if self.scheme == "nodal" else next(iter(given), None)
-
-    @model_validator(mode="after")
-    def _tolerance_chooses(self) -> Self:
-        chosen = self.model_fields_set - {"tolerance", "precision", "layout"}
-        if self.tolerance is not None and chosen:
-            raise ValueError(f"got {min(chosen)} beside tolerance, but a tolerance sets the resolution itself")
-        return self

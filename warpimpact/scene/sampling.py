@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from .distributions import EDGE
 from .model import Array
 from .plate import Plate
-from .scatter import OF_A_LAYER, QUANTITIES, Scatter
+from .quantities import drawn_column, drawn_columns
+from .scatter import Scatter
 from .shots import Hits, Impact, Shots
 from .sobol import Sobol
 from .symmetry import check_scatter, irreducible_part, symmetries_used
 
 _HIT_COLUMNS = 2
-"""Columns of uniform numbers for y and z of the hit; those of QUANTITIES follow, then those of OF_A_LAYER for every
-layer."""
+"""Columns of uniform numbers for y and z of the hit; those of the quantities follow."""
 
 
 class Sampler:
@@ -48,9 +48,8 @@ class Sampler:
         computed = None if hits.count is None else max(1, hits.count // len(self._group))
         self._hits = hits.model_copy(update={"count": computed})
         scatter = scatter or Scatter()
-        self._scatter, self._of_layers, self._layers = scatter.given, scatter.of_layers, len(scatter.layers)
-        dimensions = _HIT_COLUMNS + (len(QUANTITIES) if self._scatter or self._of_layers else 0)
-        dimensions += len(OF_A_LAYER) * self._layers if self._of_layers else 0
+        self._scatter = scatter.given
+        dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
         self._sobol = [Sobol(dimensions, _seed(hits.seed, replicate)) for replicate in range(replicates)]
 
     def __len__(self) -> int:
@@ -72,27 +71,19 @@ class Sampler:
 
     def _originals(self, first: int, count: int) -> Shots:
         """`count` shots that are not images of another shot, from number `first` of these on."""
-        columns = [_HIT_COLUMNS + list(QUANTITIES).index(name) for name in self._scatter]
-        after = _HIT_COLUMNS + len(QUANTITIES)
-        columns += [after + len(OF_A_LAYER) * k + list(OF_A_LAYER).index(name) for name, k in self._of_layers]
+        columns = [_HIT_COLUMNS + drawn_column(name, layer) for name, layer in self._scatter]
         hit_y, hit_z, *uniform = self._uniform([0, 1, *columns], first, count)
-        values = {name: np.full(count, value) for name, value in self._impact}
-        distributions = [*self._scatter.values(), *self._of_layers.values()]
-        drawn = [
-            distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))
-            for distribution, share in zip(distributions, uniform, strict=True)
-        ]
-        values |= dict(zip(self._scatter, drawn, strict=False))
-        for (name, k), column in zip(self._of_layers, drawn[len(self._scatter) :], strict=True):
-            values.setdefault(f"layer_{name}", np.full((count, self._layers), np.nan))[:, k] = column
-        values |= {
-            "hit_y": (hit_y - 0.5) * self._extent[0] + self._middle[0],
-            "hit_z": (hit_z - 0.5) * self._extent[1] + self._middle[1],
-        }
+        shots = Shots(
+            hit_y=(hit_y - 0.5) * self._extent[0] + self._middle[0],
+            hit_z=(hit_z - 0.5) * self._extent[1] + self._middle[1],
+            **{name: np.full(count, value) for name, value in self._impact},
+        )
+        for ((name, layer), distribution), share in zip(self._scatter.items(), uniform, strict=True):
+            shots = shots.with_own({name: distribution.quantile(np.clip(share, EDGE, 1.0 - EDGE))}, layer)
         if self._hits.listed is not None:
             rows = np.arange(first, first + count) % len(self._hits.listed["hit_y"])
-            values |= {name: column[rows] for name, column in self._hits.listed.items()}
-        return Shots(**values)
+            shots = shots.with_own({name: column[rows] for name, column in self._hits.listed.items()})
+        return shots
 
     def _uniform(self, columns: list[int], first: int, count: int) -> list[Array]:
         """Numbers in [0, 1) of some columns, each of shape [count]."""

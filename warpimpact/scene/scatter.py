@@ -1,17 +1,13 @@
-"""Scatter: distributions of quantities that differ from shot to shot, from scipy.stats.
-
-Long because every distribution, and every quantity that may scatter, stands here once.
-"""
+"""Scatter: distributions of quantities that differ from shot to shot, from scipy.stats."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import (
-    Field,
     FieldSerializationInfo,
     SerializerFunctionWrapHandler,
     TypeAdapter,
@@ -23,58 +19,9 @@ from pydantic import (
 
 from .distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from .model import Model
-from .shots import OF_A_BURST, Obliquity, Shots, Tilt
-from .units import (
-    Angle,
-    AngularVelocity,
-    Length,
-    NonNegativeNumber,
-    NonNegativeStress,
-    Number,
-    PositiveLength,
-    PositiveMass,
-    PositiveSpeed,
-    PositiveStress,
-    Radians,
-    in_radians,
-    quantity,
-)
-
-
-class Quantity(NamedTuple):
-    """A quantity that may scatter: its table in a campaign file, and its type."""
-
-    table: str
-    type: Any
-
-
-QUANTITIES = {
-    "velocity": Quantity("impact", PositiveSpeed),
-    "obliquity": Quantity("impact", Obliquity),
-    "azimuth": Quantity("impact", Angle),
-    "pitch": Quantity("impact", Tilt),
-    "yaw": Quantity("impact", Tilt),
-    "spin": Quantity("impact", AngularVelocity),
-    "resistance": Quantity("plate", NonNegativeStress),
-    "shear_coefficient": Quantity("plate", NonNegativeNumber),
-    "degradation": Quantity("plate", Annotated[Number, Field(ge=0, le=1)]),
-    "thickness": Quantity("plate", PositiveLength),
-    "mass": Quantity("core", PositiveMass),
-    "strength": Quantity("core", PositiveStress),
-}
-"""By name. The position in this table is the column of the random numbers. So the draws of a quantity do not depend on
-which other quantities scatter."""
-OF_A_LAYER = {
-    "thickness": Quantity("layer", PositiveLength),
-    "resistance": Quantity("layer", NonNegativeStress),
-    "shear_coefficient": Quantity("layer", NonNegativeNumber),
-    "degradation": Quantity("layer", Annotated[Number, Field(ge=0, le=1)]),
-    "offset_y": Quantity("layer", Length),
-    "offset_z": Quantity("layer", Length),
-}
-"""Quantities of each layer behind the plate, likewise: their columns follow, layer by layer."""
-OF_THE_SCENE = tuple(name for name, quantity in QUANTITIES.items() if quantity.table != "impact")
-"""Quantities of plate and core that may differ from shot to shot."""
+from .quantities import QUANTITIES, Quantity
+from .shots import OF_A_BURST, Shots
+from .units import Radians, in_radians, quantity
 
 
 def check_range(name: str, low: float, high: float, known: Mapping[str, Quantity] = QUANTITIES) -> None:
@@ -102,22 +49,22 @@ class Scattering(Model):
     @classmethod
     def _in_si(cls, value: Any, info: ValidationInfo) -> Any:
         """Parameters may have units of their quantity."""
-        assert info.field_name is not None
-        if not isinstance(value, dict) or info.field_name not in cls._quantities:
-            return value
-        read = quantity(cls._quantities[info.field_name].type)
-        return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
+        known = cls._quantities.get(str(info.field_name))
+        if known is not None and known.by_layer:
+            layers = (value,) if isinstance(value, dict | Distribution) else value
+            return [_in_si(known, one) for one in layers] if isinstance(layers, list | tuple) else layers
+        return value if known is None else _in_si(known, value)
 
     @field_validator("*", mode="after")
     @classmethod
     def _is_possible(cls, value: Any, info: ValidationInfo) -> Any:
-        assert info.field_name is not None
-        if isinstance(value, Distribution):
-            low, high = value.quantile(np.array([EDGE, 1.0 - EDGE]))
-            try:
-                check_range(info.field_name, low, high, cls._quantities)
-            except ValueError as error:
-                raise ValueError(f"got a {value.distribution} distribution that {error}") from None
+        for one in value if isinstance(value, tuple) else (value,):
+            if isinstance(one, Distribution):
+                low, high = one.quantile(np.array([EDGE, 1.0 - EDGE]))
+                try:
+                    check_range(str(info.field_name), low, high, cls._quantities)
+                except ValueError as error:
+                    raise ValueError(f"got a {one.distribution} distribution that {error}") from None
         return value
 
     @field_serializer("*", mode="wrap")
@@ -130,23 +77,8 @@ class Scattering(Model):
         mark = in_radians if info.mode == "json" else Radians
         return {name: part if name in PURE_NUMBERS else _marked(part, mark) for name, part in written.items()}
 
-    @property
-    def given(self) -> dict[str, Distribution]:
-        """The distributions that are given, by name."""
-        return {name: value for name in self._quantities if (value := getattr(self, name)) is not None}
 
-
-class LayerScatter(Scattering):
-    """Distributions of the quantities of one layer that differ from shot to shot; None does not differ."""
-
-    _quantities = OF_A_LAYER
-
-    thickness: AnyDistribution | None = None
-    resistance: AnyDistribution | None = None
-    shear_coefficient: AnyDistribution | None = None
-    degradation: AnyDistribution | None = None
-    offset_y: AnyDistribution | None = None
-    offset_z: AnyDistribution | None = None
+_ByLayer = tuple[AnyDistribution | None, ...]
 
 
 class Scatter(Scattering):
@@ -154,9 +86,7 @@ class Scatter(Scattering):
 
     In a campaign file a distribution takes the place of the value:
     ``velocity = { distribution = "normal", mean = "820 m/s", std = "10 m/s" }``.
-
-    Attributes:
-        layers: of the layers behind the plate, in order; empty if none of them differs.
+    Of what each layer has its own, there is a distribution or None by layer; a distribution alone is that of the plate.
     """
 
     _quantities = QUANTITIES
@@ -167,18 +97,40 @@ class Scatter(Scattering):
     pitch: AnyDistribution | None = None
     yaw: AnyDistribution | None = None
     spin: AnyDistribution | None = None
-    resistance: AnyDistribution | None = None
-    shear_coefficient: AnyDistribution | None = None
-    degradation: AnyDistribution | None = None
-    thickness: AnyDistribution | None = None
+    resistance: _ByLayer = ()
+    shear_coefficient: _ByLayer = ()
+    degradation: _ByLayer = ()
+    thickness: _ByLayer = ()
     mass: AnyDistribution | None = None
     strength: AnyDistribution | None = None
-    layers: tuple[LayerScatter, ...] = ()
+    offset_y: _ByLayer = ()
+    offset_z: _ByLayer = ()
+
+    @field_validator("offset_y", "offset_z")
+    @classmethod
+    def _of_a_layer(cls, value: _ByLayer) -> _ByLayer:
+        if value and value[0] is not None:
+            raise ValueError("got a distribution for the plate, but only layers behind it have an offset")
+        return value
 
     @property
-    def of_layers(self) -> dict[tuple[str, int], Distribution]:
-        """The distributions of layers, by name and number of the layer behind the plate."""
-        return {(name, k): one for k, layer in enumerate(self.layers) for name, one in layer.given.items()}
+    def given(self) -> dict[tuple[str, int], Distribution]:
+        """The distributions that are given, by name and layer; what is not of a layer stands with the plate, 0."""
+        named = [(name, getattr(self, name)) for name in QUANTITIES]
+        by_layer = [(name, value if isinstance(value, tuple) else (value,)) for name, value in named]
+        return {(name, k): one for name, layers in by_layer for k, one in enumerate(layers) if one is not None}
+
+    @property
+    def layers(self) -> int:
+        """The number of the last layer that differs, and one."""
+        return 1 + max((layer for _, layer in self.given), default=0)
+
+
+def _in_si(known: Quantity, value: Any) -> Any:
+    if not isinstance(value, dict):
+        return value
+    read = quantity(known.type)
+    return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
 
 
 def _marked(value: Any, mark: Callable[[float], Any]) -> Any:
@@ -192,7 +144,5 @@ def _read(read: Any, name: str, value: Any) -> Any:
         raise ValueError(f"{name}: {error}") from None
 
 
-assert set(QUANTITIES) == set(Scatter.model_fields) - {"layers"}
-assert {"hit_y", "hit_z", *QUANTITIES, *OF_A_BURST, *(f"layer_{name}" for name in OF_A_LAYER)} == set(
-    Shots.__dataclass_fields__
-)
+assert set(QUANTITIES) == set(Scatter.model_fields)
+assert {"hit_y", "hit_z", *QUANTITIES, *OF_A_BURST} == set(Shots.__dataclass_fields__)

@@ -82,9 +82,9 @@ class Record(Model):
                     f"but a core of this size is certain to be out of the target only from {needed:.4g} m"
                 )
         free = self.flies_free(core, target)[:-1]
-        if not target.layers or free.any(axis=0).all():
+        if len(target.layers) == 1 or free.any(axis=0).all():
             return
-        widest = max(layer.gap for layer in target.layers)
+        widest = max(target.gaps)
         if widest < 2.0 * needed:
             raise ValueError(
                 f"got {self._name}.layer_standoffs beside gaps of at most {widest:g} m, but a core of this size flies "
@@ -100,7 +100,7 @@ class Record(Model):
     def flies_free(self, core: Core, target: Target) -> NDArray[np.bool_]:
         """Whether a core is certain to touch nothing at each of the stand-offs behind each layer, however it is turned:
         shape [layers, stand-offs]. Behind the last layer it is."""
-        gaps = np.array([*(layer.gap for layer in target.layers), np.inf])
+        gaps = np.array([*target.gaps[1:], np.inf])
         reach = np.array(self.layer_standoffs) + self._clearance(core)
         return np.asarray(reach <= gaps[:, None] * (1.0 + 1e-12))
 
@@ -111,7 +111,7 @@ class Record(Model):
 
 
 if TYPE_CHECKING:
-    AnyTarget: TypeAlias = Target | Any  # what a scene holds, or what it takes, a plate above all
+    AnyTarget: TypeAlias = Target | Any  # what a scene holds, or what it takes: a plate, or layers
 else:
     AnyTarget = Target
 
@@ -121,7 +121,7 @@ class Scene(Model):
 
     Attributes:
         core: the rigid core.
-        target: what it is shot at; a plate is accepted, too.
+        target: what it is shot at; a plate or a tuple of layers is accepted, too.
         interaction: stress on the surface of the core.
         record: what is recorded of every shot.
     """
@@ -133,8 +133,10 @@ class Scene(Model):
 
     @field_validator("target", mode="before")
     @classmethod
-    def _of_a_plate(cls, target: Any) -> Any:
-        return Target(plate=target) if isinstance(target, Plate) else target
+    def _of_layers(cls, target: Any) -> Any:
+        if isinstance(target, Plate):
+            return Target(layers=(target,))
+        return Target(layers=target) if isinstance(target, tuple | list) else target
 
     @model_validator(mode="after")
     def _record_is_possible(self) -> Self:

@@ -1,20 +1,21 @@
 """Shots: how the core arrives, and where (docs/model.md §1)."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, model_validator
 
 from .files import Column, InputFile, read_columns
 from .model import Array, Model
 from .plate import Plate
-from .units import Angle, AngularVelocity, Length, Mass, Number, PositiveSpeed, Speed, Stress, quantity
+from .quantities import BY_LAYER
+from .target import Target
+from .units import Angle, AngularVelocity, Length, Mass, Number, Obliquity, PositiveSpeed, Speed, Stress, Tilt, quantity
 
 _RIGHT_ANGLE = np.pi / 2
 
@@ -23,24 +24,6 @@ _REPLICATES = 16
 9 % wider than over very many."""
 
 
-def _is_obliquity(angle: float) -> float:
-    if not 0.0 <= angle < _RIGHT_ANGLE:
-        raise PydanticCustomError("obliquity", "Input should be at least 0 and less than 90 deg")
-    return angle
-
-
-def _is_tilt(angle: float) -> float:
-    if not abs(angle) < _RIGHT_ANGLE:
-        raise PydanticCustomError("tilt", "Input should be greater than -90 and less than 90 deg")
-    return angle
-
-
-Obliquity = Annotated[
-    Angle, AfterValidator(_is_obliquity), Field(json_schema_extra={"minimum": 0, "exclusiveMaximum": 90})
-]
-Tilt = Annotated[
-    Angle, AfterValidator(_is_tilt), Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90})
-]
 _ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 OF_A_BURST = ("sample", "burst_order", "nearest_earlier_hit")
 """Columns of shots that share their plates."""
@@ -192,7 +175,8 @@ class Hits(Model):
 
 @dataclass(frozen=True)
 class Shots:
-    """Shots as arrays, each of shape [shots], in SI and radians; `Impact` and `Plate` say what the quantities are.
+    """Shots as arrays, of shape [shots] unless told otherwise, in SI and radians; `Impact` and `Layer` say what the
+    quantities are.
 
     Attributes:
         hit_y, hit_z: where the line of flight of the centre of mass crosses the front face [m].
@@ -200,11 +184,10 @@ class Shots:
         obliquity, azimuth: of the line of flight [rad].
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
-        resistance [Pa], shear_coefficient, degradation, thickness [m]: of the plate, and
         mass [kg], strength [Pa]: of the core; None where all shots have the scene's own value.
-        layer_thickness [m], layer_resistance [Pa], layer_shear_coefficient, layer_degradation, layer_offset_y [m],
-            layer_offset_z [m]: of the layers behind the plate, shape [shots, layers]; NaN where a layer has the scene's
-            own value, None where all layers have.
+        resistance [Pa], shear_coefficient, degradation, thickness [m], offset_y, offset_z [m]: of the layers, shape
+            [shots, layers]; NaN where a layer has the scene's own value, None where all layers have. Layers behind
+            those of the column have the scene's own; a column of shape [shots] is that of the plate alone.
         sample: number of the plate that a shot hits, where several hit one and the same; those are in a row. None where
             every shot has a plate of its own.
         burst_order: how many shots have hit that plate before.
@@ -225,15 +208,17 @@ class Shots:
     thickness: Array | None = None
     mass: Array | None = None
     strength: Array | None = None
-    layer_thickness: Array | None = None
-    layer_resistance: Array | None = None
-    layer_shear_coefficient: Array | None = None
-    layer_degradation: Array | None = None
-    layer_offset_y: Array | None = None
-    layer_offset_z: Array | None = None
+    offset_y: Array | None = None
+    offset_z: Array | None = None
     sample: NDArray[np.int64] | None = None
     burst_order: NDArray[np.int64] | None = None
     nearest_earlier_hit: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Make columns of the plate alone those of a first layer."""
+        for name in BY_LAYER:
+            if (column := getattr(self, name)) is not None and np.ndim(column) == 1:
+                object.__setattr__(self, name, column[:, None])
 
     def __len__(self) -> int:
         """Number of shots."""
@@ -267,12 +252,32 @@ class Shots:
         """A quantity of every shot, shape [shots]; where they do not have one of their own that of the scene, [1]."""
         return self.columns.get(name, np.array([otherwise]))
 
-    def own_of_layer(self, name: str, layer: int, otherwise: float) -> Array:
-        """A quantity of a layer behind the plate, likewise."""
-        columns = self.columns.get(f"layer_{name}")
-        if columns is None or np.isnan(columns[:, layer]).all():
+    def differs(self, name: str, layer: int) -> bool:
+        """Whether a layer has values of its own for a quantity."""
+        column = self.columns.get(name)
+        return column is not None and layer < column.shape[1] and not np.isnan(column[:, layer]).all()
+
+    def own_of(self, target: Target, name: str, layer: int) -> Array:
+        """A quantity of a layer of the target, as `own`."""
+        otherwise = target.value(name, layer)
+        if not self.differs(name, layer):
             return np.array([otherwise])
-        return np.where(np.isnan(columns[:, layer]), otherwise, columns[:, layer])
+        own = self.columns[name][:, layer]
+        return np.where(np.isnan(own), otherwise, own)
+
+    def with_own(self, values: Mapping[str, Array], layer: int = 0) -> Self:
+        """With these values of some quantities, each of shape [shots]; of what layers have, in this layer alone."""
+        own: dict[str, Any] = {
+            name: self._put(name, column, layer) if name in BY_LAYER else column for name, column in values.items()
+        }
+        return replace(self, **own)
+
+    def _put(self, name: str, values: Array, layer: int) -> Array:
+        before = self.columns.get(name, np.empty((len(self), 0)))
+        columns = np.full((len(self), max(layer + 1, before.shape[1])), np.nan)
+        columns[:, : before.shape[1]] = before
+        columns[:, layer] = values
+        return columns
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
@@ -285,4 +290,4 @@ class Shots:
 def _listable(required: tuple[str, ...]) -> tuple[str, ...]:
     """Quantities that a list of hits may have beside those required: one number per shot."""
     foreign = {*required, *OF_A_BURST}
-    return tuple(f.name for f in fields(Shots) if f.name not in foreign and not f.name.startswith("layer_"))
+    return tuple(f.name for f in fields(Shots) if f.name not in foreign and not f.name.startswith("offset_"))

@@ -74,7 +74,7 @@ def check_scatter(hits: Hits, scatter: Scatter) -> None:
     Raises:
         ValueError: names the quantity that scatters.
     """
-    turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if name in scatter.given]
+    turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if getattr(scatter, name) is not None]
     if hits.irreducible and turned:
         raise ValueError(
             f"got hits.irreducible = true beside a distribution of impact.{turned[0]}, but a symmetry must hold for "

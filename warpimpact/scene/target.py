@@ -1,5 +1,6 @@
-"""Target: the plate and the layers behind it (docs/model.md §8)."""
+"""Target: layers, of which the plate is number 0 (docs/model.md §8)."""
 
+from collections.abc import Sequence
 from itertools import accumulate
 from typing import Annotated
 
@@ -14,6 +15,7 @@ from .units import Length
 _WIDEST_GAP = 10.0
 """[m]. Positions are exact to a micrometre within such a gap, and air is left out."""
 MOST_LAYERS = 64
+"""Behind the plate."""
 
 
 class Layer(Plate):
@@ -28,50 +30,51 @@ class Layer(Plate):
     offset: tuple[Length, Length] = (0.0, 0.0)
 
 
-def value_in(plate: Plate, name: str) -> float:
-    """A quantity of a layer by the name that it scatters under; a plate in front has no offset."""
-    if name.startswith("offset"):
-        return plate.offset["yz".index(name[-1])] if isinstance(plate, Layer) else 0.0
-    return float(getattr(plate, name))
-
-
 class Target(Model):
-    """What is shot at. Nothing couples its layers but the core.
+    """What is shot at: its layers, front to back. Nothing couples them but the core.
 
     Attributes:
-        plate: the plate, with its front face at x = 0.
-        layers: what stands behind it, in order.
+        layers: at x = 0 a plate; then what stands behind it. A plate behind another layer touches it.
     """
 
-    plate: Plate
-    layers: Annotated[tuple[Layer, ...], Field(fail_fast=True, max_length=MOST_LAYERS)] = ()
+    layers: Annotated[tuple[Plate | Layer, ...], Field(fail_fast=True, min_length=1, max_length=1 + MOST_LAYERS)]
 
-    @field_validator("plate")
+    @field_validator("layers")
     @classmethod
-    def _stands_in_front(cls, plate: Plate) -> Plate:
-        if isinstance(plate, Layer):
-            raise ValueError("got a Layer, but what stands in front is a Plate")
-        return plate
-
-    @property
-    def plates(self) -> tuple[Plate, ...]:
-        """Everything in order: layer 0 is the plate."""
-        return (self.plate, *self.layers)
+    def _begins_at_the_origin(cls, layers: tuple[Plate, ...]) -> tuple[Plate, ...]:
+        if isinstance(front := layers[0], Layer) and (front.gap, *front.offset) != (0.0, 0.0, 0.0):
+            raise ValueError(
+                f"got gap = {front.gap:g} m and offset = {front.offset} m of the first layer, but it has its front "
+                "face and its origin at 0: give a Plate"
+            )
+        return layers
 
     @property
     def named(self) -> list[tuple[str, Plate]]:
         """Everything in order, with its place in a campaign."""
-        return [("plate", self.plate), *((f"layer[{k}]", layer) for k, layer in enumerate(self.layers))]
+        return [(f"layer[{k - 1}]" if k else "plate", layer) for k, layer in enumerate(self.layers)]
 
-    def fronts(self, thickness: list[Array]) -> list[Array]:
+    @property
+    def gaps(self) -> tuple[float, ...]:
+        """Air in front of each layer [m]."""
+        return tuple(layer.gap if isinstance(layer, Layer) else 0.0 for layer in self.layers)
+
+    def value(self, name: str, layer: int) -> float:
+        """A quantity of a layer by the name under which it scatters."""
+        one = self.layers[layer]
+        if name.startswith("offset"):
+            return one.offset["yz".index(name[-1])] if isinstance(one, Layer) else 0.0
+        return float(getattr(one, name))
+
+    def fronts(self, thickness: Sequence[Array]) -> list[Array]:
         """Front faces of all layers [m], if their thicknesses [m] are these, of their shapes."""
-        behind = zip(thickness[:-1], self.layers, strict=True)
-        return list(accumulate((h + layer.gap for h, layer in behind), initial=np.zeros_like(thickness[0])))
+        behind = zip(thickness[:-1], self.gaps[1:], strict=True)
+        return list(accumulate((h + gap for h, gap in behind), initial=np.zeros_like(thickness[0])))
 
     @property
     def faces(self) -> NDArray[np.float64]:
         """Front and rear faces of all layers [m], shape [layers, 2]."""
-        thickness = [np.array(plate.thickness) for plate in self.plates]
+        thickness = [np.array(layer.thickness) for layer in self.layers]
         fronts = np.array(self.fronts(thickness))
         return np.stack([fronts, fronts + np.array(thickness)], axis=1)
 
@@ -83,11 +86,11 @@ class Target(Model):
     @property
     def areal_density(self) -> float:
         """Mass per area of all layers [kg/m²]."""
-        return sum(plate.areal_density for plate in self.plates)
+        return sum(layer.areal_density for layer in self.layers)
 
     @property
     def solid(self) -> Plate:
-        """One plate without holes, of the material of the plate and of the areal density of all layers."""
-        solid = self.plate.solid
-        behind = sum(layer.areal_density for layer in self.layers)
+        """One plate without holes, of the material of the first layer and of the areal density of all."""
+        solid = self.layers[0].solid
+        behind = sum(layer.areal_density for layer in self.layers[1:])
         return solid.model_copy(update={"thickness": solid.thickness + behind / solid.density}) if behind else solid

@@ -10,11 +10,13 @@ from numbers import Real
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
 _LARGEST = 1e30
 """Of a quantity in SI: what is computed of it, such as a volume, stays finite."""
+_RIGHT_ANGLE = math.pi / 2
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
 """Powers of powers, and exponents of three digits: no unit has them, and they can take for ever."""
 _STRING = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*$"
@@ -223,6 +225,26 @@ Angle = Annotated[
     PlainSerializer(in_radians, return_type=str, when_used="json"),
 ]
 """A number is degrees; the field holds radians, and JSON says so."""
+
+
+def _is_obliquity(angle: float) -> float:
+    if not 0.0 <= angle < _RIGHT_ANGLE:
+        raise PydanticCustomError("obliquity", "Input should be at least 0 and less than 90 deg")
+    return angle
+
+
+def _is_tilt(angle: float) -> float:
+    if not abs(angle) < _RIGHT_ANGLE:
+        raise PydanticCustomError("tilt", "Input should be greater than -90 and less than 90 deg")
+    return angle
+
+
+Obliquity = Annotated[
+    Angle, AfterValidator(_is_obliquity), Field(json_schema_extra={"minimum": 0, "exclusiveMaximum": 90})
+]
+Tilt = Annotated[
+    Angle, AfterValidator(_is_tilt), Field(json_schema_extra={"exclusiveMinimum": -90, "exclusiveMaximum": 90})
+]
 AngularVelocity = Annotated[Read, _quantity("an angular velocity", "rad/s", "17000 rad/s")]
 Energy = Annotated[Read, _quantity("an energy", "J", "10 J")]
 Inertia = Annotated[Read, _quantity("a moment of inertia", "kg m^2", "1.5e-8 kg m^2")]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
+from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.bending import Sections, check_bending, sections_of
 from warpimpact.solver.blocks import SIMPLE_ONLY, check_layout, in_blocks
 from warpimpact.solver.materials import Materials, materials_of
@@ -35,6 +36,15 @@ UNBREAKABLE = 1.0e30
 """Strength of a core that has none [Pa], beyond any stress."""
 
 
+class Planes(NamedTuple):
+    """Planes of a window through the thickness: their number, the `spacing` between two [m] and how many spacings a degradation
+    depth has. One stands for the whole thickness."""
+
+    number: int = 1
+    spacing: float = math.inf
+    reach: int = 0
+
+
 @dataclass(frozen=True)
 class Grid:
     """A plate as the kernels see it.
@@ -44,9 +54,7 @@ class Grid:
         period, half_size: extents (y, z) of the period, and half of those of the plate [m]; infinite without a rim.
         spacing: of the window's grid [m].
         taps: the tent's filter from its middle on, and one 0.
-        planes: of the window's grid through the thickness; 1 stands for all of it.
-        plane_spacing: between two of them [m].
-        plane_reach: planes in a degradation depth.
+        planes: of the window's grid through the thickness.
     """
 
     tile: Tile
@@ -54,9 +62,7 @@ class Grid:
     half_size: tuple[float, float]
     spacing: float
     taps: Array
-    planes: int = 1
-    plane_spacing: float = math.inf
-    plane_reach: int = 0
+    planes: Planes
 
     @property
     def reach(self) -> int:
@@ -105,14 +111,13 @@ class Arrays:
 
 def variant_of(resolution: Resolution, scene: Scene, shots: Shots, materials: list[Materials]) -> Variant:
     """The build of the kernels that a scene needs."""
-    plates, interaction, scattered = scene.target.plates, scene.interaction, shots.columns
-    degrades = any(weakens(scene.target, scattered))
+    plates, interaction = scene.target.layers, scene.interaction
+    degrades = any(weakens(scene.target, shots))
     return Variant(
         double=resolution.double,
         nodal=resolution.nodal,
         degrades=degrades,
-        rubs=any(plate.shear_coefficient > 0.0 for plate in plates)
-        or not scattered.keys().isdisjoint(("shear_coefficient", "layer_shear_coefficient")),
+        rubs=any(one.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, one in enumerate(plates)),
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
         rimmed=any(plate.size is not None for plate in plates),
         deep=degrades and not resolution.nodal and any(map(_is_deep, plates, materials)),
@@ -135,7 +140,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
     """
     core, target, record = scene.core, scene.target, scene.record
     check_bending(record, numerics)
-    resolution = resolve(numerics, scene, shots.columns)
+    resolution = resolve(numerics, scene, shots)
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
@@ -149,15 +154,8 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
         azimuths=azimuths_of(around),
         sections=sections_of(core, rings) if record.bending else None,
         grids=[
-            _through(
-                _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length),
-                plate,
-                resolution,
-                float(material.thickness.max()),
-            )
-            if variant.deep
-            else _grid(plate, resolution, plate.degradation_length / target.plate.degradation_length)
-            for plate, material in zip(target.plates, materials, strict=True)
+            _grid(layer, resolution, layer.degradation_length / target.layers[0].degradation_length, planes)
+            for layer, planes in zip(target.layers, planes_of(variant, resolution, scene, materials), strict=True)
         ],
         materials=materials,
         onset=scene.interaction.onset,
@@ -172,7 +170,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
     return arrays
 
 
-def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:
+def _grid(plate: Plate, resolution: Resolution, wider: float, planes: Planes) -> Grid:
     """The grid of a layer, whose cells are so many times as wide as those of the plate."""
     nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
     tile = tile_of(plate, spacing if nodal else min(spacing / FINER, plate.degradation_length / FINEST), sharp=nodal)
@@ -185,6 +183,7 @@ def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:
         half_size=(0.5 * size_y, 0.5 * size_z),
         spacing=spacing,
         taps=half_taps(0.0 if nodal else plate.degradation_length, spacing),
+        planes=planes,
     )
 
 
@@ -193,13 +192,15 @@ def _is_deep(plate: Plate, material: Materials) -> bool:
     return material.weakens and bool((material.thickness > plate.degradation_depth).any())
 
 
-def _through(grid: Grid, plate: Plate, resolution: Resolution, thickness: float) -> Grid:
-    """The grid of a layer of this thickness [m] with its planes, about as far apart as a step goes."""
-    reach = max(
-        FEWEST_PLANES, math.ceil(plate.degradation_depth / float(resolution.travel * resolution.passage(thickness)))
-    )
-    spacing = plate.degradation_depth / reach
-    return replace(grid, planes=math.floor(thickness / spacing) + 4, plane_spacing=spacing, plane_reach=reach)
+def planes_of(variant: Variant, resolution: Resolution, scene: Scene, materials: list[Materials]) -> list[Planes]:
+    """The planes of all layers, about as far apart as a step goes, with one to spare before and behind."""
+    planes = []
+    for layer, material in zip(scene.target.layers, materials, strict=True):
+        thickness, depth = float(material.thickness.max()), layer.degradation_depth
+        reach = max(FEWEST_PLANES, math.ceil(depth / float(resolution.travel * resolution.passage(thickness))))
+        number = math.floor(thickness * reach / depth) + 4 if material.weakens else 4
+        planes.append(Planes(number, depth / reach, reach) if variant.deep else Planes())
+    return planes
 
 
 def half_taps(length: float, spacing: float) -> Array:
@@ -219,11 +220,11 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
     passage = _least(resolution.passage(one.thickness) for one in materials)
     times = (
         resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
-        for material, layer in zip(materials, target.plates, strict=True)
+        for material, layer in zip(materials, target.layers, strict=True)
     )
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
-    gaps = sum(layer.gap for layer in target.layers)
-    return {name: values for name, values in shots.columns.items() if not name.startswith("layer_")} | {
+    gaps = sum(target.gaps)
+    return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
         "thickness": depth,
         "mass": mass,
         "inertia_axial": scale * body.inertia_axial,

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpimpact.scene import Core, Numerics, Record
 
@@ -39,27 +38,6 @@ def check_bending(record: Record, numerics: Numerics | Fidelity) -> None:
     """
     if record.bending and isinstance(numerics, Numerics) and numerics.scheme == "nodal":
         raise ValueError('got bending = true beside numerics.scheme = "nodal", but it must be "consistent"')
-
-
-def bending_columns(found: Any, failed: NDArray[np.bool_], *, breaks: bool) -> dict[str, Array]:
-    """Largest bending moment and stress of every shot, and their sections; a section is NaN where its value is 0.
-
-    Args:
-        found: the kernels' Bending of every shot, shape [shots].
-        failed: shots whose computation failed, which get NaN.
-        breaks: whether the cores have a strength; then also whether, when and where they broke.
-    """
-    columns = {
-        "largest_bending_moment": found["moment"],
-        "bending_section": np.where(found["moment"] > 0.0, found["moment_station"], np.nan),
-        "bending_stress": found["stress"],
-        "bending_stress_section": np.where(found["stress"] > 0.0, found["stress_station"], np.nan),
-    }
-    if breaks:
-        broken = found["broken"] > 0
-        columns |= {"broken": found["broken"], "broken_section": np.where(broken, found["broken_station"], np.nan)}
-        columns |= {name: np.where(broken, found[name], np.nan) for name in ("broken_time", "broken_x")}
-    return {name: np.where(failed, np.nan, values).astype(np.float64) for name, values in columns.items()}
 
 
 def sections_of(core: Core, rings: Rings) -> Sections:

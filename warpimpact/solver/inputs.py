@@ -47,6 +47,7 @@ class Inputs:
         self.surface = surface_of(self.stage.Surface, arrays.core, arrays.rings, arrays.azimuths, self.put)
         self.plates = [plate_of(self.stage.Plate, grid, self.put) for grid in arrays.grids]
         self.plate = self.plates[0]
+        self._planes = np.array([grid.planes.number for grid in arrays.grids])
         self.target = self._target(arrays)
         self.sections = self._sections(arrays)
         self.shots = self._shots(arrays)
@@ -87,8 +88,9 @@ class Inputs:
     def place_windows(self, cells: list[tuple[int, int]]) -> None:
         """Give every layer that weakens a window of so many nodes, one behind the other."""
         sizes = np.array(cells)
-        ends = np.cumsum(sizes.prod(axis=1))
-        self.target.first = self.put(ends - sizes.prod(axis=1), wp.int32)
+        nodes = self._planes * sizes.prod(axis=1)
+        ends = np.cumsum(nodes)
+        self.target.first = self.put(ends - nodes, wp.int32)
         self.target.cells_y, self.target.cells_z = (self.put(column, wp.int32) for column in sizes.T)
         self.target.nodes = int(ends[-1])
 
@@ -148,7 +150,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
     plate.taps, plate.reach = put(grid.taps), grid.reach
-    plate.planes, plate.per_plane, plate.plane_reach = grid.planes, 1.0 / grid.plane_spacing, grid.plane_reach
+    plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
     return plate
 
 

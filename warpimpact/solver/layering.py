@@ -38,7 +38,7 @@ class Weakened(NamedTuple):
     Attributes:
         cell_y, cell_z: centres of the cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
         material: share of material in each cell, shape [cells_y, cells_z].
-        share: resistance left, as a share of Y; 0 in holes.
+        share: resistance left, as a share of Y, the mean through the thickness; 0 in holes.
     """
 
     cell_y: Array
@@ -62,14 +62,15 @@ def weakened(
     is_open, homes = stack.open.numpy(), stack.home.numpy()
     first, found = 0, {}
     for k, (size, material) in enumerate(zip(cells, arrays.materials, strict=True)):
-        nodes = math.prod(size)
+        planes = arrays.grids[k].planes.number
+        nodes = planes * math.prod(size)
         if k > 0 and nodes and is_open[k]:
-            exposure = fields.exposure.numpy()[first : first + nodes].astype(np.float64).reshape(size)
+            exposure = fields.exposure.numpy()[first : first + nodes].astype(np.float64).reshape(planes, *size)
             spacing, place = arrays.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
             y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), size, spacing)
             offset = float(material.offset_y[-1]), float(material.offset_z[-1])
             solid = material_about(plates[k], y - offset[0], z - offset[1], spacing)
-            found[k] = Weakened(y, z, solid, solid * np.exp(material.decay_rate[-1] * exposure))
+            found[k] = Weakened(y, z, solid, solid * np.exp(material.decay_rate[-1] * exposure).mean(axis=0))
         first += nodes
     return found
 
@@ -93,14 +94,14 @@ class Passages:
     """How the cores of some shots left each layer (kernels/layers.py), on the device.
 
     Args:
-        free: whether a core flies free at each stand-off behind each layer, shape [layers, stand-offs].
 
     Attributes:
         filled: the struct that the march fills; empty if the plate stands alone.
+        free: whether a core flies free at each stand-off behind each layer, shape [layers, stand-offs].
     """
 
     def __init__(self, stage: Any, shots: int, free: NDArray[np.bool_], variant: Variant, device: Any) -> None:
-        self._stage, self._free, self._layered, self._device = stage, free, variant.layered, device
+        self._stage, self.free, self._layered, self._device = stage, free, variant.layered, device
         self._layers, standoffs = free.shape
         self.filled = stage.Passage()
         shapes = (shots,), (shots, self._layers), (shots, self._layers, standoffs)
@@ -114,22 +115,3 @@ class Passages:
         for name, variable in self._stage.Stack.vars.items() if self._layered else ():
             setattr(stack, name, wp.empty(slots * self._layers, dtype=variable.type.dtype, device=self._device))
         return stack
-
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """What was filled, by the names of `LayeredOutcomes`."""
-        if not self._layered:
-            return {}
-        values = {name: getattr(self.filled, name).numpy() for name in self._stage.Passage.vars}
-        at_standoffs = {
-            f"layer_{name}": np.where(self._free, values[name].astype(np.float64), np.nan)
-            for name in ("standoff_tilt", "standoff_pitch", "standoff_yaw")
-        }
-        return at_standoffs | {
-            "layer_status": values["status"].astype(np.int8),
-            "layer_residual_velocity": values["velocity"].astype(np.float64),
-            "layer_tilt": values["tilt"].astype(np.float64),
-            "layer_time": values["time"].astype(np.float64),
-            "layer_deflection": values["deflection"].astype(np.float64),
-            "stopped_in": values["stopped_in"].astype(np.int8),
-            "depth": values["depth"].astype(np.float64),
-        }

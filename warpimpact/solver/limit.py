@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit_search import Search
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.refinement import picked, with_rows
 from warpimpact.solver.resolution import FIDELITIES, Fidelity, computed_as
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ def limit_velocity(
         highest: largest velocity tried [m/s].
 
     Raises:
-        ValueError: the plate weakens by time (`check_arrests`); the numerics have a tolerance.
+        ValueError: the plate weakens by time (`check_arrests`).
         DeviceError: the device is absent.
     """
     compute = _Computing(scene, _in_short_steps(numerics), device, threads)
@@ -115,12 +115,11 @@ def limit_thickness(
     Raises:
         ValueError, DeviceError: as `limit_velocity`.
     """
-    own = scene.target.plates[layer].thickness
-    start = shots.own("thickness", own) if layer == 0 else shots.own_of_layer("thickness", layer - 1, own)
-    start = np.broadcast_to(start, len(shots))
-    search = Search(start, 0.0, shots.velocity**2, tolerance, THICKEST * own)
+    start = np.broadcast_to(shots.own_of(scene.target, "thickness", layer), len(shots))
+    highest = THICKEST * scene.target.layers[layer].thickness
+    search = Search(start, 0.0, shots.velocity**2, tolerance, highest)
     compute = _Computing(scene, _in_short_steps(numerics), device, threads)
-    return _searched(compute, shots, search, partial(with_thickness, scene, layer), progress)
+    return _searched(compute, shots, search, partial(with_thickness, layer), progress)
 
 
 def with_velocity(shots: Shots, values: Array) -> Shots:
@@ -128,14 +127,9 @@ def with_velocity(shots: Shots, values: Array) -> Shots:
     return replace(shots, velocity=values)
 
 
-def with_thickness(scene: Scene, layer: int, shots: Shots, values: Array) -> Shots:
+def with_thickness(layer: int, shots: Shots, values: Array) -> Shots:
     """Shots with thicknesses of a layer of their own [m], shape [shots]; layer 0 is the plate."""
-    if layer == 0:
-        return replace(shots, thickness=values)
-    columns = shots.layer_thickness
-    columns = np.full((len(shots), len(scene.target.layers)), np.nan) if columns is None else columns.copy()
-    columns[:, layer - 1] = values
-    return replace(shots, layer_thickness=columns)
+    return shots.with_own({"thickness": values}, layer)
 
 
 def short_steps(fidelity: Fidelity) -> Fidelity:
@@ -172,10 +166,9 @@ def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
 
 
 def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
-    """Whether a plate, layer 0, or a layer behind it weakens in any shot."""
-    own = None if shots is None else shots.degradation if layer == 0 else shots.layer_degradation
-    column = own if own is None or layer == 0 else own[:, layer - 1]
-    return plate.degradation < 1.0 or (column is not None and bool((column < 1.0).any()))
+    """Whether a layer weakens in any shot."""
+    own = None if shots is None or not shots.differs("degradation", layer) else shots.columns["degradation"][:, layer]
+    return plate.degradation < 1.0 or (own is not None and bool((own < 1.0).any()))
 
 
 class _Computing(NamedTuple):
@@ -230,5 +223,5 @@ class _Kept:
         """Keep the runs in some places of `which`; the first ones are of all shots."""
         if not hasattr(self, "outcomes"):
             self.outcomes = ended
-        self.outcomes = with_rows(self.outcomes, which[places], picked(ended, places))
+        self.outcomes = self.outcomes.with_rows(which[places], ended[places])
         self.values[which[places]] = tried[places]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.solver.simulate import Outcomes
+from warpimpact.records.outcomes import Outcomes
 
 Array = NDArray[np.float64]
 

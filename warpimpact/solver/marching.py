@@ -22,9 +22,9 @@ from warpimpact.kernels import free_flight
 from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
+from warpimpact.records.group import Returned
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.arrays import Arrays, arrays_of
-from warpimpact.solver.bending import bending_columns
 from warpimpact.solver.blocks import first_window
 from warpimpact.solver.bursts import (
     bytes_of,
@@ -37,7 +37,6 @@ from warpimpact.solver.bursts import (
     whole_plates,
 )
 from warpimpact.solver.device import cores, free_memory, halving, load
-from warpimpact.solver.exits import exits
 from warpimpact.solver.inputs import Inputs
 from warpimpact.solver.layering import Passages, Weakened, deep_cells, material_about, nodes_about, weakened
 from warpimpact.solver.resolution import Fidelity
@@ -136,18 +135,18 @@ class March:
         self._launch(order, outcomes, scratch, 1, before, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells), {}
-        exposure = np.zeros(math.prod(self.cells))
+        planes = self.arrays.grid.planes.number
+        exposure = np.zeros(planes * math.prod(self.cells))
         if self.variant.degrades and self.arrays.materials[0].weakens:
-            planes = self.arrays.grid.planes
-            exposure = _host(scratch[0].exposure)[: planes * exposure.size].reshape(planes, -1)
-        decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure).reshape(-1, *self.cells).mean(axis=0)
+            exposure = _host(scratch[0].exposure)[: exposure.size]
+        decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure.reshape(planes, *self.cells)).mean(axis=0)
         return np.asarray(self._material * decayed), self._behind(scratch)
 
     def _behind(self, scratch: tuple[Any, ...]) -> dict[int, Weakened]:
         if not (self.variant.layered and self.variant.degrades):
             return {}
         hit = float(self.shots.hit_y[-1]), float(self.shots.hit_z[-1])
-        return weakened(self.arrays, self.scene.target.plates, hit, scratch, self._windows(*self.cells))
+        return weakened(self.arrays, self.scene.target.layers, hit, scratch, self._windows(*self.cells))
 
     def body(self) -> MassProperties:
         """Mass properties of the last shot."""
@@ -162,12 +161,12 @@ class March:
     @cached_property
     def _material(self) -> Array:
         """Share of material about every node of the last shot's window."""
-        return material_about(self.scene.target.plate, *self.nodes(), self.arrays.grid.spacing)
+        return material_about(self.scene.target.layers[0], *self.nodes(), self.arrays.grid.spacing)
 
-    def report(self, contact: Any) -> dict[str, NDArray[Any]]:
-        """Compute the free flight to the stand-offs; return all values on the host, by the names of `Outcomes`."""
-        count, record = len(self.shots), self.scene.record
-        flight, standoffs = free_flight.build(self.variant), np.array(record.standoffs, dtype=np.float64)
+    def report(self, contact: Any) -> Returned:
+        """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
+        count, standoffs = len(self.shots), np.array(self.scene.record.standoffs, dtype=np.float64)
+        flight = free_flight.build(self.variant)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
         wp.launch(
             flight.kernel,
@@ -176,16 +175,8 @@ class March:
             outputs=[report],
             device=self.device,
         )
-        values = {name: _host(getattr(report, name)) for name in flight.Report.vars}
-        status = contact.status.numpy().astype(np.int8)
-        values |= exits(contact, status)
-        bent = self._bending(status) if self.variant.bends else {}
-        return {"status": status} | values | bent | self.passages.columns()
-
-    def _bending(self, status: NDArray[np.int8]) -> dict[str, Array]:
-        """What is known of the bending of every shot."""
-        breaks = self.scene.core.strength is not None or self.shots.strength is not None
-        return bending_columns(self.bending.numpy(), status >= Status.UNFINISHED, breaks=breaks)
+        status, passages = contact.status.numpy().astype(np.int8), self.passages
+        return Returned(status, contact, report, self.bending.numpy(), passages.filled, passages.free)
 
     def _empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
         """A struct of empty arrays; each has the shape with its number of dimensions."""
@@ -212,7 +203,7 @@ class March:
     def _nodes(self, cells_y: int, cells_z: int) -> int:
         """Nodes of a slot in all its windows."""
         windows = zip(self._windows(cells_y, cells_z), self.arrays.grids, strict=True)
-        return sum(grid.planes * y * z for (y, z), grid in windows)
+        return sum(grid.planes.number * y * z for (y, z), grid in windows)
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4

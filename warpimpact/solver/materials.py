@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpimpact.solver.resolution import decay_rate
 
 if TYPE_CHECKING:
-    from warpimpact.scene import Core, Plate, Scene, Shots
+    from warpimpact.scene import Core, Scene, Shots
 
 Array = NDArray[np.float64]
 
@@ -54,29 +54,25 @@ class Materials:
 def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
     """Those of all layers of a scene, front to back."""
     target = scene.target
-    thickness = [_own(shots, k, "thickness", plate.thickness) for k, plate in enumerate(target.plates)]
-    fronts = target.fronts(thickness)
-    return [_material(scene, shots, k, plate, fronts[k], thickness[k]) for k, plate in enumerate(target.plates)]
+    fronts = target.fronts([shots.own_of(target, "thickness", k) for k in range(len(target.layers))])
+    return [_material(scene, shots, k, front) for k, front in enumerate(fronts)]
 
 
-def _own(shots: Shots, layer: int, name: str, otherwise: float) -> Array:
-    """A quantity of a layer; of the plate, if it is number 0."""
-    return shots.own_of_layer(name, layer - 1, otherwise) if layer else shots.own(name, otherwise)
-
-
-def _material(scene: Scene, shots: Shots, layer: int, plate: Plate, front: Array, thickness: Array) -> Materials:
-    degradation = _own(shots, layer, "degradation", plate.degradation)
-    core, mass = scene.core, shots.own("mass", scene.core.mass_properties.mass)
-    a0, a1, a2 = scene.interaction.coefficients(_own(shots, layer, "resistance", plate.resistance), plate.density)
-    offset_y, offset_z = scene.target.layers[layer - 1].offset if layer else (0.0, 0.0)
+def _material(scene: Scene, shots: Shots, layer: int, front: Array) -> Materials:
+    core, plate, mass = scene.core, scene.target.layers[layer], shots.own("mass", scene.core.mass_properties.mass)
+    thickness, resistance, friction, degradation, offset_y, offset_z = (
+        shots.own_of(scene.target, name, layer)
+        for name in ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
+    )
+    a0, a1, a2 = scene.interaction.coefficients(resistance, plate.density)
     return Materials(
         front=front,
         thickness=thickness,
-        offset_y=_own(shots, layer, "offset_y", offset_y) if layer else np.zeros(1),
-        offset_z=_own(shots, layer, "offset_z", offset_z) if layer else np.zeros(1),
+        offset_y=offset_y,
+        offset_z=offset_z,
         a0=a0,
         a1=a1,
-        friction=_own(shots, layer, "shear_coefficient", plate.shear_coefficient),
+        friction=friction,
         degradation=degradation,
         decay_rate=decay_rate(degradation, plate.degradation_unit),
         onset_jump=onset_jump(core, thickness, mass, a0),

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Numerics, Scene, Shots, Tolerance
+from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.scene import Accuracy, Numerics, Scene, Shots
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import LADDER, Fidelity, level
-from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -46,16 +48,16 @@ class Named(NamedTuple):
     safe; those of fine levels are dear. Draft and standard end where 105 random scenes of single plates needed no finer
     level, but one: who asks for a draft waits for no level that costs fifty times as much."""
 
-    tolerance: Tolerance
+    accuracy: Accuracy
     first: int
     last: int
     pilot: int
 
 
 PROMISES = {
-    "draft": Named(Tolerance(residual_velocity=5.0, tilt="5 deg"), 0, 5, 64),
-    "standard": Named(Tolerance(residual_velocity=1.0, tilt="1 deg"), 2, 7, 64),
-    "reference": Named(Tolerance(residual_velocity=0.2, tilt="0.2 deg"), 4, 8, 32),
+    "draft": Named(Accuracy(residual_velocity=5.0, tilt="5 deg"), 0, 5, 64),
+    "standard": Named(Accuracy(residual_velocity=1.0, tilt="1 deg"), 2, 7, 64),
+    "reference": Named(Accuracy(residual_velocity=0.2, tilt="0.2 deg"), 4, 8, 32),
 }
 
 
@@ -114,7 +116,7 @@ def keep(
     Raises:
         DeviceError: the device is absent.
     """
-    tolerance, first, last, _ = PROMISES[numerics.fidelity]
+    accuracy, first, last, _ = PROMISES[numerics.fidelity]
     known: dict[int, Outcomes] = {}
     follow = progress and (lambda _, total: progress(0, total))
     found = Promise(level(first, numerics), False, math.inf, math.inf)
@@ -133,19 +135,19 @@ def keep(
             break
         pair, margin = (known[index], known[finer]), MARGIN[finer - index]
         plain, weighed = (margin * _errors(*pair, pilot.at_a_plate, impact) for impact in (None, pilot.velocity))
-        kept = _within(tolerance, plain)
+        kept = _within(accuracy, plain)
         found = Promise(level(index, numerics), kept, *(float(error) for error in plain))
         told = (index, float(plain[0]), math.degrees(plain[1]), "kept" if kept else "not kept")
         _logger.info("pilot at level %d: errors of %.2g m/s and %.2g deg, the promise is %s", *told)
         if kept:
             return found
-        if enough is None and _within(tolerance, weighed):
+        if enough is None and _within(accuracy, weighed):
             enough, last = found, min(last, index + BEYOND)
     return enough or found
 
 
-def _within(tolerance: Tolerance, errors: Array) -> bool:
-    return bool(errors[0] <= tolerance.residual_velocity and errors[1] <= tolerance.tilt)
+def _within(accuracy: Accuracy, errors: Array) -> bool:
+    return bool(errors[0] <= accuracy.residual_velocity and errors[1] <= accuracy.tilt)
 
 
 def _errors(coarse: Outcomes, fine: Outcomes, at_a_plate: int, impact: Array | None) -> Array:
@@ -183,7 +185,7 @@ def changes(coarse: Outcomes, fine: Outcomes, impact: Array | None = None) -> tu
         neither = np.isnan(last[0]) & np.isnan(last[1])
         tilt = np.where(neither, 0.0, weight * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
     depth = np.full(len(velocity), math.nan)
-    if isinstance(coarse, LayeredOutcomes) and isinstance(fine, LayeredOutcomes):
+    if LAYER_RESIDUAL_VELOCITY in coarse:
         before, after = (np.nan_to_num(one.layer_residual_velocity) for one in (coarse, fine))
         apart = _weight(before, after, None if impact is None else impact[:, None]) * np.abs(after - before)
         velocity = np.maximum(velocity, apart.max(axis=1))

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene, Target
+from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
 
 Array = NDArray[np.float64]
 
@@ -161,23 +160,21 @@ class Resolution:
 
     def step_in(self, impact: Impact, target: Target) -> float:
         """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
-        return min(self.step_of(impact, plate) for plate in target.plates)
+        return min(self.step_of(impact, plate) for plate in target.layers)
 
 
-def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[str] = ()) -> Resolution:
+def resolve(numerics: Numerics | Fidelity, scene: Scene, shots: Shots | None = None) -> Resolution:
     """Fill in what the numerics leave to fidelity and scheme; a fidelity need not have a name.
 
     Args:
-        scattered: names of the quantities of the scene that differ from shot to shot.
+        shots: whose own quantities count, too.
     """
-    core, plate, plates = scene.core, scene.target.plate, scene.target.plates
-    weakening = weakens(scene.target, scattered)
+    core, plate, plates = scene.core, scene.target.layers[0], scene.target.layers
+    weakening = weakens(scene.target, shots)
     if isinstance(numerics, Fidelity):
         fidelity, numerics = numerics, Numerics()
     else:
         fidelity = FIDELITIES[numerics.fidelity]
-    if numerics.tolerance is not None:
-        raise ValueError("a tolerance has no one resolution: refine.simulate_to_tolerance meets it")
     lengths = [one.degradation_length for one, does in zip(plates, weakening, strict=True) if does]
     finest = min(lengths, default=plate.degradation_length)
     width = fidelity.patch_width * finest if lengths else math.inf
@@ -189,7 +186,7 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
     }
     if numerics.scheme == "nodal":
         defaults = NODAL
-        if scene.target.layers:
+        if len(plates) > 1:
             raise ValueError(ONE_PLATE)
         if plate.degradation_distance is not None:
             raise ValueError(
@@ -213,15 +210,17 @@ def resolve(numerics: Numerics | Fidelity, scene: Scene, scattered: Collection[s
     )
 
 
-def weakens(target: Target, scattered: Collection[str] = ()) -> list[bool]:
-    """Whether each layer weakens, if the quantities of these names differ from shot to shot."""
-    names = ["degradation", *["layer_degradation"] * len(target.layers)]
-    return [one.degradation < 1.0 or name in scattered for one, name in zip(target.plates, names, strict=True)]
+def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
+    """Whether each layer weakens; one that differs from shot to shot may."""
+    return [
+        layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
+        for k, layer in enumerate(target.layers)
+    ]
 
 
 def spelt_out(fidelity: Fidelity, scene: Scene, impact: Impact) -> Numerics:
     """Numerics that give, for one impact, what `resolve` would make of the fidelity if it had a name."""
-    plate = scene.target.plate
+    plate = scene.target.layers[0]
     return Numerics(
         time_step=resolve(fidelity, scene).step_in(impact, scene.target),
         patches_axial=fidelity.patches_axial,

@@ -1,52 +1,17 @@
-"""Unfolding: from hits in the irreducible part of a unit cell to hits in the whole cell (scene/symmetry.py)."""
+"""The history of an image of a replayed hit (scene/symmetry.py)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import fields, replace
-from typing import TypeVar
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Symmetry
 from warpimpact.solver.layering import Weakened
-from warpimpact.solver.refinement import Estimates
-from warpimpact.solver.simulate import LayeredOutcomes, Outcomes, Replay
+from warpimpact.solver.simulate import Replay
 
 Array = NDArray[np.float64]
-
-
-def unfolded(outcomes: Outcomes, group: Sequence[Symmetry]) -> Outcomes:
-    """Outcomes of all images of the shots under a group, shape [shots · group]; the images of a shot follow each other.
-
-    A projected angle changes its sign with its axis. The angular velocity is an axial vector, the other vectors are
-    polar. Other outcomes stay.
-    """
-    every = _repeated(outcomes, len(group))
-    signs = np.tile([s.polar for s in group], (len(outcomes.status), 1))
-    axial = np.tile([s.axial for s in group], (len(outcomes.status), 1))
-    if isinstance(every, LayeredOutcomes):
-        along_y, along_z = signs[:, 1, None, None], signs[:, 2, None, None]
-        every = replace(
-            every,
-            layer_standoff_yaw=every.layer_standoff_yaw * along_y,
-            layer_standoff_pitch=every.layer_standoff_pitch * along_z,
-        )
-    return replace(
-        every,
-        angular_velocity=every.angular_velocity * axial,
-        yaw=every.yaw * signs[:, 1:2],
-        pitch=every.pitch * signs[:, 2:3],
-        exit_velocity=every.exit_velocity * signs,
-        exit_axis=every.exit_axis * signs,
-        exit_position=every.exit_position * signs,
-    )
-
-
-def unfolded_estimates(estimates: Estimates, group: Sequence[Symmetry]) -> Estimates:
-    """Estimates of all images, in the order of `unfolded`; an image has the estimates of its shot."""
-    return _repeated(estimates, len(group))
 
 
 def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], image: tuple[float, float]) -> Replay:
@@ -73,7 +38,7 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
     cells = moved((replay.cell_y, replay.cell_z))
     return replace(
         replay,
-        outcomes=unfolded(replay.outcomes, [symmetry]),
+        outcomes=replay.outcomes.unfolded([symmetry]),
         history=replace(
             history,
             position=history.position * polar,
@@ -89,11 +54,3 @@ def image_of(replay: Replay, symmetry: Symmetry, *, home: tuple[float, float], i
         cell_z=cells[1],
         behind={number: turned(layer) for number, layer in replay.behind.items()},
     )
-
-
-Columns = TypeVar("Columns", Outcomes, Estimates)
-
-
-def _repeated(columns: Columns, times: int) -> Columns:
-    """Every row, `times` times in a row."""
-    return replace(columns, **{f.name: np.repeat(getattr(columns, f.name), times, axis=0) for f in fields(columns)})

@@ -83,10 +83,25 @@ class Ratio(NamedTuple):
         if (mean := float(known.mean())) <= 0.0:
             return cls(mean)
         ratio, low, high = (number / mean for number in (estimate.value, estimate.low, estimate.high))
-        if np.ptp(known) > 0.0 and not math.isnan(low):
-            linear = estimate_of("mean", ratio_numbers(numbers, reference, ratio), **dealt)
-            low, high = linear.low, linear.high
+        if np.ptp(known) > 0.0 and estimate.spread > 0.0 and not math.isnan(low):
+            low, high = _of_both(numbers, reference, ratio, dealt)
         return cls(mean, ratio, low, high)
+
+
+def _of_both(numbers: Array, reference: Array, ratio: float, dealt: dict[str, Any]) -> tuple[float, float]:
+    """Interval of the ratio r of two means of numbers that are not negative: all r for which the interval of the mean
+    of one less r times the other contains 0. It has no upper end (NaN) where the interval of the other contains 0.
+
+    Source: E. C. Fieller, Journal of the Royal Statistical Society B 16 (1954) 175.
+    """
+    one, other = ratio_numbers(numbers, reference, 0.0), ratio_numbers(0.0 * numbers, reference, -1.0)
+    a, b, ab = (estimate_of("mean", some, **dealt).half_width ** 2 for some in (one, other, one - other))
+    # (ratio - r)² ≤ a - (a + b - ab) r + b r²
+    square, half, constant = 1.0 - b, ratio - 0.5 * (a + b - ab), ratio**2 - a
+    root = math.sqrt(max(0.0, half**2 - square * constant))
+    if square <= 0.0:
+        return max(0.0, (half - root) / square) if constant > 0.0 and square < 0.0 else 0.0, math.nan
+    return max(0.0, (half - root) / square), (half + root) / square
 
 
 def ratio_numbers(numbers: Array, reference: Array, ratio: float) -> Array:

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,11 @@ class Estimate:
     def half_width(self) -> float:
         """Half of the interval's length."""
         return 0.5 * (self.high - self.low)
+
+    def within(self, least: float, most: float = math.inf) -> Self:
+        """The estimate of a number that lies between two others: no end of its interval is beyond them."""
+        low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))
+        return replace(self, low=low, high=high)
 
 
 def estimate_of(kind: str, values: Array, **dealt: Any) -> Estimate:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import study_dataset
@@ -29,7 +30,7 @@ from warpimpact.scene import Hits, Numerics, Shots, make_shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import FIDELITIES, Fidelity, Resolution, resolve, spelt_out
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 

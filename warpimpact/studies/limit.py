@@ -19,7 +19,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.limits import solid_limits, with_limits, with_solid_limits
+from warpimpact.results.limits import solid_limits, with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import HitMap, at_solid, described, pilot_of
@@ -80,17 +80,13 @@ class LimitMap(HitMap):
             raise CampaignError("got a stop rule, but limits are searched for every hit: leave out the table [stop]")
         if campaign.burst is not None:
             raise CampaignError("got a burst, but limits are searched for every hit alone: leave out the table [burst]")
-        if campaign.numerics.tolerance is not None:
-            raise CampaignError(
-                "got numerics.tolerance, but limits take a fidelity; warpimpact limit has a --tolerance of its own"
-            )
         try:
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None
         if quantity == "velocity":
             return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
-        plates = campaign.target.plates
+        plates = campaign.target.layers
         if layer >= len(plates):
             raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
         return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * plates[layer].thickness, layer)
@@ -127,7 +123,7 @@ class LimitMap(HitMap):
         dataset = described(
             campaign,
             self._put(campaign, shots, limits, images),
-            limits.outcomes,
+            limits.outcomes.assign(**{name: getattr(limits, name.field) for name in v.LIMITS[self.quantity]}),
             numerics=campaign.numerics if promise is None else promise.fidelity,
             device=device,
             elapsed=time.perf_counter() - begin,
@@ -142,8 +138,7 @@ class LimitMap(HitMap):
         )
         begun, *_ = dataset.attrs[attr.HISTORY].split()
         dataset.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {self.quantity}"
-        found = with_limits(dataset, self.quantity, limits, images)
-        return found if how.get("solid") is None else self._beside_solid(campaign, found, **how)
+        return dataset if how.get("solid") is None else self._beside_solid(campaign, dataset, **how)
 
     def _beside_solid(self, campaign: Campaign, found: Table, **how: Any) -> Table:
         """The Dataset with the limits of some shots at the solid plate that is as heavy as the whole target."""
@@ -196,7 +191,7 @@ class LimitMap(HitMap):
         """What turns the thickness of the layer into the areal density of the target; nothing of a velocity."""
         if self.quantity == "velocity":
             return {}
-        layer = target.plates[self.layer]
+        layer = target.layers[self.layer]
         return {
             attr.LIMIT_DENSITY: layer.areal_density / layer.thickness,
             attr.LIMIT_ELSEWHERE: target.areal_density - layer.areal_density,
@@ -206,13 +201,8 @@ class LimitMap(HitMap):
         """Shots, with their images, as they just perforate."""
         if self.quantity == "velocity":
             return with_velocity(shots, np.repeat(limits.shots.velocity, images))
-        if self.layer == 0:
-            tried = limits.shots.thickness
-        else:
-            columns = limits.shots.layer_thickness
-            tried = None if columns is None else columns[:, self.layer - 1]
-        assert tried is not None  # searched
-        return with_thickness(campaign.scene, self.layer, shots, np.repeat(tried, images))
+        tried = limits.shots.own_of(campaign.target, "thickness", self.layer)
+        return with_thickness(self.layer, shots, np.repeat(tried, images))
 
     def _search(self, scene: Scene, shots: Shots, numerics: Any, **how: Any) -> Limits:
         how |= {"numerics": numerics, "tolerance": self.tolerance}
@@ -237,7 +227,7 @@ def _promised(promise: LimitPromise) -> dict[str, Any]:
 
 def told_of(campaign: Campaign, quantity: str) -> str | None:
     """What a user should know of a campaign whose limits are asked for."""
-    if getattr(campaign.scatter, quantity) is None:
+    if (quantity, 0) not in campaign.scatter.given:
         return None
     return (
         f"the {quantity} scatters in this campaign, but a limit {quantity} does not depend on that: the scatter only "

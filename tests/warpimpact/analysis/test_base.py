@@ -16,10 +16,9 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure, weight_figure
+from warpimpact.results.dataset import described
 from warpimpact.results.files import ResultError
-from warpimpact.results.limits import with_limits
-from warpimpact.results.variables import STATUS
-from warpimpact.solver.limit import Limits
+from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.studies.limit import LimitMap, limits_text
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -140,7 +139,9 @@ def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result,
 def limits(result: xarray.Dataset, thickness: np.ndarray, elsewhere: float) -> xarray.Dataset:
     """The result of a search of the limit thickness of a base [m] behind so many kg/m²."""
     ends = (thickness, thickness, np.ones(len(thickness)), np.ones(len(thickness), dtype=bool))
-    found = with_limits(result, "thickness", Limits(thickness, *ends, None, None), 1)
+    found = result.assign(
+        described(LIMITS["thickness"], dict(zip(LIMITS["thickness"], (thickness, *ends), strict=True)))
+    )
     told = {"limit": "thickness", "limit_layer": 1, "limit_highest": 20e-3, "limit_density": 8000.0}
     return found.assign_attrs(told | {"limit_elsewhere": elsewhere})
 

@@ -61,6 +61,33 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     assert "better than" not in text
 
 
+def test_plates_that_share_a_rank_cannot_be_told_apart(make_plate_result) -> None:
+    """Two plates that hardly scatter differ; the third scatters so that it is told apart from neither."""
+    plates = [
+        make_plate_result(velocities(fraction))
+        for fraction in (
+            np.linspace(0.49, 0.51, 100),
+            np.linspace(0.54, 0.56, 100),
+            np.tile([0.0, 0.1, 1.0, 1.0, 0.8], 20),
+        )
+    ]
+    comparison = compare(plates, ["first", "second", "wide"])
+    assert comparison.ranks(MEAN) == {"first": 1, "second": 2, "wide": 2}
+    text = comparison_text(comparison)
+    assert "   first (not told apart for certain from wide)\n" in text
+    assert comparison.ranks("stopped_share") == {"first": 1, "second": 1, "wide": 1}
+
+
+def test_an_interval_that_was_not_computed_is_told_as_such(make_plate_result) -> None:
+    plates = [make_plate_result(velocities(np.linspace(low, 1.0, 12))) for low in (0.1, 0.5)]
+    comparison = compare(plates, ["one", "other"])
+    assert math.isnan(difference(comparison, TAIL, "one", "other").low)
+    text = comparison_text(comparison)
+    assert "of which these hits give no interval" in text
+    assert "(-)" not in text
+    assert next(line for line in text.splitlines() if "worst tenth  " in line).endswith("   not ranked")
+
+
 def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) -> None:
     fraction, tilt = NUMBERS.uniform(0.5, 0.9, 500), NUMBERS.uniform(0.0, 60.0, 500)
     plates = [
@@ -75,7 +102,7 @@ def test_a_clearly_better_plate_is_first_whichever_way_is_up(make_plate_result) 
     best = next(line for line in lines if line.startswith("residual energy fraction, mean  "))
     assert best.endswith("   one and other")
     assert next(line for line in lines if line.startswith("P(stopped)  ")).endswith("   cannot be told apart")
-    ranking = lines[lines.index("P(inclined > 30° at 130 mm, or stopped); higher is better") + 2 :]
+    ranking = lines[lines.index("P(inclined > 30° at 130 mm, either end first, or stopped); higher is better") + 2 :]
     assert [line.split()[:2] for line in ranking[:3]] == [["1", "one"], ["1", "other"], ["3", "worst"]]
 
 
@@ -243,6 +270,9 @@ def test_plates_that_were_asked_something_else_are_refused(change: dict, sentenc
 
 
 def test_what_makes_a_comparison_less_than_fair_is_said(make_plate_result) -> None:
+    inexact = make_plate_result(np.full(64, 800.0), promise_kept=0)
+    text = comparison_text(compare([make_plate_result(np.full(64, 700.0)), inexact], ["kept", "broken"]))
+    assert "less exact than the fidelity promises: broken;" in text
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)), sampling="sobol", replicates=1)
     finer = '{"fidelity": "reference", "time_step": null}'
     notes = compare([plate, plate.assign_attrs(areal_density=30.0, numerics_given=finer)], ["a", "b"]).notes
@@ -264,7 +294,7 @@ def test_the_figure_shows_every_measure_and_every_pair(make_plate_result) -> Non
     assert [axes.get_title(loc="left").split(";")[0] for axes in left] == [
         "residual energy fraction",
         "proxy: energy per presented area at 130 mm [J/mm²]",
-        "P(inclined > 30° at 130 mm, or stopped)",
+        "P(inclined > 30° at 130 mm, either end first, or stopped)",
         "P(stopped)",
     ]
     for axes in right:
@@ -295,7 +325,7 @@ def test_a_campaign_with_plates_is_run_compared_and_not_run_again(
     assert sorted(path.name for path in folder.iterdir()) == ["round holes.nc", "slots.nc", "two.png", "two.toml"]
     before = Path("slots.nc").stat()
     assert main([*command, "-o", "two.svg", "--angle", "45 deg", "--standoff", "50 mm"]) == 0
-    assert "P(inclined > 45° at 50 mm, or stopped)" in capsys.readouterr().out
+    assert "P(inclined > 45° at 50 mm, either end first, or stopped)" in capsys.readouterr().out
     assert Path("slots.nc").stat() == before
     assert main(["compare", "slots.nc", "round holes.nc"]) == 0
     assert capsys.readouterr().out == shown.replace("two.png", "comparison.png")

@@ -108,20 +108,6 @@ def test_the_accuracy_is_told(result: Path) -> None:
     assert "draft keeps its promise (5 m/s and 5 deg for 90 % of the hits); estimated errors: " in accuracy
 
 
-def test_hits_that_miss_their_tolerance_are_counted_and_the_worst_are_named() -> None:
-    numerics = '[numerics]\ntolerance = { residual_velocity = "1e-6 m/s" }\n'
-    text = DRAFT.partition("[numerics]")[0].replace("count = 512", "count = 16") + numerics
-    dataset = run(Campaign.from_text(text, name="t", folder=Path()), device="cpu")
-    lines = inspect_text(dataset).splitlines()
-    place = lines.index("16 of 16 hits did not reach the tolerance at the finest level")
-    errors = dataset["residual_velocity_error"].values
-    worst = int(errors.argmax())
-    assert lines[place + 1].startswith(f"  hit {worst}: estimated errors {errors[worst]:.2g} m/s and ")
-    assert lines[place + 5].startswith("  hit ")
-    assert not lines[place + 6].startswith("  hit ")
-    assert "accuracy    promises nothing, as numerics.tolerance is given" in lines
-
-
 def test_it_says_that_no_core_passed() -> None:
     text = DRAFT.replace('resistance = "2600 MPa"', 'resistance = "200 GPa"').replace("count = 512", "count = 8")
     assert text != DRAFT

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from warpimpact import Campaign, Core, Hits, Impact, Interaction, Numerics, Plate, PolynomialCore
+from warpimpact import Campaign, Core, Hits, Impact, Interaction, Plate, PolynomialCore
 from warpimpact.campaign.campaign import CampaignError
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -308,8 +308,6 @@ def test_a_campaign_needs_no_file() -> None:
     )
     assert campaign.output.standoffs == (0.05, 0.13)
     assert Campaign.model_validate_json(campaign.text) == campaign
-    with_tolerance = campaign.model_copy(update={"numerics": Numerics(tolerance={"tilt": "1 deg"})})
-    assert Campaign.model_validate_json(with_tolerance.text) == with_tolerance
 
 
 @pytest.mark.parametrize(

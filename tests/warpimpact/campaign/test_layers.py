@@ -72,13 +72,13 @@ def result() -> xarray.Dataset:
 
 def test_layers_stand_behind_the_plate_in_order() -> None:
     target = campaign().target
-    assert [layer.gap for layer in target.layers] == [0.05, 0.005]
-    assert target.layers[0].offset == (2e-3, 0.0)
+    assert target.gaps == (0.0, 0.05, 0.005)
+    assert (target.value("offset_y", 1), target.value("offset_z", 1)) == (2e-3, 0.0)
     np.testing.assert_allclose(target.faces, [[0.0, 4e-3], [54e-3, 57e-3], [62e-3, 70e-3]])
     solid, steel = target.solid, 7850.0
     assert solid.areal_density == pytest.approx(target.areal_density, rel=1e-12)
     holed = steel * 3e-3 * (1 - np.pi * 4 / 81)
-    assert target.areal_density == pytest.approx(target.plate.areal_density + holed + steel * 8e-3, rel=1e-9)
+    assert target.areal_density == pytest.approx(target.layers[0].areal_density + holed + steel * 8e-3, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_layers_scatter_and_say_so(result: xarray.Dataset) -> None:
     assert "layer_resistance" not in result
     # Draws depend on seed and number alone.
     every = campaign(offset=UNKNOWN, thickness=ABOUT).sampler()
-    np.testing.assert_array_equal(every.shots(5, 4).layer_offset_y, every.shots(0, 16).layer_offset_y[5:9])
+    np.testing.assert_array_equal(every.shots(5, 4).offset_y, every.shots(0, 16).offset_y[5:9])
 
 
 def test_solid_reference_is_as_heavy_as_all_layers(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,7 +146,7 @@ def test_solid_reference_is_as_heavy_as_all_layers(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(compute, "simulate", lambda *args, **rest: seen.append(args) or simulate(*args, **rest))
     made = campaign()
     run(made, device="cpu")
-    (reference,) = [scene for scene, shots in seen if not scene.target.layers]
+    (reference,) = [scene for scene, shots in seen if not scene.target.layers[1:]]
     assert reference.target.areal_density == pytest.approx(made.target.areal_density, rel=1e-12)
 
 

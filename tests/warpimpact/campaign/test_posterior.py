@@ -85,10 +85,10 @@ def campaign(path: Path, *changes: tuple[str, str]) -> Campaign:
 
 def test_parameters_are_drawn_together(tmp_path: Path) -> None:
     shots = campaign(posterior(tmp_path)).sampler().shots(0, 256)
-    share = (shots.resistance - 2e9) / 1e9
+    share = (shots.resistance[:, 0] - 2e9) / 1e9
     assert len(np.unique(share)) > 40
-    assert shots.shear_coefficient == pytest.approx(0.1 * share)
-    assert np.log(shots.degradation) == pytest.approx(np.log(0.8) / (1.0 + share))  # per interval of the campaign
+    assert shots.shear_coefficient[:, 0] == pytest.approx(0.1 * share)
+    assert np.log(shots.degradation[:, 0]) == pytest.approx(np.log(0.8) / (1.0 + share))  # per interval of the campaign
     assert shots.thickness is None
 
 
@@ -106,7 +106,7 @@ def test_images_share_their_draw(tmp_path: Path) -> None:
     shots, images = drawn.sampler().shots(3, 90), len(drawn.symmetries)
     assert images == 4
     of = (np.arange(3, 93) // images)[:, None] == (np.arange(3, 93) // images)
-    assert (shots.resistance[:, None] == shots.resistance)[of].all()
+    assert (shots.resistance == shots.resistance.T)[of].all()
 
 
 def test_a_result_holds_its_draws_and_replays(tmp_path: Path) -> None:

@@ -16,7 +16,6 @@ from warpimpact.results.variables import OUTCOME_VARIABLES
 from warpimpact.runs.compute import compute, promise_in
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
-from warpimpact.scene import Numerics
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -40,7 +39,7 @@ def test_a_distribution_stands_in_the_place_of_its_value(tmp_path: Path) -> None
         (VELOCITY, f'{NORMAL}\nyaw = {{ distribution = "triangular", low = "-2 deg", mode = 0, high = "2 deg" }}'),
     )
     assert campaign.impact.velocity == 820.0  # the median
-    assert set(campaign.scatter.given) == {"velocity", "yaw"}
+    assert set(campaign.scatter.given) == {("velocity", 0), ("yaw", 0)}
     assert campaign.scatter.yaw.high == pytest.approx(math.radians(2))
     dataset = run(campaign, device="cpu")
     shots = campaign.sampler().shots(0, 64)
@@ -107,7 +106,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(
 
     dataset, shots = files.read(tmp_path / "a.nc"), campaign.sampler().shots(0, count)
     for name in OWN:
-        assert np.array_equal(dataset[name], shots.columns[name])
+        assert np.array_equal(dataset[name], shots.columns[name].ravel())
         assert len(np.unique(dataset[name])) == count
     # The loss of translational energy exceeds the total loss by the rotational energy; each core has its own mass.
     energy = 0.5 * dataset.mass * (dataset.impact_velocity**2 - dataset.residual_velocity**2)
@@ -121,16 +120,14 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     assert capsys.readouterr().out.splitlines()[-1] == f"0 of {count} shots failed"
 
 
-def test_scatter_in_plate_and_core_beside_symmetry_and_tolerance(own: Campaign) -> None:
+def test_scatter_in_plate_and_core_beside_symmetry(own: Campaign) -> None:
     hits = own.hits.model_copy(update={"irreducible": True})
-    numerics = Numerics(tolerance={"residual_velocity": "5 m/s", "tilt": "5 deg"})
-    dataset = run(own.model_copy(update={"hits": hits, "numerics": numerics}), device="cpu")
+    dataset = run(own.model_copy(update={"hits": hits}), device="cpu")
     assert dataset.attrs["computed_hits"] == 8
     for name in (*OWN, "residual_velocity", "energy_loss", "tilt"):
         values = dataset[name].values.reshape(8, 8, -1)
         assert (values == values[:, :1]).all(), name  # a hit and its images
         assert len(np.unique(values[:, 0, 0])) == 8
-    assert dataset.converged.mean() > 0.8
 
 
 def test_a_list_may_bring_its_own_plates(tmp_path: Path) -> None:

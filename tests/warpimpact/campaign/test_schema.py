@@ -45,7 +45,6 @@ def test_it_takes_the_campaigns(schema: dict[str, Any], path: Path) -> None:
         ("impact", "velocity", {"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"}),
         ("core", "mass", {"distribution": "discrete", "values": ["4 g", "4.1 g"], "weights": [1, 2]}),
         ("plate", "pattern", {"shape": "circle", "diameter": "9 mm", "spacing": [0.01, 0.02], "holes": [[0, 0]]}),
-        ("numerics", "tolerance", {"tilt": "1 deg"}),
         ("stop", "half_width", "0.5 m/s"),
     ],
 )

@@ -11,7 +11,6 @@ from warpimpact.cli.progress import show_standing
 from warpimpact.results.measures import Estimate, Measure
 from warpimpact.runs.run import Standing
 from warpimpact.solver.promise import Promise
-from warpimpact.solver.refinement import Refining
 from warpimpact.solver.resolution import LADDER
 
 
@@ -71,19 +70,6 @@ def test_a_log_speaks_every_few_seconds_at_first_and_every_minute_later(
             show(standing(101))
             clock[0] += 0.1
     assert len(capsys.readouterr().err.splitlines()) == 3
-
-
-def test_a_run_to_a_tolerance_tells_its_level_and_what_may_be_left(
-    capsys: pytest.CaptureFixture[str], clock: list[float]
-) -> None:
-    with show_standing() as show:
-        show(replace(standing(0, resumed=0), refining=Refining(3, 5, 8, 95.4)))
-        clock[0] += 10.0
-        show(replace(standing(0, resumed=0), refining=Refining(1, 5, 8, None)))
-    assert capsys.readouterr().err.splitlines() == [
-        "0 of 1000 hits; level 3 of 5 for 8 hits, at most some 95.4 s left for them",
-        "0 of 1000 hits; level 1 of 5 for 8 hits",
-    ]
 
 
 def test_a_terminal_gets_a_bar_that_counts_what_was_resumed_as_done(monkeypatch: pytest.MonkeyPatch) -> None:

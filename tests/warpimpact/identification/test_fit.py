@@ -22,7 +22,7 @@ def test_priors_are_read_in_si(make_fit: FitMaker) -> None:
     assert names == ["resistance", "shear_coefficient", "discrepancy_velocity", "discrepancy_angle"]
     assert fit.parameters[0].at(np.array([0.0])) == pytest.approx(2.5e9)
     assert fit.parameters[0].ends == pytest.approx((1e9, 4e9), rel=1e-6)
-    assert fit.scene_of(fit.shots[0]).target.plate.resistance == pytest.approx(2.5e9)
+    assert fit.scene_of(fit.shots[0]).target.layers[0].resistance == pytest.approx(2.5e9)
 
 
 def test_observations_are_in_si_and_have_their_standoff(make_fit: FitMaker) -> None:
@@ -54,7 +54,7 @@ def test_any_number_of_the_scene_may_be_a_parameter(make_fit: FitMaker) -> None:
     scene = fit.scene_of(
         fit.shots[0], {by_name["spacing_y"]: 11.5e-3, by_name["onset"]: 0.004, by_name["length"]: 19.5e-3}
     )
-    assert scene.target.plate.pattern.period == pytest.approx((11.5e-3, 12e-3))
+    assert scene.target.layers[0].pattern.period == pytest.approx((11.5e-3, 12e-3))
     assert (scene.interaction.onset, scene.core.length) == (0.004, 19.5e-3)
     assert [one.is_column for one in fit.parameters] == sorted(one.is_column for one in fit.parameters)
 
@@ -62,7 +62,7 @@ def test_any_number_of_the_scene_may_be_a_parameter(make_fit: FitMaker) -> None:
 def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
     fit = make_fit((ONE_SHOT, ONE_SHOT + '\nplate = { thickness = "5 mm", resistance = "2 GPa" }'))
     values = {("plate", "resistance"): 1.5e9}
-    own, other = (fit.scene_of(shot, values).target.plate for shot in fit.shots)
+    own, other = (fit.scene_of(shot, values).target.layers[0] for shot in fit.shots)
     assert (own.thickness, own.resistance) == (5e-3, 2e9)
     assert (other.thickness, other.resistance) == (3e-3, 1.5e9)
     assert len(benches(fit)) == 2
@@ -87,7 +87,6 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (('title = "Two', 'tilte = "Two'), 'got the unknown key "tilte"'),
         (("seed = 3", "sets = 3"), "sampling: sets: got 3, but it must be greater than or equal to 64"),
         (("title =", 'selection = ["whole"]\ntitle ='), 'selection: got "whole", but it must be one of perforated'),
-        (('fidelity = "draft"', 'tolerance = { tilt = "1 deg" }'), "numerics"),
         (
             (RESISTANCE, "resistance = 2e9"),
             "but a prior is a distribution such as",

@@ -9,7 +9,6 @@ import xarray
 
 from warpimpact.cli import main
 from warpimpact.identification import identify
-from warpimpact.identification.calibration import calibrate
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import Standing, identify_to_file, rounds
 from warpimpact.identification.posterior import learnt, parameters_of
@@ -138,12 +137,3 @@ def test_the_command(
     Path("bad.toml").write_text(text.replace("between holes", "nowhere"), encoding="utf-8")
     assert main(["identify", "bad.toml"]) == 2
     assert 'hit: got "nowhere", but it must be "unknown"' in capsys.readouterr().err
-
-
-def test_posteriors_are_calibrated(make_fit: FitMaker) -> None:
-    """A small version of tests/validation/calibrate_fit.py: ranks are uniform, and 90 % intervals cover 90 %."""
-    found = calibrate(make_fit(("hits = 64", "hits = 32")), data_sets=60, library=512, device="cpu")
-    assert found.uniformity.min() > 0.001
-    # Binomial: 54 of 60 expected; 45 or fewer have a probability of 3e-4.
-    assert (60 * found.coverage).min() > 45
-    assert found.recovery[0] > 0.7  # the resistance

@@ -1,7 +1,6 @@
 """The likelihood of a shot against a sum written out, and the hits that it is integrated over."""
 
 from collections.abc import Callable
-from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,11 @@ from warpimpact.identification.hits import CLASSES, Aim, aim
 from warpimpact.identification.likelihood import Data, holds, score
 from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status
+from warpimpact.records.exit import OUTCOME_VARIABLES
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.measures import Measure
 from warpimpact.scene import IDENTITY, Shots
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 FitMaker = Callable[..., Fit]
 POINTS = 16
@@ -24,7 +25,7 @@ POINTS = 16
 def outcomes_of(velocity: np.ndarray, angle: np.ndarray, status: Any = Status.PERFORATED) -> Outcomes:
     """Outcomes with these residual velocities [m/s] and yaws at one stand-off [rad]."""
     count = len(velocity)
-    columns = {one.name: np.zeros(count) for one in fields(Outcomes)}
+    columns = {str(one): np.zeros(count) for one in OUTCOME_VARIABLES}
     columns |= dict.fromkeys(("tilt", "pitch", "yaw", "total_yaw"), angle[:, None])
     return Outcomes(**columns | {"status": np.broadcast_to(np.int8(status), count), "residual_velocity": velocity})
 
@@ -73,7 +74,7 @@ def test_the_likelihood_is_the_mean_over_the_hits_of_the_class(computed: Outcome
 
 def test_angles_are_compared_the_short_way_round(computed: Outcomes) -> None:
     data, rng = Data((YAW,), None), np.random.default_rng(0)
-    round_the_other_way = replace(computed, yaw=computed.yaw - 2.0 * np.pi)
+    round_the_other_way = computed.assign(yaw=computed.yaw - 2.0 * np.pi)
     one, other = (
         score(data, aim_of(np.ones(POINTS)), of, SCALES, rng).log_likelihood for of in (computed, round_the_other_way)
     )
@@ -109,7 +110,7 @@ def test_shots_that_failed_do_not_count(computed: Outcomes) -> None:
     weight = np.ones(POINTS)
     weight[:4] = 0.0
     data, rng = Data((VELOCITY,), None), np.random.default_rng(0)
-    failed = score(data, aim_of(np.ones(POINTS)), replace(computed, status=status.astype(np.int8)), SCALES, rng)
+    failed = score(data, aim_of(np.ones(POINTS)), computed.assign(status=status.astype(np.int8)), SCALES, rng)
     left_out = score(data, aim_of(weight), computed, SCALES, rng)
     assert failed.log_likelihood[0] == pytest.approx(left_out.log_likelihood[0])
 
@@ -132,7 +133,7 @@ def test_kept_hits_follow_their_posterior() -> None:
 def test_hits_cover_the_cell_and_know_their_class(make_fit: FitMaker) -> None:
     fit = make_fit()
     scene = fit.scene_of(fit.shots[0])
-    plate, core = scene.target.plate, scene.core
+    plate, core = scene.target.layers[0], scene.core
     points = aim(fit.shots[0], plate, core, fit.sampling)
     assert len(points.group) == 4
     assert len(points.computed) == fit.sampling.hits
@@ -149,12 +150,12 @@ def test_a_place_with_its_uncertainty_is_drawn(make_fit: FitMaker) -> None:
     place = '{ y = "6 mm", z = { distribution = "normal", mean = "5 mm", std = "0.5 mm" } }'
     fit = make_fit(('hit = "between holes"', f"hit = {place}"))
     scene = fit.scene_of(fit.shots[0])
-    points = aim(fit.shots[0], scene.target.plate, scene.core, fit.sampling)
+    points = aim(fit.shots[0], scene.target.layers[0], scene.core, fit.sampling)
     assert (points.shots.hit_y == 6e-3).all()
     assert points.shots.hit_z.mean() == pytest.approx(5e-3, abs=5e-5)
     assert points.shots.hit_z.std() == pytest.approx(0.5e-3, rel=0.1)
     exact = make_fit(('hit = "between holes"', 'hit = { y = "6 mm", z = "5 mm" }'))
-    assert len(aim(exact.shots[0], scene.target.plate, scene.core, fit.sampling).shots) == 1
+    assert len(aim(exact.shots[0], scene.target.layers[0], scene.core, fit.sampling).shots) == 1
 
 
 def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMaker) -> None:
@@ -173,7 +174,7 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     (run,) = runs(fit, bench, points, device="cpu")
     values = {one.path: float(one.at(points[1:, i])[0]) for i, one in enumerate(fit.parameters)}
     scene = fit.scene_of(fit.shots[0], values)
-    assert scene.target.plate.degradation_interval == values["plate", "degradation_interval"]
+    assert scene.target.layers[0].degradation_interval == values["plate", "degradation_interval"]
     alone = simulate(scene, run.aim.computed, numerics=fit.numerics, device="cpu")
     again = run.outcomes.residual_velocity.reshape(2, -1, len(run.aim.group))[1, :, 0]
     assert again == pytest.approx(alone.residual_velocity, abs=0.02)

@@ -43,24 +43,9 @@ def scattered(dataset):
 def test_where_nothing_scatters_nothing_is_uncertain(make_result, tmp_path):
     """A smooth map that bends is not uncertain for that."""
     dataset = make_result(512)
-    with pytest.raises(ValueError, match="shots that all arrive alike, with no estimate of its numerical error"):
+    with pytest.raises(ValueError, match="shots that all arrive alike"):
         uncertainty(dataset, "residual_velocity")
     assert not [path for path in save_maps(dataset, tmp_path, "a") if "uncertainty" in path.name]
-
-
-def test_of_a_run_to_a_tolerance_the_numerical_error_is_shown(make_result, tmp_path):
-    dataset = make_result(np.where(np.arange(512) % 4, Status.PERFORATED, Status.ARRESTED))
-    error = dataset["residual_velocity"].copy(data=np.linspace(0.1, 0.9, 512))
-    dataset = dataset.assign(residual_velocity_error=error)
-    figure = uncertainty(dataset, "residual_velocity")
-    image = np.asarray(figure.axes[1].images[0].get_array())
-    shown = image[np.isfinite(image)]
-    assert np.isnan(image).any()
-    assert set(shown) <= set(error.values[np.arange(512) % 4 > 0])
-    assert figure.axes[3].get_ylabel() == "estimated numerical error [m/s]"
-    assert [path for path in save_maps(dataset, tmp_path, "a") if path.name == "a_uncertainty.png"]
-    with pytest.raises(ValueError, match="with no estimate of its numerical error"):
-        uncertainty(dataset, "deflection")
 
 
 def test_uncertainty_shows_local_mean_and_interval_across_the_edges(make_result):
@@ -94,12 +79,20 @@ def test_probability_map_holds_the_share_at_every_place(make_result):
     chance = 0.5 + 0.3 * np.sin(2.0 * np.pi * dataset["hit_y"].values / dataset.attrs["plate_period"][0])
     beyond = np.random.default_rng(5).random(4096) < chance
     dataset["residual_velocity"].values[:] = np.where(beyond, 800.0, 600.0)
-    figure = probability_map(dataset, "P(residual_velocity > 700 m/s)")
+    figure = probability_map(scattered(dataset), "P(residual_velocity > 700 m/s)")
     share, half_width = (np.asarray(axes.images[0].get_array()) for axes in figure.axes[:2])
     truth = 0.5 + 0.3 * np.sin(2.0 * np.pi * ((np.arange(share.shape[1]) + 0.5) / share.shape[1] - 0.5))
     assert 0.9 < np.mean(np.abs(share - truth) <= half_width) < 0.99
     # Wilson's of one half among 24 hits: 1.96 · √(1/(4·24) + 1.96²/(4·24²)) / (1 + 1.96²/24) = 0.186.
     assert half_width.max() == pytest.approx(0.186, abs=5e-4)
+
+
+def test_a_probability_of_shots_that_arrive_alike_is_not_smoothed(make_result):
+    figure = probability_map(make_result(np.tile(MIXED, 128)), "P(perforated)")
+    (image,) = (axes.images[0] for axes in figure.axes if axes.images)
+    assert set(np.unique(image.get_array())) == {0.0, 1.0}
+    certain = probability_map(make_result(512), "P(perforated)").axes[0].images[0]
+    assert (certain.norm.vmin, certain.norm.vmax) == (0.0, 1.0)
 
 
 @pytest.mark.parametrize(

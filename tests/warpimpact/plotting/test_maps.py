@@ -1,6 +1,7 @@
 """Rendered maps: the right colour at the right place, to scale, with labelled axes."""
 
 import io
+import json
 import warnings
 
 import numpy as np
@@ -11,6 +12,7 @@ from PIL import Image
 
 from warpimpact.kernels.status import LayerStatus, Status
 from warpimpact.plotting import cell, hit_map, hit_maps, overview, save_beside, save_maps, status_map
+from warpimpact.results.dataset import outlines
 from warpimpact.scene import NoPattern
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
@@ -333,3 +335,27 @@ def test_maps_beside_each_other_have_one_scale_of_colour_and_of_length(make_resu
     assert lengths[0] == pytest.approx(lengths[1])
     paths = save_beside({"wide": wide, "small": small}, tmp_path, "both")
     assert [path.name for path in paths] == [f"both_{name}.png" for name in ("residual_velocity", "deflection", "tilt")]
+
+
+def test_a_figure_says_of_how_many_hits_and_whether_a_promise_is_broken(covered, perforated):
+    assert "512 hits (50.0% passed the plate), " in cell.shots_text(covered)
+    told = cell.shots_text(perforated.assign_attrs(promise_kept=0))
+    assert "512 hits, " in told
+    assert told.endswith("numerics less exact than the fidelity promises")
+
+
+def test_a_layer_has_its_own_holes(perforated):
+    assert np.isfinite(outlines(perforated)["y"]).any()
+    behind = {"thickness": 1e-3, "resistance": 1e9, "pattern": {"shape": "none"}, "gap": 0.1, "offset": [0.0, 0.0]}
+    holed = behind | {"pattern": {"shape": "circle", "diameter": 1e-3, "spacing": [4e-3, 4e-3]}, "offset": [1e-3, 0.0]}
+    layered = perforated.assign_attrs(layers=json.dumps({"1": behind, "2": holed}))
+    assert len(outlines(layered, 1)["y"]) == 0
+    found = outlines(layered, 2)
+    assert np.nanmin(np.hypot(found["y"] - 1e-3, found["z"])) == pytest.approx(0.5e-3)
+
+
+def test_a_constant_map_has_the_colour_of_its_scale(make_result):
+    dataset = make_result(512)
+    dataset["residual_velocity"][:] = 764.0
+    norm = hit_map(dataset, "residual_velocity").axes[0].images[0].norm
+    assert (norm.vmin, norm.vmax) == pytest.approx((0.0, 764.0))

@@ -14,7 +14,6 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, outlines, solid_reference
 from warpimpact.results.measures import dealing
-from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -125,21 +124,6 @@ def test_shots_at_the_solid_plate_stay_with_their_hits() -> None:
     chosen = solid.isel(hit=slice(10, 50, 2))
     for name in ("residual_velocity", "tilt", "impact_velocity"):
         np.testing.assert_array_equal(later[name], chosen[name])
-
-
-def test_files_of_the_first_version_are_read(result: xarray.Dataset, tmp_path: Path) -> None:
-    """They hold everything in the root, in double precision, without numbers of hits and without a plate."""
-    flat = result.drop_vars(["hit", *v.EXIT_VARIABLES]).reset_coords([*v.OUTLINE_VARIABLES, *v.SOLID_VARIABLES])
-    flat = flat.assign({name: flat[name].astype(float) for name in v.OUTCOME_VARIABLES if name != v.STATUS})
-    del flat.attrs["plate"]
-    flat.to_netcdf(tmp_path / "old.nc")
-    read = files.read(tmp_path / "old.nc")
-    assert set(read.variables) == set(result.variables) - set(v.EXIT_VARIABLES)
-    assert set(read.coords) == set(result.coords)
-    assert replay(read, 5, folder=tmp_path).attrs["agreement"] == "bit-identical"
-    assert [one.ratio for one in effectiveness(read)] == pytest.approx(
-        [one.ratio for one in effectiveness(result)], nan_ok=True
-    )
 
 
 def test_a_study_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

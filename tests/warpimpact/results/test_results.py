@@ -13,17 +13,13 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.variables import (
-    BENDING_VARIABLES,
     BURST_VARIABLES,
     EXIT_VARIABLES,
-    LAYER_STANDOFF_VARIABLES,
-    LAYER_VARIABLES,
     OUTCOME_VARIABLES,
     SCATTER_VARIABLES,
     SHOT_VARIABLES,
 )
 from warpimpact.scene import NoPattern, Shots, SquarePattern
-from warpimpact.solver.simulate import BentOutcomes, LayeredOutcomes, Outcomes
 
 MM = 1e-3
 TWO_HOLES = SquarePattern(side=2 * MM, spacing=(16 * MM, 8 * MM), holes=[(2 * MM, 0.0), (-2 * MM, 0.0)])
@@ -232,11 +228,7 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
         files.read(path)
 
 
-def test_every_field_of_shots_and_outcomes_has_a_variable():
+def test_every_field_of_shots_has_a_variable():
     shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | {*SCATTER_VARIABLES, *BURST_VARIABLES}
-    ended = {*OUTCOME_VARIABLES, *EXIT_VARIABLES}
-    assert {field.name for field in dataclasses.fields(Outcomes)} == ended
-    assert {field.name for field in dataclasses.fields(BentOutcomes)} == ended | set(BENDING_VARIABLES)
-    of_layers = {*LAYER_VARIABLES, *LAYER_STANDOFF_VARIABLES}
-    assert {field.name for field in dataclasses.fields(LayeredOutcomes)} == ended | of_layers
+    of_layers = {name.removeprefix("layer_") for name in (*SCATTER_VARIABLES, *BURST_VARIABLES)}
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpimpact import Campaign, Numerics
+from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.runs.cluster import _compute_alike, _How, _looked_at, cluster_team
 from warpimpact.runs.compute import HitMap
@@ -130,19 +130,6 @@ def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
         _compute_alike(HitMap(), campaign, None, campaign.sampler().shots(0, 1), None, _How("cpu", None, kind))
-
-
-def test_workers_tell_on_which_level_their_hits_are(campaign: Campaign, cluster: object, tmp_path: Path) -> None:
-    numerics = Numerics(tolerance={"residual_velocity": "2 m/s", "tilt": "2 deg"})
-    hits = campaign.hits.model_copy(update={"count": 256})
-    told: list[Standing] = []
-    exact = campaign.model_copy(update={"numerics": numerics, "hits": hits})
-    team = cluster_team(exact, address=cluster.scheduler_address, device="cpu")
-    run_to_file(exact, tmp_path / "a.nc", team=team, progress=told.append)
-    levels = [standing.refining for standing in told if standing.refining is not None]
-    assert levels
-    assert all(1 <= one.level <= one.levels for one in levels)
-    assert told[-1].refining is None
 
 
 def test_the_ligament_of_a_mask_is_found_once_for_all_workers(

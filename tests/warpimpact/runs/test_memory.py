@@ -9,12 +9,12 @@ import pytest
 
 from warpimpact import Campaign
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver import device, marching, simulate
-from warpimpact.solver.simulate import Outcomes
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -34,7 +34,7 @@ def at_once(scene: Scene, shots: Shots, **_: object) -> Outcomes:
     }
     each = {name: numbers.random((n, len(scene.record.standoffs))) for name in ("tilt", "pitch", "yaw", "total_yaw")}
     vectors = {name: numbers.random((n, 3)) for name in ("angular_velocity", *EXIT_VARIABLES)}
-    return Outcomes(np.zeros(n, dtype=np.int8), **vectors, **single, **each)
+    return Outcomes(status=np.zeros(n, dtype=np.int8), **vectors, **single, **each)
 
 
 def test_memory_does_not_grow_with_the_count(

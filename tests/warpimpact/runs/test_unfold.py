@@ -16,7 +16,7 @@ from warpimpact.campaign.stop import Stop
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
-from warpimpact.results.variables import ESTIMATE_VARIABLES, OUTCOME_VARIABLES, SHOT_VARIABLES
+from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.runs import compute as computing
 from warpimpact.runs import shards
 from warpimpact.runs.replay import replay
@@ -24,7 +24,6 @@ from warpimpact.runs.run import Interrupted, Standing, run_to_file
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
-from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -123,18 +122,6 @@ def test_a_finite_plate_is_unfolded_by_mirror_images(tmp_path: Path) -> None:
     assert unfolded.attrs["symmetries"] == "(y, z), (y, -z), (-y, z), (-y, -z)"
     every = every_hit_computed(campaign(plate=rimmed), unfolded, tmp_path)
     np.testing.assert_allclose(unfolded["residual_velocity"], every["residual_velocity"], rtol=0.0, atol=1e-10)
-
-
-def test_a_tolerance_run_is_unfolded_with_its_estimates(tmp_path: Path) -> None:
-    numerics = Numerics(tolerance={"residual_velocity": "0.3 m/s", "tilt": "0.4 deg"}, precision="double")
-    unfolded = run(campaign(numerics=numerics), device="cpu")
-    assert unfolded.attrs["computed_hits"] == 4
-    every = every_hit_computed(campaign(numerics=numerics), unfolded, tmp_path)
-    assert 1 <= every["level"].min() < every["level"].max() < len(LADDER)
-    for name in ESTIMATE_VARIABLES:
-        np.testing.assert_allclose(unfolded[name], every[name], rtol=0.0, atol=ROUNDING[name.units], err_msg=name)
-    last = 8 * int(unfolded["level"].values[::8].argmax()) + 5
-    assert replay(unfolded, last, folder=tmp_path).attrs["agreement"] == "bit-identical"
 
 
 @pytest.mark.parametrize("impact", [STRAIGHT, PITCHED], ids=["straight", "pitched"])

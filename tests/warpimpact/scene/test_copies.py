@@ -22,13 +22,11 @@ from warpimpact import (
     run,
 )
 from warpimpact.campaign.campaign import CampaignError
-from warpimpact.campaign.former import in_present_terms
 from warpimpact.campaign.plates import read_plates
 from warpimpact.results import files
-from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene import Hits, NoPattern, Tolerance
+from warpimpact.scene import Hits, NoPattern
 from warpimpact.scene.model import Model
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -103,7 +101,6 @@ def thinner(campaign: Campaign) -> Campaign:
         (ROUND, {"diameter": 9e-3}, "overlap or touch"),
         (Impact(velocity=825.0), {"velocity": "825 m"}, "not a speed"),
         (Hits(count=4), {"sampling": "list"}, 'got sampling = "list" without file'),
-        (Numerics(tolerance={"tilt": "1 deg"}), {"time_step": 1e-6}, "got time_step beside tolerance"),
     ],
 )
 def test_a_copy_that_cannot_be_is_refused(value: Model, update: dict[str, Any], complaint: str) -> None:
@@ -138,8 +135,8 @@ def test_a_pattern_keeps_no_rim_of_another_plate() -> None:
 
 
 def test_what_was_not_given_is_not_given_in_a_copy() -> None:
-    numerics = Numerics(tolerance=Tolerance(tilt="0.01 rad")).model_copy(update={"precision": "double"})
-    assert numerics.model_dump() == {"tolerance": {"tilt": 0.01}, "precision": "double"}
+    numerics = Numerics(patches_axial=20).model_copy(update={"precision": "double"})
+    assert numerics.model_dump() == {"patches_axial": 20, "precision": "double"}
 
 
 def test_a_deep_copy_shares_nothing_that_can_hold_other_values() -> None:
@@ -174,14 +171,11 @@ def test_a_campaign_copied_without_a_change_is_the_same(folder: Path) -> None:
     assert Campaign.from_text(campaign.model_copy().text, name="text", folder=Path("nowhere")) == campaign
 
 
-@pytest.mark.parametrize(
-    "numerics", [{"fidelity": "draft"}, {"tolerance": {"residual_velocity": 5.0}}], ids=["fidelity", "tolerance"]
-)
 @pytest.mark.parametrize(("text", "options"), [(LISTED, {}), (PLAIN, {"count": 3})], ids=["listed", "another count"])
 def test_a_replay_computes_the_plate_of_a_changed_campaign(
-    folder: Path, text: str, options: dict[str, int], numerics: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+    folder: Path, text: str, options: dict[str, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    original = read(folder, text, **options).model_copy(update={"numerics": numerics})
+    original = read(folder, text, **options).model_copy(update={"numerics": {"fidelity": "draft"}})
     changed = thinner(original)
     result, before = (run(campaign, device="cpu") for campaign in (changed, original))
     assert result.sizes["hit"] == 3
@@ -223,7 +217,6 @@ def test_a_campaign_changed_to_what_cannot_be_is_refused(folder: Path) -> None:
 ANGLES = """\
 title = "angles"
 core = { shape = "cone", diameter = "6 mm", length = "20 mm", mass = "4 g" }
-numerics = { tolerance = { tilt = 1 } }
 stop = { quantity = "mean(tilt@130mm)", half_width = 2, max_count = 64 }
 hits = { seed = 1 }
 [plate]
@@ -250,7 +243,6 @@ def test_numbers_of_angles_are_degrees_and_their_text_gives_them_again() -> None
     assert campaign.impact.azimuth == 0.5
     assert campaign.plate.pattern.rotation == pytest.approx(np.radians(20))
     assert [hole.rotation for hole in campaign.plate.pattern.holes] == pytest.approx([np.radians(10), 0.2])
-    assert campaign.numerics.tolerance.tilt == pytest.approx(np.radians(1))
     assert campaign.stop.half_width == pytest.approx(np.radians(2))
     assert campaign.scatter.pitch.std == pytest.approx(np.radians(0.5))
     assert campaign.scatter.yaw.values == pytest.approx((0.0, np.radians(2)))
@@ -264,32 +256,6 @@ def test_numbers_of_angles_are_degrees_and_their_text_gives_them_again() -> None
     for model in (campaign.impact, campaign.plate.pattern, campaign.scatter, campaign.stop, campaign.numerics):
         assert model.model_copy() == model
         assert type(model).model_validate(model.model_dump()) == model
-
-
-def test_a_result_of_the_first_version_keeps_its_radians(folder: Path) -> None:
-    """It took numbers of angles for radians, and did not say so."""
-    text = HEAD + "[impact]\nvelocity = 825\nobliquity = 0.3\n[hits]\ncount = 2\n"
-    campaign = Campaign.from_text(text.replace("0.3", '"0.3 rad"'), name="text", folder=folder)
-    result = run(campaign, device="cpu")
-    del result.attrs["campaign_angles"]
-    result.attrs["campaign"] = text
-    assert replay(result, 1, folder=folder).attrs["agreement"] == "bit-identical"
-    result.attrs["campaign_angles"] = "degree"
-    with pytest.raises(ResultError, match="now give another shot than the stored one"):
-        replay(result, 1, folder=folder)
-
-
-def test_every_angle_of_a_former_text_is_marked() -> None:
-    text = ANGLES.replace("obliquity = 30", "obliquity = 0.3").replace("mean = 1, std = 0.5", "mean = 0.1, std = 0.05")
-    text = text.replace("values = [0, 2]", "values = [0, 0.2]")
-    campaign = Campaign.from_text(in_present_terms(text, "text"), name="text", folder=Path())
-    assert (campaign.impact.obliquity, campaign.impact.azimuth) == (0.3, 0.5)
-    assert (campaign.impact.pitch, campaign.scatter.pitch.std) == (0.1, 0.05)
-    assert (campaign.scatter.yaw.values, campaign.scatter.yaw.weights) == ((0.0, 0.2), (1, 3))
-    assert campaign.plate.pattern.rotation == 20
-    assert campaign.plate.pattern.holes[0].rotation == 10
-    assert campaign.numerics.tolerance.tilt == 1
-    assert campaign.stop.half_width == 2
 
 
 def test_angles_of_a_hit_list_are_degrees(folder: Path) -> None:

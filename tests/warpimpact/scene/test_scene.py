@@ -13,11 +13,13 @@ from warpimpact import (
     Hits,
     Impact,
     Interaction,
+    Layer,
     Numerics,
     Plate,
     PolynomialCore,
     Record,
     Scene,
+    Shots,
     Target,
     make_shots,
     run,
@@ -31,8 +33,8 @@ PLATE = Plate(thickness=4e-3, resistance=2.6e9)
 
 def test_a_plate_alone_is_a_target() -> None:
     scene = Scene(core=CORE, target=PLATE)
-    assert scene == Scene(core=CORE, target=Target(plate=PLATE))
-    assert scene.target.plate is PLATE
+    assert scene == Scene(core=CORE, target=Target(layers=(PLATE,)))
+    assert scene.target.layers[0] is PLATE
     assert (scene.interaction, scene.record) == (Interaction(), Record())
 
 
@@ -84,5 +86,27 @@ def test_a_scene_without_standoffs_records_none() -> None:
 def test_a_campaign_has_a_scene() -> None:
     campaign = Campaign.from_toml(SLOTTED_PLATE)
     scene = campaign.scene
-    assert (scene.core, scene.target.plate, scene.interaction) == (campaign.core, campaign.plate, campaign.interaction)
+    assert (scene.core, scene.interaction) == (campaign.core, campaign.interaction)
+    assert scene.target.layers == (campaign.plate,)
     assert scene.record.standoffs == campaign.output.standoffs
+
+
+def test_the_plate_is_layer_0() -> None:
+    behind = Layer(thickness="8 mm", resistance="1 GPa", gap="1 cm")
+    target = Scene(core=CORE, target=(PLATE, PLATE, behind)).target
+    assert target.gaps == (0.0, 0.0, 0.01)
+    assert [place for place, _ in target.named] == ["plate", "layer[0]", "layer[1]"]
+    with pytest.raises(ValueError, match=r"gap = 0.01 m .* of the first layer"):
+        Target(layers=(behind,))
+
+
+def test_columns_of_layers_are_put_one_beside_the_other() -> None:
+    base = Layer(thickness="8 mm", resistance="1 GPa")
+    target, two = Target(layers=(PLATE, base, base)), np.array([1e-3, 2e-3])
+    shots = Shots(*np.zeros((8, 2)), thickness=two).with_own({"thickness": two + 1e-3}, layer=1)
+    assert [shots.differs("thickness", layer) for layer in range(3)] == [True, True, False]
+    assert [shots.own_of(target, "thickness", layer).tolist() for layer in range(3)] == [
+        [1e-3, 2e-3],
+        [2e-3, 3e-3],
+        [8e-3],
+    ]

@@ -61,7 +61,7 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
         ({}, {"precision": "double"}, {}, "double precision"),
         ({}, {"scheme": "nodal"}, {}, "the nodal scheme"),
         ({"record": Record(bending=True)}, {}, {}, "the bending moment"),
-        ({"target": Target(plate=PLATE, layers=(Layer(**PLATE.model_dump()),))}, {}, {}, "layers"),
+        ({"target": Target(layers=(PLATE, Layer(**PLATE.model_dump())))}, {}, {}, "layers"),
         ({}, {}, {"count": 4, "at_a_plate": 2}, "several shots at one plate"),
     ],
 )

@@ -8,11 +8,12 @@ import pytest
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
 from warpimpact.solver.limit import limit_thickness, limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.solver.simulate import Outcomes, simulate
+from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
@@ -77,18 +78,17 @@ def test_a_limit_beyond_the_largest_value_tried_is_infinite() -> None:
 def test_thickness_of_a_layer_of_its_own() -> None:
     # Solid plates far apart take their work one after the other: what the front leaves to do is done by the base.
     base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
-    scene = Scene(core=CORE, target=Target(plate=PLATE, layers=(base,)))
+    scene = Scene(core=CORE, target=Target(layers=(PLATE, base)))
     alone = limit_thickness(Scene(core=CORE, target=PLATE), shots(1), device="cpu").value.item()
     behind = limit_thickness(scene, shots(1), layer=1, device="cpu")
     assert behind.converged.all()
     assert behind.value.item() == pytest.approx(alone - 4e-3, rel=0.03)
-    assert behind.shots.layer_thickness is not None
-    assert behind.shots.layer_thickness[0, 0] == behind.lower.item()
+    assert behind.shots.own_of(scene.target, "thickness", 1).item() == behind.lower.item()
 
 
 def test_the_limit_velocity_of_a_target_of_layers_adds_their_work() -> None:
     base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
-    scene = Scene(core=CORE, target=Target(plate=PLATE, layers=(base,)))
+    scene = Scene(core=CORE, target=Target(layers=(PLATE, base)))
     whole = limit_velocity(scene, shots(1), device="cpu").value.item()
     parts = [
         limit_velocity(Scene(core=CORE, target=PLATE), shots(1, thickness=np.full(1, h)), device="cpu").value.item()
@@ -100,7 +100,7 @@ def test_the_limit_velocity_of_a_target_of_layers_adds_their_work() -> None:
 def test_a_layer_that_weakens_by_time_is_refused() -> None:
     base = Layer(thickness=3e-3, resistance=1e9, degradation=0.8, gap=0.1)
     with pytest.raises(ValueError, match=r"layer\[0\]: got a plate that weakens by time"):
-        limit_velocity(Scene(core=CORE, target=Target(plate=PLATE, layers=(base,))), shots(1))
+        limit_velocity(Scene(core=CORE, target=Target(layers=(PLATE, base))), shots(1))
 
 
 def test_a_plate_without_resistance_is_passed_at_any_velocity() -> None:
@@ -189,8 +189,8 @@ def test_a_speed_that_grows_with_the_thickness_does_not_creep(monkeypatch: pytes
     # Behind a thicker plate the core turns less, up to 40 mm: the energy tells nothing of the limit.
     def end(some: Shots) -> tuple[Array, Array]:
         assert some.thickness is not None
-        passes = some.thickness < 40e-3
-        speed = np.where(passes, 150.0 * (some.thickness / 4e-3) ** 0.5, 0.0)
+        passes = some.thickness[:, 0] < 40e-3
+        speed = np.where(passes, 150.0 * (some.thickness[:, 0] / 4e-3) ** 0.5, 0.0)
         return np.where(passes, Status.PERFORATED, Status.ARRESTED), speed
 
     monkeypatch.setattr(limit, "simulate", outcomes_by(end))

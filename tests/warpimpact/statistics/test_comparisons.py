@@ -35,3 +35,14 @@ def test_a_ratio_to_numbers_that_differ_has_an_interval_of_its_own() -> None:
     assert one == (2.0, 3.0, 2.5, 3.5)
     assert math.isnan(Ratio.of(estimate(6.0, 5.0, 7.0), numbers, None, {}).value)
     assert Ratio.of(estimate(6.0, 5.0, 7.0), numbers, np.array([0.0]), {}).reference == 0.0
+
+
+@pytest.mark.parametrize(("reference", "bounded"), [([3.0, 4.0, 5.0, 6.0], True), ([0.0, 0.0, 0.0, 9.0], False)])
+def test_a_ratio_of_means_that_are_not_negative_has_no_negative_end(reference: list[float], bounded: bool) -> None:
+    numbers = np.array([0.0, 0.1, 3.0, 0.2])
+    told = Ratio.of(estimate_of("mean", numbers), numbers, np.array(reference), {})
+    assert told.low == 0.0
+    assert math.isnan(told.high) is not bounded
+    if bounded:  # Fieller: there the mean of the one less r times the other is as far from 0 as its interval reaches
+        apart = estimate_of("mean", numbers - told.high * np.array(reference))
+        assert -apart.value == pytest.approx(apart.half_width)

@@ -172,7 +172,6 @@ def test_thickness_of_the_base_behind_a_perforated_plate(tmp_path: Path) -> None
     ("change", "sentence"),
     [
         (("shear_coefficient", "degradation = 0.8\nshear_coefficient"), "give degradation_distance in its place"),
-        (("fidelity = \"draft\"", 'tolerance = { residual_velocity = "1 m/s" }'), "got numerics.tolerance"),
         (
             ("count = 64", 'count = 64\n[stop]\nquantity = "P(perforated)"\nhalf_width = 0.1\nmax_count = 64'),
             r"leave out the table \[stop\]",

@@ -110,6 +110,11 @@ def test_the_figure_shows_means_against_the_input(folder: Path) -> None:
     for line, values in zip(lines, expected, strict=True):
         np.testing.assert_allclose(line.get_xdata(), [0.0, 30.0])
         np.testing.assert_allclose(line.get_ydata(), values, rtol=1e-6)
+    status = sweep["status"].copy(deep=True)
+    status[{"hit": slice(None, None, 2)}] = 1
+    some = sweep_figure(sweep.assign(status=status)).axes[0]
+    assert some.get_ylabel().endswith("of the cores that passed")
+    assert {text.get_text() for text in some.texts} == {"50%"}
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,186 @@
+"""Records: a new one is a group and a line, and outcomes are columns with what is done to all of them alike."""
+
+import pickle
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from warpimpact import (
+    Campaign,
+    ConeCore,
+    Hits,
+    Impact,
+    Layer,
+    Numerics,
+    Plate,
+    Record,
+    Scene,
+    SquarePattern,
+    Target,
+    make_shots,
+    simulate,
+)
+from warpimpact.records import registry
+from warpimpact.records.group import Group, Returned, doubles
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.records.variable import HITS, Variable
+from warpimpact.results import files
+from warpimpact.runs.run import run_to_file
+from warpimpact.scene import IDENTITY, Symmetry
+
+SIDEWAYS = Variable("sideways", HITS, "m s-1", "velocity along y at the end of contact", mirror="along_y")
+
+
+def sideways(returned: Returned) -> dict[Variable, Any]:
+    return {SIDEWAYS: doubles(returned.contact.velocity)[:, 1]}
+
+
+TOY = Group("With the toy", (SIDEWAYS,), lambda scene, shots: True, sideways)
+
+
+@pytest.fixture
+def toy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A record of its own module, and the line of the registry."""
+    monkeypatch.setattr(registry, "RECORDS", (*registry.RECORDS, TOY))
+
+
+CORE = ConeCore(diameter="6 mm", length="20 mm", cone_length="6 mm", mass="4 g")
+PLATE = Plate(thickness="4 mm", resistance="2 GPa", pattern=SquarePattern(side="4 mm", spacing=("8 mm", "8 mm")))
+CAMPAIGN = """
+title = "a toy"
+[core]
+shape = "cone"
+diameter = "6 mm"
+length = "20 mm"
+cone_length = "6 mm"
+mass = "4 g"
+[plate]
+thickness = "4 mm"
+resistance = "2 GPa"
+pattern = { shape = "square", side = "4 mm", spacing = ["8 mm", "8 mm"] }
+[impact]
+velocity = "825 m/s"
+[hits]
+count = 16
+irreducible = true
+[numerics]
+fidelity = "draft"
+patches_axial = 14
+"""
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_new_record_is_computed_unfolded_and_in_the_file(tmp_path: Path) -> None:
+    shots = make_shots(Impact(velocity=825.0), Hits(count=4), PLATE)
+    outcomes = simulate(Scene(core=CORE, target=PLATE), shots, numerics=Numerics(fidelity="draft"), device="cpu")
+    np.testing.assert_array_equal(outcomes.sideways, outcomes.exit_velocity[:, 1])
+    assert np.ptp(outcomes.sideways) > 1.0
+
+    campaign = Campaign.from_text(CAMPAIGN, name="toy", folder=tmp_path)
+    group = campaign.symmetries
+    assert len(group) == 4
+    run_to_file(campaign, tmp_path / "toy.nc", device="cpu")
+    result = files.read(tmp_path / "toy.nc")
+    stored = result["sideways"]
+    assert (stored.dims, stored.dtype, stored.attrs["units"]) == (("hit",), np.float32, "m s-1")
+    signs = [symmetry.along_y for symmetry in group] * (16 // len(group))
+    np.testing.assert_array_equal(stored, np.repeat(stored.values[:: len(group)], len(group)) * signs)
+    np.testing.assert_array_equal(stored, result["exit_velocity"][:, 1])
+
+    result.assign(sideways=stored.assign_attrs(units="km s-1")).to_netcdf(tmp_path / "altered.nc")
+    with pytest.raises(files.ResultError, match='its variable "sideways" has no units as it should'):
+        files.read(tmp_path / "altered.nc")
+
+
+def some(count: int = 3) -> Outcomes:
+    """Outcomes of a few columns."""
+    rng = np.random.default_rng(1)
+    vectors = {name: rng.random((count, 3)) for name in ("exit_velocity", "angular_velocity")}
+    angles = {name: rng.random((count, 2)) for name in ("tilt", "pitch", "yaw")}
+    behind = {name: rng.random((count, 2, 2)) for name in ("layer_standoff_pitch", "layer_standoff_yaw")}
+    return Outcomes(status=np.arange(count, dtype=np.int8), **vectors, **angles, **behind)
+
+
+def test_images_have_the_signs_of_each_column() -> None:
+    # (y, z) → (−y, z): a polar vector turns its y, an axial one the others; yaw is the angle of y, pitch that of z.
+    one, mirror = some(), Symmetry(-1, 1, False)
+    both = one.unfolded([IDENTITY, mirror])
+    assert both.status.tolist() == [0, 0, 1, 1, 2, 2]
+    image = both[1::2]
+    for name, values in vars(both[::2]).items():
+        np.testing.assert_array_equal(values, getattr(one, name))
+    np.testing.assert_array_equal(image.exit_velocity, one.exit_velocity * [1, -1, 1])
+    np.testing.assert_array_equal(image.angular_velocity, one.angular_velocity * [-1, 1, -1])
+    np.testing.assert_array_equal(image.tilt, one.tilt)
+    for name, sign in (("pitch", 1), ("yaw", -1)):
+        np.testing.assert_array_equal(getattr(image, name), sign * getattr(one, name))
+        name = f"layer_standoff_{name}"
+        np.testing.assert_array_equal(getattr(image, name), sign * getattr(one, name))
+
+
+def test_outcomes_without_a_standoff_have_images() -> None:
+    none = Outcomes(status=np.zeros(2, dtype=np.int8), yaw=np.empty((2, 0)))
+    assert none.unfolded([IDENTITY] * 4).yaw.shape == (8, 0)
+    assert none[:0].unfolded([IDENTITY] * 4).yaw.shape == (0, 0)
+
+
+def test_rows_are_chosen_joined_and_put() -> None:
+    one = some(5)
+    parts = Outcomes.joined([one[:2], one[2:4], one[np.array([4])]])
+    for name, values in vars(parts).items():
+        np.testing.assert_array_equal(values, getattr(one, name))
+    put = one.with_rows(np.array([3, 1]), one[:2])
+    assert put.status.tolist() == [0, 1, 2, 0, 4]
+    assert one.status.tolist() == [0, 1, 2, 3, 4]
+    assert len(one) == 5
+    assert one.assign(tilt=one.yaw).tilt is one.yaw
+
+
+def test_outcomes_are_immutable_and_say_what_they_lack() -> None:
+    one = some()
+    with pytest.raises(AttributeError, match=r"outcomes are immutable; assign\(tilt=\.\.\.\) gives others"):
+        one.tilt = one.yaw
+    with pytest.raises(AttributeError, match=r'no "bending_stress"; it is there with `output.bending`'):
+        _ = one.bending_stress
+    with pytest.raises(AttributeError, match='no "tild"; there are status, exit_velocity'):
+        _ = one.tild
+    assert "tilt" in one
+    assert "tild" not in one
+    again = pickle.loads(pickle.dumps(one))
+    np.testing.assert_array_equal(again.tilt, one.tilt)
+
+
+LAYER = Layer(thickness="1 mm", resistance="1 GPa", gap="80 mm")
+ALWAYS = {"status", "residual_velocity", "tilt", "exit_axis"}
+BENT = {"bending_stress", "largest_bending_moment"}
+LAYERED = {"layer_status", "stopped_in", "layer_tilt"}
+
+
+@pytest.mark.parametrize(
+    ("strength", "layers", "record", "expected"),
+    [
+        (None, (), {}, ALWAYS),
+        (None, (), {"bending": True}, ALWAYS | BENT),
+        (2e9, (), {"bending": True}, ALWAYS | BENT | {"broken"}),
+        (None, (LAYER,), {}, ALWAYS | LAYERED),
+        (None, (LAYER,), {"layer_standoffs": ("0.03 m",)}, ALWAYS | LAYERED | {"layer_standoff_yaw"}),
+        (2e9, (LAYER,), {"bending": True}, ALWAYS | LAYERED | BENT | {"broken"}),
+    ],
+)
+def test_a_scene_says_what_is_recorded(strength: Any, layers: Any, record: Any, expected: set[str]) -> None:
+    core = CORE.model_copy(update={"strength": strength})
+    scene = Scene(core=core, target=Target(layers=(PLATE, *layers)), record=Record(**record))
+    shots = make_shots(Impact(velocity=825.0), Hits(count=1), PLATE)
+    groups = [group for group in registry.RECORDS if group.recorded(scene, shots)]
+    assert {str(one) for group in groups for one in group} & (
+        ALWAYS | LAYERED | BENT | {"broken", "layer_standoff_yaw"}
+    ) == expected
+
+
+def test_each_name_has_one_variable() -> None:
+    named = [one for group in registry.RECORDS for one in group]
+    assert {str(one) for one, count in Counter(named).items() if count > 1} == {"limit_runs", "limit_converged"}
+    assert registry.variable("tilt").units == "degree"

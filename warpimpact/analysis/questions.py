@@ -1,0 +1,69 @@
+"""Whether results answer the same question: what must be the same, and whether the shots are."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import xarray
+
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.files import ResultError
+from warpimpact.results.measures import dealing
+from warpimpact.runs.shards import first_difference
+
+_SAME_PLACE = 1e-9
+"""Rounding of a place in units of the cell."""
+_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
+
+
+def check_same_question(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str) -> None:
+    """Refuse results of another core, impact or stand-offs.
+
+    Raises:
+        ResultError: names the first difference.
+    """
+    asked, asked_other = _question(one, name), _question(other, other_name)
+    if (found := first_difference(asked, asked_other)) is not None:
+        place, was, now = found
+        raise ResultError(f"{other_name}: cannot be compared with {name}: {place} is {now} here and {was} there")
+
+
+def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
+    """What must be the same for plates to be compared."""
+    told = dataset.attrs
+    if not {attr.CORE, attr.IMPACT} <= told.keys():
+        raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
+    output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
+    told_of = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
+    told_of |= {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}
+    return told_of | {
+        "core": json.loads(told[attr.CORE]),
+        "impact": _in_degrees(json.loads(told[attr.IMPACT])),
+        "output": output,
+    }
+
+
+def _in_degrees(impact: dict[str, Any]) -> dict[str, Any]:
+    """An impact with the angles that it gives as numbers as a person reads them."""
+    return {
+        name: f"{math.degrees(value)!r} deg" if name in _ANGLES and isinstance(value, float) else value
+        for name, value in impact.items()
+    }
+
+
+def other_shots(one: xarray.Dataset, other: xarray.Dataset) -> str:
+    """Why the shots of two results are not the same ones; empty where they are."""
+    if dealing(one) != dealing(other):
+        return "their shots have other replicates or symmetries"
+    for axis, coordinate in enumerate((v.HIT_Y, v.HIT_Z)):
+        here, there = (dataset[coordinate].values / dataset.attrs[attr.PLATE_PERIOD][axis] for dataset in (one, other))
+        if not np.allclose(here, there, rtol=0.0, atol=_SAME_PLACE):
+            return "their shots hit other places of the cell"
+    for name in (*v.SHOT_VARIABLES, v.MASS):
+        if name in one and not (name in other and np.array_equal(one[name], other[name])):
+            return f"their shots differ in {name}"
+    return ""

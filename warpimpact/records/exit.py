@@ -1,0 +1,58 @@
+"""How the shot ended, and the state of the core at the end of contact."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpimpact.kernels.status import Status
+from warpimpact.records.group import Columns, Group, Returned, doubles
+from warpimpact.records.variable import AT_STANDOFF, HITS, MAIN, VECTORS, Variable
+
+STATUS = Variable("status", HITS, "1", "how the shot ended", flags=Status)
+RESIDUAL_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity", shown_by=MAIN)
+DEFLECTION = Variable("deflection", HITS, "degree", "angle between residual velocity and line of fire", shown_by=MAIN)
+ANGULAR_VELOCITY = Variable(
+    "angular_velocity", VECTORS, "rad s-1", "angular velocity at the end of contact", mirror="axial"
+)
+ENERGY_LOSS = Variable("energy_loss", HITS, "J", "kinetic energy lost in the target")
+CONTACT_DURATION = Variable("contact_duration", HITS, "s", "duration of contact")
+TILT = Variable("tilt", AT_STANDOFF, "degree", "angle between core axis and line of fire", shown_by=MAIN)
+PITCH = Variable("pitch", AT_STANDOFF, "degree", "pitch of the core, projected into the x-z plane", mirror="along_z")
+YAW = Variable("yaw", AT_STANDOFF, "degree", "yaw of the core, projected into the x-y plane", mirror="along_y")
+TOTAL_YAW = Variable("total_yaw", AT_STANDOFF, "degree", "angle between core axis and residual velocity")
+
+EXIT_VELOCITY = Variable("exit_velocity", VECTORS, "m s-1", "velocity at the end of contact", mirror="polar")
+EXIT_AXIS = Variable(
+    "exit_axis", VECTORS, "1", "unit vector along the core towards its nose at the end of contact", mirror="polar"
+)
+EXIT_POSITION = Variable(
+    "exit_position", VECTORS, "m", "centre of mass at the end of contact, in the plate frame", mirror="polar"
+)
+"""Of outcomes, from the hit point."""
+
+_OF_FLIGHT = (
+    *(RESIDUAL_VELOCITY, DEFLECTION, ANGULAR_VELOCITY, ENERGY_LOSS, CONTACT_DURATION),
+    *(TILT, PITCH, YAW, TOTAL_YAW),
+)
+
+
+def _ends(returned: Returned) -> Columns:
+    return {STATUS: returned.status} | {one: doubles(getattr(returned.flight, one.field)) for one in _OF_FLIGHT}
+
+
+def _exits(returned: Returned) -> Columns:
+    """NaN where the computation failed; an arrested core has the velocity 0."""
+    arrested, contact = (returned.status == Status.ARRESTED)[:, None], returned.contact
+    state = {
+        EXIT_VELOCITY: np.where(arrested, 0.0, doubles(contact.velocity)),
+        EXIT_AXIS: doubles(contact.axis),
+        EXIT_POSITION: doubles(contact.position),
+    }
+    return {name: np.where(returned.failed[:, None], np.nan, values) for name, values in state.items()}
+
+
+OUTCOME_VARIABLES = Group("How the shot ended", (STATUS, *_OF_FLIGHT), lambda scene, shots: True, _ends)
+EXIT_VARIABLES = Group(
+    "At the end of contact", (EXIT_VELOCITY, EXIT_AXIS, EXIT_POSITION), lambda scene, shots: True, _exits
+)
+"""In a file unless `output.exit_state` is false. With `angular_velocity` they start a flight behind the plate."""

@@ -1,0 +1,121 @@
+"""How each core left each layer of the target, and where it came to rest (kernels/passage.py).
+
+A core leaves a layer at the instant when its last point passes the rear face; NaN where it does not.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpimpact.kernels.status import LayerStatus
+from warpimpact.records.group import Columns, Group, Returned, doubles
+from warpimpact.records.variable import BEHIND_LAYER, HITS, IN_LAYER, Variable
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Scene, Shots
+
+LAYER_STATUS = Variable(
+    "layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus, field="status"
+)
+LAYER_RESIDUAL_VELOCITY = Variable(
+    "layer_residual_velocity",
+    IN_LAYER,
+    "m s-1",
+    "velocity when the last point of the core leaves the layer",
+    field="velocity",
+)
+LAYER_TILT = Variable(
+    "layer_tilt",
+    IN_LAYER,
+    "degree",
+    "angle between core axis and line of fire when its last point leaves the layer",
+    field="tilt",
+)
+LAYER_TIME = Variable(
+    "layer_time",
+    IN_LAYER,
+    "s",
+    "time when the last point of the core leaves the layer, since the first touch",
+    field="time",
+)
+STOPPED_IN = Variable("stopped_in", HITS, "1", "deepest layer that the core rests in; -1 where it does not rest in one")
+DEPTH = Variable("depth", HITS, "m", "how far behind the front face of that layer any point of the core came")
+
+LAYER_DEFLECTION = Variable(
+    "layer_deflection",
+    IN_LAYER,
+    "degree",
+    "angle between velocity and line of fire behind the layer",
+    field="deflection",
+)
+LAYER_STANDOFF_TILT = Variable(
+    "layer_standoff_tilt",
+    BEHIND_LAYER,
+    "degree",
+    "angle between core axis and line of fire behind the layer",
+    field="standoff_tilt",
+)
+LAYER_STANDOFF_PITCH = Variable(
+    "layer_standoff_pitch",
+    BEHIND_LAYER,
+    "degree",
+    "pitch of the core behind the layer, projected into the x-z plane",
+    field="standoff_pitch",
+    mirror="along_z",
+)
+LAYER_STANDOFF_YAW = Variable(
+    "layer_standoff_yaw",
+    BEHIND_LAYER,
+    "degree",
+    "yaw of the core behind the layer, projected into the x-y plane",
+    field="standoff_yaw",
+    mirror="along_y",
+)
+
+LAYER_FRONT = Variable("layer_front", ("layer",), "m", "front face of the layer, from that of the target")
+LAYER_REAR = Variable("layer_rear", ("layer",), "m", "rear face of the layer, from the front face of the target")
+LAYER_FACES = (LAYER_FRONT, LAYER_REAR)
+"""Of the means where thicknesses scatter."""
+LAYER_STANDOFF = Variable("layer_standoff", ("layer_standoff",), "m", "distance behind the rear face of a layer")
+LAYER_COORDINATES = (LAYER_STANDOFF,)
+
+_CODES = (LAYER_STATUS, STOPPED_IN)
+
+
+def _layered(scene: Scene, shots: Shots) -> bool:
+    return len(scene.target.layers) > 1
+
+
+def _left(returned: Returned) -> Columns:
+    passage = returned.passage
+    codes = {one: getattr(passage, one.field).numpy().astype(np.int8) for one in _CODES}
+    return codes | {one: doubles(getattr(passage, one.field)) for one in LAYER_VARIABLES if one not in _CODES}
+
+
+def _behind(returned: Returned) -> Columns:
+    """No value where free flight ends at the next layer: a stand-off and the size of the core are more than the gap."""
+    deflection, *attitude = LAYER_STANDOFF_VARIABLES
+    columns = {one: np.where(returned.free, doubles(getattr(returned.passage, one.field)), np.nan) for one in attitude}
+    return {deflection: doubles(getattr(returned.passage, deflection.field))} | columns
+
+
+LAYER_VARIABLES = Group(
+    "With layers behind the plate",
+    (LAYER_STATUS, LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, STOPPED_IN, DEPTH),
+    _layered,
+    _left,
+    beside=LAYER_FACES,
+    whole=True,
+)
+LAYER_STANDOFF_VARIABLES = Group(
+    "With `output.layer_standoffs`",
+    (LAYER_DEFLECTION, LAYER_STANDOFF_TILT, LAYER_STANDOFF_PITCH, LAYER_STANDOFF_YAW),
+    lambda scene, shots: _layered(scene, shots) and bool(scene.record.layer_standoffs),
+    _behind,
+    beside=LAYER_COORDINATES,
+    whole=True,
+)
+LAYER_NUMBERS = (LAYER_RESIDUAL_VELOCITY, LAYER_TILT, LAYER_TIME, *LAYER_STANDOFF_VARIABLES)
+"""Variables with one number per hit and layer, or one for each stand-off behind the layer."""

@@ -1,0 +1,91 @@
+"""How shots ended: columns by their names, with what is done to all of them alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.records import registry
+
+if TYPE_CHECKING:
+    from warpimpact.records.group import Returned
+    from warpimpact.scene import Scene, Shots, Symmetry
+
+Which = slice | NDArray[np.int64] | NDArray[np.bool_]
+
+
+class Outcomes:
+    """How the shots ended: arrays as attributes, of which the first axis is along the shots, SI and radians; NaN where
+    a value does not exist. The reference of variables says what each holds.
+
+    Every computation has `status`, `residual_velocity`, `deflection`, `angular_velocity`, `energy_loss`,
+    `contact_duration`, `exit_velocity`, `exit_axis` and `exit_position` (from the hit point), and at each stand-off
+    `tilt`, `pitch`, `yaw` and `total_yaw`. Others follow from what the scene records, its core and its target.
+
+    Args:
+        columns: by name.
+    """
+
+    def __init__(self, **columns: NDArray[Any]) -> None:
+        vars(self).update(columns)
+
+    @classmethod
+    def collected(cls, scene: Scene, shots: Shots, returned: Returned) -> Self:
+        """All columns that a scene records, filled from what a device returned."""
+        groups = (group for group in registry.RECORDS if group.recorded(scene, shots))
+        return cls(**{str(name): values for group in groups for name, values in group.filled(returned).items()})
+
+    @classmethod
+    def joined(cls, parts: Iterable[Self]) -> Self:
+        """Outcomes with the same columns, one after the other."""
+        columns = [vars(part) for part in parts]
+        return cls(**{name: np.concatenate([one[name] for one in columns]) for name in columns[0]})
+
+    def __getattr__(self, name: str) -> NDArray[Any]:
+        titles = [group.title for group in registry.RECORDS if name in group]
+        hint = f"it is there {titles[0].lower()}" if titles else f"there are {', '.join(vars(self))}"
+        raise AttributeError(f'these outcomes have no "{name}"; {hint}')
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"outcomes are immutable; assign({name}=...) gives others")
+
+    def __contains__(self, name: str) -> bool:
+        return name in vars(self)
+
+    def __len__(self) -> int:
+        """Number of shots."""
+        return len(self.status)
+
+    def __getitem__(self, which: Which) -> Self:
+        """Those of some shots."""
+        return type(self)(**{name: values[which] for name, values in vars(self).items()})
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__} of {len(self)} shots: {', '.join(vars(self))}"
+
+    def assign(self, **columns: NDArray[Any]) -> Self:
+        """The same with these columns, new ones or in place of old ones."""
+        return type(self)(**vars(self) | columns)
+
+    def with_rows(self, which: Which, other: Self) -> Self:
+        """Copies of the columns, with other outcomes of some shots."""
+        columns = {name: values.copy() for name, values in vars(self).items()}
+        for name, values in columns.items():
+            values[which] = getattr(other, name)
+        return type(self)(**columns)
+
+    def unfolded(self, group: Sequence[Symmetry]) -> Self:
+        """Outcomes of all images of the shots under a group; the images of a shot follow each other."""
+        return type(self)(**{name: _images(name, values, group) for name, values in vars(self).items()})
+
+
+def _images(name: str, values: NDArray[Any], group: Sequence[Symmetry]) -> NDArray[Any]:
+    mirror = registry.variable(name).mirror
+    if mirror is None:
+        return np.repeat(values, len(group), axis=0)
+    factors = np.array([getattr(symmetry, mirror) for symmetry in group])  # a number or a vector for each
+    factors = factors.reshape(len(group), *(1,) * (values.ndim - factors.ndim), *factors.shape[1:])
+    return np.asarray((values[:, None] * factors).reshape(len(group) * len(values), *values.shape[1:]))
