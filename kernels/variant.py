@@ -8,11 +8,12 @@ from typing import Any
 import warp as wp
 
 CPU_FLAGS = (
-    "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign "
+    "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign -fno-slp-vectorize "
     "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )
 """Flags that let the compiler vectorise sums and divisions, as wide as the processor can; its default for Intel is half
-of that. NaN and infinity keep their meaning."""
+of that. NaN and infinity keep their meaning. Straight-line code stays scalar: on some processors the compiler breaks a
+large kernel there (LLVM: "Instruction does not dominate all uses"), and loops are what counts."""
 
 
 @dataclass(frozen=True)

@@ -37,8 +37,8 @@ UNBREAKABLE = 1.0e30
 
 
 class Planes(NamedTuple):
-    """Planes of a window through the thickness: their number, the `spacing` between two [m] and how many spacings a degradation
-    depth has. One stands for the whole thickness."""
+    """Planes of a window through the thickness: their number, the `spacing` between two [m], and how many of them a
+    degradation depth has. One stands for the whole thickness."""
 
     number: int = 1
     spacing: float = math.inf
