@@ -3,11 +3,14 @@
 import re
 import shlex
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
+
+from warpimpact.cli import main
+from warpimpact.studies import accuracy
 
 CHECKOUT = Path(__file__).parents[2]
 README = (CHECKOUT / "README.md").read_text(encoding="utf-8")
@@ -19,36 +22,46 @@ def commands() -> list[list[str]]:
     return [shlex.split(line, comments=True) for line in block.splitlines()]
 
 
-def test_each_line_works_after_those_above_it(tmp_path: Path) -> None:
-    """All of them, on few hits; then the example in Python."""
+SMALLER = {
+    "paper_fit.toml": ("sets = 3072\nhits = 512", "sets = 64\nhits = 64"),
+    "obliquity_sweep.toml": ("count = 1024", "count = 64"),
+}
+"""What is computed less of, by file."""
+FEWER = {
+    "run": ["--count", "128"],
+    "compare": ["--count", "128"],
+    "report": ["--trajectories", "1"],
+    "study": ["--hits", "2"],
+}
+
+
+def test_each_line_works_after_those_above_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """All of them, on few hits and in coarse pictures; then the example in Python."""
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda figure, file, **how: save(figure, file, **how | {"dpi": 20}))
+    monkeypatch.setattr(accuracy, "MEASURED_TIME", 0.0)
+    monkeypatch.setattr(accuracy, "SHORTEST_RUN", 0.0)
+    monkeypatch.chdir(tmp_path)
     lines = commands()
     assert len(lines) > 10
-    for line in lines:
-        assert line[0] == "warpimpact"
-        few = ["--count", "128"] if line[1] in ("run", "compare") else []
-        few = ["--trajectories", "1"] if line[1] == "report" else few
-        few = ["--hits", "2"] if line[1] == "study" else few
-        if line[1] == "identify":  # the fit itself takes minutes
-            fit = tmp_path / line[2]
-            text = fit.read_text(encoding="utf-8")
-            fit.write_text(text.replace("sets = 3072\nhits = 512", "sets = 64\nhits = 64"), encoding="utf-8")
-            assert fit.read_text(encoding="utf-8") != text
-        done = subprocess.run(
-            [sys.executable, "-c", "import sys; from warpimpact.cli import main; sys.exit(main())", *line[1:], *few],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, f"{shlex.join(line)}: {done.stderr}"
+    for program, command, *rest in lines:
+        assert program == "warpimpact"
+        for name in SMALLER.keys() & set(rest):
+            text = Path(name).read_text(encoding="utf-8")
+            assert SMALLER[name][0] in text
+            Path(name).write_text(text.replace(*SMALLER[name]), encoding="utf-8")
+        code = main([command, *rest, *FEWER.get(command, "").split()])
+        assert not code, f"{command} {shlex.join(rest)}: {capsys.readouterr().err}"
     made = {path.name for path in tmp_path.iterdir()}
     assert {"slotted.toml", "slotted.nc", "slotted.csv", "slots.nc", "slots.html", "slotted_hit34.nc"} <= made
     (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     few_hits = code.replace('from_toml("slotted.toml")', 'from_toml("slotted.toml", count=128)')
     assert few_hits != code
-    done = subprocess.run([sys.executable, "-c", few_hits], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "perforated" in done.stdout
+    capsys.readouterr()
+    exec(few_hits, {})
+    assert "perforated" in capsys.readouterr().out
 
 
 @pytest.mark.skipif(not (CHECKOUT / ".git").exists(), reason="no checkout")
@@ -66,13 +79,10 @@ def test_what_the_lines_write_is_ignored_by_git() -> None:
     assert done.stdout.replace('"', "").splitlines() == made
 
 
-def test_every_command_is_in_the_readme_or_in_its_help() -> None:
-    shown = subprocess.run(
-        [sys.executable, "-c", "from warpimpact.cli import main; main(['--help'])"],
-        capture_output=True,
-        text=True,
-        check=False,
-    ).stdout
+def test_every_command_is_in_the_readme_or_in_its_help(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    shown = capsys.readouterr().out
     assert all(re.search(rf"^    {line[1]}\b", shown, re.MULTILINE) for line in commands())
 
 

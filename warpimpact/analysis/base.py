@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,13 +55,43 @@ def is_pierced(dataset: Result) -> Array:
     return np.where(np.isnan(depth), np.nan, depth >= base_thickness(dataset) if has_base(dataset) else np.nan)
 
 
-def solid_note(dataset: Result) -> str:
-    """What to know of the solid plate beside a base, if its material keeps it from stopping any core; mostly empty."""
-    material = json.loads(dataset.attrs.get(attr.MATERIAL, "{}"))
-    by_time = material.get("degradation", 1.0) < 1.0 and material.get("degradation_distance") is None
-    if not (has_base(dataset) and by_time and v.SOLID_VARIABLES.keys() <= dataset.variables.keys()):
+def solid_plate(dataset: Result) -> str:
+    """Thickness and material of the solid plate of equal areal density, as a phrase; empty where that is not told."""
+    told = dataset.attrs
+    material = json.loads(told.get(attr.MATERIAL, "{}"))
+    if not {"resistance", "density"} <= material.keys() or attr.AREAL_DENSITY not in told:
         return ""
+    thickness = 1e3 * float(told[attr.AREAL_DENSITY]) / material["density"]
+    return f"{thickness:.3g} mm of {1e-9 * material['resistance']:.3g} GPa, {_weakens(material)}"
+
+
+def _weakens(material: dict[str, Any]) -> str:
+    if not (share := material.get("degradation", 1.0)) < 1.0:
+        return "which does not weaken"
+    by_path = material.get("degradation_distance") is not None
+    unit = (
+        f"{1e3 * material['degradation_distance']:.3g} mm of path"
+        if by_path
+        else f"{1e6 * material['degradation_interval']:.3g} µs of contact"
+    )
+    at_once = "" if material.get("degradation_depth") is not None else ", through its whole thickness at once,"
+    return f"which weakens{at_once} to {share:.3g} in {unit}"
+
+
+def solid_note(dataset: Result) -> str:
+    """What the solid plate beside a result is, and what keeps it from being the best plate of that weight; empty where
+    the result has none."""
+    plate = solid_plate(dataset)
+    if not plate or not {*v.SOLID_VARIABLES, *v.SOLID_LIMIT_VARIABLES} & dataset.variables.keys():
+        return ""
+    note = f"The solid plate is {plate}, the material of the plate in front."
+    material = json.loads(dataset.attrs[attr.MATERIAL])
+    if not material.get("degradation", 1.0) < 1.0 or material.get("degradation_depth") is not None:
+        return note
+    note += " A thick plate that weakens as a whole holds less than a real one, so a ratio to it flatters the target."
+    if material.get("degradation_distance") is not None:
+        return note
     return (
-        "The solid plate is of the material of the plate, which weakens by time and so stops no core, however slow. "
-        "Give degradation_distance in the place of degradation_interval for a solid plate that may stop cores."
+        f"{note} Weakening by time, it stops no core, however slow; give degradation_distance in the place of "
+        "degradation_interval for a solid plate that may stop cores."
     )

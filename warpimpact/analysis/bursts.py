@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpimpact.analysis.numbers import interval_text, plus_minus
-from warpimpact.analysis.summary import UNITS, means_of, slices
+from warpimpact.analysis.summary import means_of, slices
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import shots_at_a_plate
 from warpimpact.results.measures import Array, Measure, dealing
@@ -134,7 +134,7 @@ def label_of(measure: Measure) -> str:
     if measure.is_binary:
         return str(measure.text)
     at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-    return f"{measure.variable.replace('_', ' ')}{at} [{UNITS[measure.units].strip()}]"
+    return f"{measure.variable.replace('_', ' ')}{at} [{measure.display.shown}]"
 
 
 PASSED_ALONE = "velocity and tilt are those of the cores that passed"

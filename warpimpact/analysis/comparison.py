@@ -23,15 +23,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray
 
-from warpimpact.analysis.base import base_thickness, has_base, solid_note
+from warpimpact.analysis.base import base_thickness, has_base, solid_note, solid_plate
 from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.questions import check_same_question, other_shots
 from warpimpact.analysis.summary import breaks_promise, sampling_note
-from warpimpact.analysis.survival import Survival, survival_of, why_not_by_draws
+from warpimpact.analysis.survival import Survival, draws_note, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import dealing
 from warpimpact.runs.shards import first_difference
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (
     Ratio,
     confidence_of_each,
@@ -43,18 +45,19 @@ from warpimpact.statistics.intervals import Array, Estimate, estimate_of
 
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
-_MATERIAL_UNITS = {"resistance": " Pa", "degradation_interval": " s", "degradation_length": " m", "density": " kg/m³"}
 
 
 @dataclass(frozen=True)
 class Contestant:
-    """A plate and how well it protects; areal density [kg/m²], open area as a share."""
+    """A plate and how well it protects; areal density [kg/m²], open area as a share, and what the solid plate of equal
+    areal density is."""
 
     name: str
     hits: int
     areal_density: float
     open_area: float
     measures: tuple[Measure, ...]
+    solid: str = ""
 
 
 @dataclass(frozen=True)
@@ -143,8 +146,8 @@ def compare(
     datasets: Sequence[xarray.Dataset],
     names: Sequence[str],
     *,
-    angle: float = ANGLE,
-    standoff: float | None = None,
+    angle: float | str = ANGLE,
+    standoff: float | str | None = None,
     confidence: float = 0.95,
 ) -> Comparison:
     """Compare the plates of some hit maps, by all their hits.
@@ -152,8 +155,7 @@ def compare(
     Args:
         datasets: two or more, of the same core under the same impact; of open files one number per hit is in memory.
         names: of the plates, each once.
-        angle: inclination beyond which a core counts as tilted [rad].
-        standoff: where that is looked at [m]; None is the largest stand-off.
+        angle, standoff: beyond which inclination a core counts as tilted, and where, as in `effectiveness`.
         confidence: of all differences in a measure together.
 
     Raises:
@@ -189,7 +191,12 @@ def compare(
             differences.append(Difference(name, names[i], names[j], *interval, survival))
     plates = tuple(
         Contestant(
-            name, dataset.sizes["hit"], dataset.attrs[attr.AREAL_DENSITY], dataset.attrs[attr.OPEN_AREA], tuple(told)
+            name,
+            dataset.sizes["hit"],
+            dataset.attrs[attr.AREAL_DENSITY],
+            dataset.attrs[attr.OPEN_AREA],
+            tuple(told),
+            solid_plate(dataset),
         )
         for name, dataset, told in zip(names, datasets, measures, strict=True)
     )
@@ -296,7 +303,10 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
     if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
         yield f"The numerics are less exact than the fidelity promises: {', '.join(broken)} (warpimpact inspect)."
-    yield from dict.fromkeys(note for d in datasets for note in (solid_note(d), sampling_note(d)) if note)
+    solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
+    alike = len(set(solid.values())) == 1
+    yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
+    yield from dict.fromkeys(note for d in datasets for note in (sampling_note(d), draws_note(d)) if note)
 
 
 def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator[str]:
@@ -309,5 +319,6 @@ def _materials(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iter
     for quantity in dict.fromkeys(key for material in told.values() for key in material):
         values = {name: material.get(quantity) for name, material in told.items()}
         if len(set(values.values())) > 1:
-            units = _MATERIAL_UNITS.get(quantity, "")
-            yield f"{quantity} ({of_each(list(values), [f'{value:.6g}{units}' for value in values.values()])})"
+            read = reader_of(QUANTITIES[quantity].type)
+            shown = ["not given" if value is None else read.text(value) for value in values.values()]
+            yield f"{quantity} ({of_each(list(values), shown)})"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
-from warpimpact.analysis.numbers import interval_text, of_each
+from warpimpact.analysis.numbers import interval_text, intervals_text, of_each
 from warpimpact.analysis.numbers import number_text as number
 from warpimpact.analysis.survival import survival_text
 
@@ -139,7 +139,7 @@ def _ranking(comparison: Comparison, measure: Measure) -> Ranking:
     for plate in (plates[name] for name in ranks):
         told = plate.measures[place]
         against = "" if math.isnan(told.ratio_low) else interval_text(told.ratio_low, told.ratio_high)
-        value = (f"{plate.areal_density:.2f}", number(told.value), interval_text(told.low, told.high))
+        value = (f"{plate.areal_density:.2f}", number(told.value), intervals_text(told.low, told.high, told.parameters))
         rank = str(ranks[plate.name]) if is_ranked(comparison, measure.name) else "-"
         rows.append((rank, plate.name, *value, number(told.ratio), against))
     what = " in the ratio to the solid plate" if by_ratio else ""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,19 +18,21 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.effects import Effect, effects
-from warpimpact.analysis.numbers import interval_text, number_text
+from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
+from warpimpact.analysis.survival import over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_reference
 from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import dealing
+from warpimpact.scene.units import Radians
 from warpimpact.statistics.comparisons import Ratio
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
 
 Array = NDArray[np.float64]
 
-ANGLE = math.radians(30.0)
+ANGLE = Radians(math.radians(30.0))
 """Inclination beyond which a core counts as tilted, unless said otherwise [rad]."""
 
 
@@ -41,10 +43,11 @@ class Measure:
     Attributes:
         name, label, units, definition, source, higher_is_better: as of `Effect`, and of what is made of it.
         value: the number.
-        low, high: its confidence interval; none of a worst point, as what lies between the hits may be worse.
+        low, high: its confidence interval by the hits; none of a worst point: what lies between the hits may be worse.
         solid: the same of the solid plate of equal areal density.
         ratio, ratio_low, ratio_high: the value as a multiple of that.
         hit: number of the hit that is the worst point; None of anything else.
+        parameters: its interval by the parameters as of an `Estimate`.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Measure:
     ratio_low: float
     ratio_high: float
     hit: int | None = None
+    parameters: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -99,13 +103,15 @@ _WORST_TENTH = _Statistic(
 _WORST_POINT = _Statistic("_worst_point", ", worst point", " The worst of the hits, an observed extreme.", "")
 
 
-def effectiveness(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None) -> list[Measure]:
+def effectiveness(
+    dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
+) -> list[Measure]:
     """How well the plate of a result protects.
 
     Args:
         dataset: a hit map; of an open file a slice is in memory at a time, and one number per hit.
-        angle: inclination beyond which a core counts as tilted [rad].
-        standoff: distance behind the rear face where tilt counts [m]; the largest of the result if None.
+        angle: inclination beyond which a core counts as tilted: degrees, a string with its unit, or `Radians`.
+        standoff: distance behind the rear face where tilt counts [m], or a string; the largest of the result if None.
 
     Raises:
         ResultError: the result has no such stand-off.
@@ -121,8 +127,8 @@ def effect_names(dataset: xarray.Dataset) -> list[str]:
 def gather(
     dataset: xarray.Dataset,
     *,
-    angle: float = ANGLE,
-    standoff: float | None = None,
+    angle: float | str = ANGLE,
+    standoff: float | str | None = None,
     confidence: float = 0.95,
     only: Container[str] | None = None,
 ) -> Iterator[Evidence]:
@@ -135,22 +141,30 @@ def gather(
             continue
         values, solid = effect.over(dataset), None if reference is None else effect.over(reference)
         if effect.kind == "share":
-            yield _averaged(effect, _SHARE, values, solid, dealt)
+            yield _averaged(effect, _SHARE, values, solid, dealt, dataset)
         else:
-            yield _averaged(effect, _MEAN, values, solid, dealt)
+            yield _averaged(effect, _MEAN, values, solid, dealt, dataset)
             sign = -1.0 if effect.higher_is_better else 1.0
             worst = None if solid is None else sign * worst_tenth(sign * solid)
-            yield _averaged(effect, _WORST_TENTH, sign * worst_tenth(sign * values), worst, dealt)
+            yield _averaged(effect, _WORST_TENTH, sign * worst_tenth(sign * values), worst, dealt, dataset)
             yield _worst_point(effect, values, solid, dataset)
 
 
 def _averaged(
-    effect: Effect, statistic: _Statistic, numbers: Array, solid: Array | None, dealt: dict[str, Any]
+    effect: Effect,
+    statistic: _Statistic,
+    numbers: Array,
+    solid: Array | None,
+    dealt: dict[str, Any],
+    dataset: xarray.Dataset,
 ) -> Evidence:
     """The measure that is the mean of some numbers."""
-    estimate = estimate_of(effect.kind, numbers, **dealt).within(0.0, 1.0 if effect.units == "1" else math.inf)
+    estimate = over_draws(dataset, estimate_of(effect.kind, numbers, **dealt), numbers)
+    estimate = estimate.within(0.0, 1.0 if effect.units == "1" else math.inf)
+    if statistic is _WORST_TENTH and estimate.parameters:  # that is of all draws together
+        estimate = replace(estimate, parameters=(math.nan, math.nan))
     if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
-        estimate = _without_interval(estimate.value)
+        estimate = replace(_without_interval(estimate.value), parameters=estimate.parameters)
     against = Ratio.of(estimate, numbers, solid, dealt)
     return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers, solid)
 
@@ -189,6 +203,7 @@ def _measure(
         ratio_low=against.low,
         ratio_high=against.high,
         hit=hit,
+        parameters=estimate.parameters,
     )
 
 
@@ -196,7 +211,9 @@ SHOWN_UNITS = {"1": "", "mm": " [mm]", "J mm-2": " [J/mmÂ²]", "kg m-2": " [kg/mÂ
 """Units behind a label."""
 
 
-def effectiveness_text(dataset: xarray.Dataset, *, angle: float = ANGLE, standoff: float | None = None) -> str:
+def effectiveness_text(
+    dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
+) -> str:
     """The measures of `effectiveness` as a table, beside those of the solid plate of equal areal density."""
     measures = effectiveness(dataset, angle=angle, standoff=standoff)
     labels = [measure.label + SHOWN_UNITS[measure.units] for measure in measures]
@@ -241,7 +258,11 @@ def plate_text(dataset: xarray.Dataset) -> str:
 
 
 def _second(measure: Measure) -> str:
-    return f"at hit {measure.hit}" if measure.hit is not None else interval_text(measure.low, measure.high)
+    return (
+        f"at hit {measure.hit}"
+        if measure.hit is not None
+        else intervals_text(measure.low, measure.high, measure.parameters)
+    )
 
 
 def _against_text(measure: Measure) -> str:

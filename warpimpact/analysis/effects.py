@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from warpimpact.analysis import base
 from warpimpact.analysis.summary import slices
+from warpimpact.campaign.problems import complaint
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, passed
 from warpimpact.results.files import ResultError
+from warpimpact.results.measures import place_of_standoff
 from warpimpact.scene import AnyCore, Core
+from warpimpact.scene.units import Length, Obliquity
 
 Array = NDArray[np.float64]
 
@@ -56,15 +60,15 @@ class Effect:
         return np.concatenate([self.values(part) for part in slices(dataset[needed].drop_vars(v.HIT, errors="ignore"))])
 
 
-def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) -> Iterator[Effect]:
+def effects(dataset: xarray.Dataset, *, angle: float | str, standoff: float | str | None) -> Iterator[Effect]:
     """All there are for a result: of the base first, if there is one; of a search of limits, those alone.
 
     Args:
-        angle: inclination beyond which a core counts as tilted [rad].
-        standoff: distance behind the rear face [m]; the largest of the result if None.
+        angle: inclination beyond which a core counts as tilted: degrees, a string with its unit, or `Radians`.
+        standoff: distance behind the rear face [m], or a string; the largest of the result if None.
 
     Raises:
-        ResultError: the result has no such stand-off.
+        ResultError: the angle is none, or the result has no such stand-off.
     """
     if _THICKNESS in dataset:
         yield from _of_limits(dataset)
@@ -74,7 +78,7 @@ def effects(dataset: xarray.Dataset, *, angle: float, standoff: float | None) ->
         return
     if base.has_base(dataset):
         yield from _of_base()
-    standoff, degrees = _at_standoff(dataset, standoff), math.degrees(angle)
+    standoff, degrees = _at_standoff(dataset, standoff), math.degrees(_read("angle", Obliquity, angle))
     at = f"{standoff * 1e3:g} mm"
     yield Effect(
         name="residual_energy_fraction",
@@ -257,16 +261,22 @@ def _is_broken(part: xarray.Dataset) -> Array:
     return np.asarray(part[v.BROKEN].values, dtype=np.float64)
 
 
-def _at_standoff(dataset: xarray.Dataset, standoff: float | None) -> float:
+def _read(name: str, kind: Any, value: float | str) -> float:
+    try:
+        return float(TypeAdapter(kind).validate_python(value))
+    except ValidationError as error:
+        raise ResultError(f"{name}: {complaint(error.errors()[0])}") from None
+
+
+def _at_standoff(dataset: xarray.Dataset, standoff: float | str | None) -> float:
     """The stand-off of a result that is meant [m]."""
     distances = dataset[v.STANDOFF].values
     if standoff is None:
         return float(distances[-1])
-    nearest = float(distances[np.argmin(np.abs(distances - standoff))])
-    if not np.isclose(nearest, standoff, rtol=1e-9, atol=0.0):
-        known = ", ".join(f"{distance * 1e3:g} mm" for distance in distances)
-        raise ResultError(f"standoff: got {standoff * 1e3:g} mm, but the result has {known}")
-    return nearest
+    try:
+        return float(distances[place_of_standoff(distances, _read("standoff", Length, standoff))])
+    except ValueError as error:
+        raise ResultError(f"standoff: {error}") from None
 
 
 def _of_passed(part: xarray.Dataset, values: Array, otherwise: float) -> Array:

@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
+from warpimpact.results.measures import place_of_standoff
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -108,17 +109,9 @@ def chosen(
         array = array.isel(layer=-1 if layer is None else layer)
     for name in (v.STANDOFF, v.LAYER_STANDOFF):
         if name in array.dims:
-            array = array.isel({name: _index_of(dataset[name].values, standoff)})
+            place = -1 if standoff is None else place_of_standoff(dataset[name].values, standoff)
+            array = array.isel({name: place})
     return array
-
-
-def _index_of(distances: Array, standoff: float | None) -> int:
-    """Place of a stand-off [m] among those of a result; of the largest if None."""
-    index = distances.size - 1 if standoff is None else int(np.argmin(np.abs(distances - standoff)))
-    if standoff is not None and not np.isclose(distances[index], standoff):
-        known = ", ".join(f"{distance:g}" for distance in distances)
-        raise ValueError(f"the result has no stand-off of {standoff:g} m; it has {known} m")
-    return index
 
 
 def mappable(dataset: xarray.Dataset) -> list[str]:

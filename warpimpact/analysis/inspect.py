@@ -10,18 +10,20 @@ import xarray
 
 from warpimpact.analysis.bursts import bursts, bursts_text
 from warpimpact.analysis.effectiveness import effectiveness_text
-from warpimpact.analysis.numbers import interval_text
+from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
-    UNITS,
+    Spread,
     estimated,
     means_of,
+    numerics_note,
     promise_text,
     sampling_note,
     slices,
     stop_lines,
     symmetry_text,
 )
+from warpimpact.analysis.survival import draws_note
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -30,8 +32,6 @@ from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.statistics.intervals import Estimate
 
 _QUANTILES = (0.05, 0.5, 0.95)
-_SHOWN = {"Pa": ("GPa", 1e-9)}
-"""Units of rows that are not those of the Dataset, and the factors to them."""
 
 
 def inspect_text(dataset: xarray.Dataset) -> str:
@@ -79,7 +79,8 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
     yield f"{'status':<22}{'share':>10}   95 % interval"
     for measure, estimate in estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES]).items():
         if estimate.value > 0.0:
-            yield f"{measure.variable:<22}{estimate.value:>10.2%}   {estimate.low:.2%} to {estimate.high:.2%}"
+            interval = intervals_text(*ends_of(estimate), "{:.2%}".format)
+            yield f"{measure.variable:<22}{estimate.value:>10.2%}   {interval}"
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
@@ -97,20 +98,22 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
         for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
             if estimate.count:
                 yield _row(measure, estimate)
-    if note := sampling_note(dataset):
-        yield note
+    velocity = Spread.of(
+        estimated(dataset, means_of([v.RESIDUAL_VELOCITY], []))[Measure.parse("mean(residual_velocity)")]
+    )
+    yield from filter(None, (sampling_note(dataset), numerics_note(dataset, velocity), draws_note(dataset)))
     yield from stop_lines(dataset)
 
 
 def _row(measure: Measure, estimate: Estimate) -> str:
     name, what = "", f"{measure.share * 100.0:g} % quantile"
-    unit, factor = _SHOWN.get(measure.units, (UNITS[measure.units].strip(), 1.0))
+    unit, factor = measure.display.shown, measure.display.factor
     if measure.kind == "mean":
         at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
         name, what = f"{measure.variable.replace('_', ' ')}{at}, {unit}", "mean"
-    interval = interval_text(factor * estimate.low, factor * estimate.high, "{:.2f}".format)
+    interval = intervals_text(*ends_of(estimate), lambda end: f"{factor * end:.2f}")
     row = f"{name:<29}{what:<14}{factor * estimate.value:>10.2f}   {interval}"
-    return f"{row:<79}spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row
+    return f"{row:<78} spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row
 
 
 def failures(dataset: xarray.Dataset) -> Iterator[str]:

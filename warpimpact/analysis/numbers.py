@@ -22,6 +22,22 @@ def interval_text(low: float, high: float, text: Callable[[float], str] = number
     return f"at least {text(low)}" if math.isnan(high) else f"{text(low)} to {text(high)}"
 
 
+def intervals_text(
+    low: float, high: float, parameters: tuple[float, float] | None, text: Callable[[float], str] = number_text
+) -> str:
+    """An interval by the hits, and beside it one by the parameters where shots draw these from a posterior."""
+    by_hits = interval_text(low, high, text)
+    if parameters is None:
+        return by_hits
+    by_parameters = "not known" if math.isnan(parameters[0]) else interval_text(*parameters, text)
+    return f"by hits {by_hits}, by parameters {by_parameters}"
+
+
+def ends_of(estimate: Estimate) -> tuple[float, float, tuple[float, float] | None]:
+    """The ends of its intervals, as `intervals_text` takes them."""
+    return estimate.low, estimate.high, estimate.parameters
+
+
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:
     """A mean ± half the width of its confidence interval, the one meaning of the sign; without it where there is none.
 

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.analysis import base
-from warpimpact.analysis.numbers import interval_text
+from warpimpact.analysis.numbers import interval_text, intervals_text
+from warpimpact.analysis.survival import draws_note, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
+from warpimpact.scene.display import STORED
 from warpimpact.solver.promise import PROMISES, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
@@ -37,11 +39,12 @@ class Spread:
     mean: float
     standard_deviation: float
     interval: tuple[float, float] = (math.nan, math.nan)
+    parameters: tuple[float, float] | None = None
 
     @classmethod
     def of(cls, estimate: Estimate) -> Spread:
         """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
-        return cls(estimate.count, estimate.value, estimate.spread, (estimate.low, estimate.high))
+        return cls(estimate.count, estimate.value, estimate.spread, (estimate.low, estimate.high), estimate.parameters)
 
 
 @dataclass(frozen=True)
@@ -108,13 +111,13 @@ def _base_depth(dataset: Result) -> Spread | None:
         return None
     needed = dataset[[name for name in base.NEEDED if name in dataset]]
     depths = np.concatenate([base.base_depth(part) for part in slices(needed)])
-    return Spread.of(estimate_of("mean", depths, **dealing(dataset)))
+    return Spread.of(over_draws(dataset, estimate_of("mean", depths, **dealing(dataset)), depths))
 
 
 def _broken(dataset: Result) -> int | None:
     if v.BROKEN not in dataset:
         return None
-    return sum(int(part[v.BROKEN].values.sum()) for part in slices(dataset[[v.BROKEN]]))
+    return sum(int(np.nansum(part[v.BROKEN].values)) for part in slices(dataset[[v.BROKEN]]))
 
 
 def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> list[Measure]:
@@ -129,10 +132,21 @@ def means_of(variables: Sequence[v.Variable], standoffs: Sequence[float]) -> lis
 def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 0.95) -> dict[Measure, Estimate]:
     """Measures of a result with their intervals; of an open file only a slice is in memory at a time."""
     tallies = [Tally(measure, **dealing(dataset), confidence=confidence) for measure in measures]
+    drawn: list[list[Any]] = [[] for _ in tallies]
     for part in slices(dataset[[v.STATUS, *(name for name in MEASURED if name in dataset)]]):
-        for tally in tallies:
+        for tally, values in zip(tallies, drawn, strict=True):
             tally.add(part)
-    return {tally.measure: tally.estimate() for tally in tallies}
+            if v.POSTERIOR_DRAW in dataset:
+                values.append(tally.measure.values(part))
+    found = {tally.measure: tally.estimate() for tally in tallies}
+    if v.POSTERIOR_DRAW not in dataset:
+        return found
+    return {
+        one: replace(estimate, parameters=(math.nan, math.nan))  # a quantile does not move as the mean does
+        if one.kind == "quantile"
+        else over_draws(dataset, estimate, np.concatenate(values), units=one.units).within(one.least)
+        for (one, estimate), values in zip(found.items(), drawn, strict=True)
+    }
 
 
 def slices(dataset: Result) -> Iterator[Any]:
@@ -176,11 +190,16 @@ def summary_text(dataset: Result) -> str:
         shown = replace(depth, mean=1e3 * depth.mean, standard_deviation=1e3 * depth.standard_deviation)
         low, high = depth.interval
         rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm", hits))
-    return "\n".join([*rows, *stop_lines(dataset)])
+    notes = (numerics_note(dataset, result.residual_velocity), draws_note(dataset))
+    return "\n".join([*rows, *stop_lines(dataset), *filter(None, notes)])
 
 
-UNITS = {"m s-1": " m/s", "degree": "°", "J": " J", "s": " s", "N m": " N m", "Pa": " Pa", "m": " m", "1": ""}
-"""Units as people write them."""
+def numerics_note(dataset: Result, velocity: Spread) -> str:
+    """That an interval is narrower than what the numerics may be off by; empty where it is not."""
+    error, (low, high) = dataset.attrs.get(attr.RESIDUAL_VELOCITY_ERROR_P90, 0.0), velocity.interval
+    if not 0.5 * (high - low) < error:
+        return ""
+    return f"Intervals are by the hits alone; the numerics may be off by more: {error:.2g} m/s for 90 % of the hits."
 
 
 def stop_lines(dataset: Result) -> list[str]:
@@ -188,11 +207,12 @@ def stop_lines(dataset: Result) -> list[str]:
     told = dataset.attrs
     if attr.STOP_QUANTITY not in told:
         return []
-    (low, high), unit = told[attr.ESTIMATE_INTERVAL], UNITS[told[attr.ESTIMATE_UNITS]]
+    (low, high), unit = told[attr.ESTIMATE_INTERVAL], STORED[told[attr.ESTIMATE_UNITS]]
+    interval = interval_text(unit.factor * low, unit.factor * high, "{:.6g}".format)
     reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told[attr.STOP_REASON]]
     return [
-        f"{told[attr.STOP_QUANTITY]} = {told[attr.ESTIMATE]:.6g}{unit}, {told[attr.CONFIDENCE]:.4g} interval "
-        f"{interval_text(low, high, '{:.6g}'.format)}{unit}; {reason}"
+        f"{told[attr.STOP_QUANTITY]} = {unit.text(told[attr.ESTIMATE], '.6g')}, {told[attr.CONFIDENCE]:.4g} interval "
+        f"{interval}{unit.suffix}; {reason}"
     ]
 
 
@@ -211,6 +231,6 @@ def _count_row(meaning: str, count: int, hits: int) -> str:
 def _spread_row(name: str, spread: Spread, unit: str, hits: int) -> str:
     if spread.count == 0:
         return f"{name:<20}{'-':>8}   no core behind the plate"
-    interval = interval_text(*spread.interval, "{:.2f}".format)
+    interval = intervals_text(*spread.interval, spread.parameters, "{:.2f}".format)
     some = f"   of {spread.count} hits" if spread.count < hits else ""
     return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}{some}"

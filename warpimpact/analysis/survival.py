@@ -7,15 +7,23 @@ has the same draw at every plate of a comparison, and the differences shot by sh
 
 from __future__ import annotations
 
+import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray
 
+from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Array, dealing
-from warpimpact.statistics.random_effects import FEWEST, positive_share
+from warpimpact.statistics.intervals import Estimate
+from warpimpact.statistics.random_effects import FEWEST, interval_of_means, positive_share
+
+if TYPE_CHECKING:
+    import xarray
+
+    from warpimpact.results.table import Result
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,43 @@ class Survival:
         if math.isnan(self.probability) or self.at_least < self.needed <= self.probability:
             return None
         return self.at_least >= self.needed
+
+
+def over_draws(dataset: Result, estimate: Estimate, numbers: Array, *, units: str = "", kind: str = "mean") -> Estimate:
+    """An estimate with its interval by the parameters, where shots draw these from a posterior.
+
+    Args:
+        numbers: of all shots, whose mean moves with the draw as the estimate does, shape [hits].
+        units: of the numbers; with units of a discrepancy that the result asks to count, this adds to every draw.
+        kind: of the estimate; a "quantile" moves as the mean of the numbers.
+    """
+    if v.POSTERIOR_DRAW not in dataset:
+        return estimate
+    counted = dataset.attrs.get(attr.DISCREPANCY_COUNTS, 0)
+    beside = json.loads(dataset.attrs.get(attr.DISCREPANCY, "{}")).get(units, 0.0) if counted else 0.0
+    finite = np.where(np.isinf(numbers), np.nan, numbers)
+    draws = np.asarray(dataset[v.POSTERIOR_DRAW].values)
+    low, high = interval_of_means(finite, draws, images=dealing(dataset)["images"], beside=float(beside))
+    shift = estimate.value - float(np.nanmean(finite)) if kind == "quantile" and np.isfinite(finite).any() else 0.0
+    if not math.isnan(estimate.low + estimate.high):  # the hits leave the number of one draw no more certain than that
+        low, high = min(low, estimate.low - shift), max(high, estimate.high - shift)
+    return replace(estimate, parameters=(low + shift, high + shift))
+
+
+def draws_note(dataset: Result) -> str:
+    """What the two intervals of a result with a posterior are, and whether they count the discrepancy; else empty."""
+    if v.POSTERIOR_DRAW not in dataset:
+        return ""
+    shown = {"m s-1": " m/s", "degree": "°"}
+    sizes = json.loads(dataset.attrs.get(attr.DISCREPANCY, "{}"))
+    told = " and ".join(f"{size:.2g}{shown[unit]}" for unit, size in sizes.items())
+    counts = "counts in them" if dataset.attrs.get(attr.DISCREPANCY_COUNTS) else "does not count in them"
+    found = f"that the fit found, {told}, {counts}" if told else "of the fit is not known"
+    asking = " (warpimpact inspect --discrepancy counts it)" if told and "not" in counts else ""
+    return (
+        "Intervals by hits are of the mean over all draws of the posterior; those by parameters contain the number for "
+        f"95 % of the draws, of which the true material is one. The discrepancy {found}{asking}."
+    )
 
 
 def survival_of(

@@ -35,7 +35,7 @@ from ..scene import (
 from ..scene.distributions import EDGE
 from ..scene.files import InputFile
 from ..scene.model import Model
-from ..scene.quantities import QUANTITIES
+from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range
 from ..scene.symmetry import check_layers, check_scatter
 from ..scene.target import MOST_LAYERS
@@ -331,7 +331,7 @@ class Campaign(Model):
             low, high = distribution.quantile(np.array([EDGE, 1.0 - EDGE]))
             ranges[name] = (float(low), float(high))
         for name, column in (self.hits.listed or {}).items():
-            if name in QUANTITIES:
+            if name in SCATTERED:
                 ranges[name] = (float(column.min()), float(column.max()))
                 try:
                     check_range(name, *ranges[name])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible
-from ..scene.quantities import QUANTITIES
+from ..scene.quantities import SCATTERED
 
 if TYPE_CHECKING:
     from .campaign import Campaign
@@ -59,7 +59,7 @@ def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:
         for standoff in getattr(campaign.output, name):
             yield f"output.{name}", "output.standoffs", standoff
     for name, column in (campaign.hits.listed or {}).items():
-        kind = f"{QUANTITIES[name].table}.{name}" if name in QUANTITIES else "hits"
+        kind = f"{SCATTERED[name].table}.{name}" if name in SCATTERED else "hits"
         ends = [float(column[np.abs(column).argmax()])]
         if kind != "hits":  # which may be as small as it likes
             ends.append(float(column[np.abs(column).argmin()]))

@@ -18,21 +18,16 @@ from numpy.typing import NDArray
 
 from warpimpact.results import posterior as files
 from warpimpact.scene import Interaction, Plate, Sampler, Scene, Shots
+from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 
 Array = NDArray[np.float64]
 
-OF_THE_MATERIAL: tuple[Path, ...] = (
-    ("plate", "resistance"),
-    ("plate", "shear_coefficient"),
-    ("plate", "degradation"),
-    *UNITS_OF_EXPOSURE,
-    ("plate", "degradation_length"),
-    *(("interaction", name) for name in Interaction.model_fields),
-)
+OF_THE_MATERIAL: tuple[Path, ...] = tuple((one.table, name) for name, one in QUANTITIES.items() if one.drawn)
 """What a posterior gives; all else stays that of the campaign."""
-MOST_SCENES = 64
-"""Draws at most where a parameter needs a scene of its own, such as the degradation length."""
+MOST_DRAWS = 64
+"""Draws that a run uses. Several hits of each tell what the parameters and what the hits scatter; a parameter such as
+the degradation length needs a scene for each."""
 _COLUMN = 2**20
 """Of the random numbers that choose the draws; those of quantities that scatter have small ones."""
 
@@ -58,8 +53,12 @@ class Posterior:
     @property
     def draws(self) -> int:
         """How many draws are used."""
-        (count,) = {len(column) for column in self.values.values()}
-        return min(count, MOST_SCENES) if self.of_scene else count
+        return min(MOST_DRAWS, len(next(iter(self.values.values()))))
+
+    @property
+    def discrepancy(self) -> dict[str, float]:
+        """Standard deviations by which the model misses, by units of a Dataset; empty in a file without them."""
+        return {unit: float(size) for unit, size in self.found_with.get("discrepancy", {}).items()}
 
     @property
     def of_scene(self) -> tuple[Path, ...]:
@@ -86,11 +85,19 @@ class Posterior:
                 )
 
     def which(self, seed: int, first: int, count: int) -> NDArray[np.int64]:
-        """Draws of shots from number `first` on: a function of the seed and the number of the shot."""
-        sequence = np.random.SeedSequence(seed, spawn_key=(_COLUMN,))
-        block, within = divmod(first, 4)  # Philox counts in blocks of four
-        uniform = np.random.Generator(np.random.Philox(sequence).advance(block)).random(within + count)[within:]
-        chosen: NDArray[np.int64] = (uniform * self.draws).astype(np.int64)
+        """Draws of shots from number `first` on: a function of the seed and the number of the shot.
+
+        The seed chooses the draws from all of the posterior. Every so many shots in a row have each of them once, in an
+        order of their own.
+        """
+
+        def ordered(key: int, size: int) -> NDArray[np.int64]:
+            return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(_COLUMN, key))).permutation(size)
+
+        used = ordered(0, len(next(iter(self.values.values()))))[: self.draws]
+        blocks = range(first // self.draws, (first + count - 1) // self.draws + 1)
+        places = np.concatenate([ordered(block + 1, self.draws) for block in blocks])
+        chosen: NDArray[np.int64] = used[places[first - blocks.start * self.draws :][:count]]
         return chosen
 
     def scenes(self, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:

@@ -8,7 +8,7 @@ from pydantic import ValidationError
 
 from ..scene import Scatter
 from ..scene.distributions import Distribution
-from ..scene.quantities import QUANTITIES
+from ..scene.quantities import SCATTERED
 from ..scene.units import quantity
 from .problems import sentence
 from .text import CampaignError
@@ -20,7 +20,7 @@ def with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
     if isinstance(tables := data.get("layer"), list):
         data["layer"] = [dict(table) if isinstance(table, dict) else table for table in tables]
     scatter: dict[str, Any] = {}
-    for field, known in QUANTITIES.items():
+    for field, known in SCATTERED.items():
         layers = [_taken(table, field, f"{name}: {place}", k) for k, place, table in _tables(data, field)]
         if any(layers):
             scatter[field] = layers if known.by_layer else layers[0]
@@ -29,7 +29,7 @@ def with_scatter_apart(data: dict[str, Any], name: str) -> dict[str, Any]:
 
 def _tables(data: dict[str, Any], field: str) -> Iterator[tuple[int, str, Any]]:
     """Number, place and table of everything that has a quantity: its table, or the layers from the plate on."""
-    known, behind = QUANTITIES[field], data.get("layer")
+    known, behind = SCATTERED[field], data.get("layer")
     yield 0, known.table, data.get(known.table)
     if known.by_layer and isinstance(behind, list):
         yield from ((k, f"layer[{k - 1}]", table) for k, table in enumerate(behind, start=1))
@@ -45,7 +45,7 @@ def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | Non
     one = value if at is None else value[at] if pair else None
     if not isinstance(one, dict):
         return None
-    known, label = QUANTITIES[field], key if at is None else f"{key}[{at}]"
+    known, label = SCATTERED[field], key if at is None else f"{key}[{at}]"
     given = [*[None] * layer, one] if known.by_layer else one
     try:
         ((_, distribution),) = Scatter.model_validate({field: given}).given.items()

@@ -11,7 +11,7 @@ from pydantic import BaseModel
 
 from ..scene.distributions import PURE_NUMBERS, Distribution
 from ..scene.model import Model
-from ..scene.quantities import QUANTITIES
+from ..scene.quantities import SCATTERED
 from .campaign import Campaign
 
 Schema = dict[str, Any]
@@ -133,7 +133,7 @@ def _take_distributions(schema: Schema) -> None:
     }
     # A file has its distributions in the places of values.
     del schema["properties"]["scatter"], definitions["Scatter"]
-    for name, quantity in QUANTITIES.items():
+    for name, quantity in SCATTERED.items():
         for table in (schema["properties"][quantity.table], {"$ref": "#/$defs/Layer"} if quantity.by_layer else {}):
             for definition in _referred(schema, table):
                 if name in definition["properties"]:

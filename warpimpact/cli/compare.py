@@ -95,7 +95,7 @@ def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
 
     def read(option: str, kind: Any, text: str) -> float:
         try:
-            return float(quantity(kind)(text))
+            return quantity(kind)(text)
         except ValueError as error:
             raise ResultError(f"{option}: {error}") from None
 

@@ -5,7 +5,17 @@ from pathlib import Path
 from typing import Any
 
 from .mistakes import memory_told
-from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite, at_least
+from .options import (
+    Commands,
+    add_campaign,
+    add_command,
+    add_computing,
+    add_count,
+    add_output,
+    add_overwrite,
+    add_posterior,
+    at_least,
+)
 from .paths import check_picture, check_place
 from .progress import show_standing, warn
 from .run import failure_code
@@ -45,6 +55,7 @@ def add_limit(commands: Commands) -> None:
     )
     add_computing(parser)
     add_count(parser)
+    add_posterior(parser)
     parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted search; start a new one if there is none"
     )
@@ -58,9 +69,10 @@ def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.runs.cluster import cluster_team
     from warpimpact.runs.run import run_to_file
     from warpimpact.runs.team import local_team
-    from warpimpact.studies.limit import LimitMap, limits_text, told_of
+    from warpimpact.studies.limit import LimitMap, told_of
+    from warpimpact.studies.limit_text import limits_text
 
-    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count)
+    campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
     picture = output.with_suffix(".png")
     check_place(output)

@@ -65,6 +65,16 @@ def add_device(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_posterior(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--posterior",
+        type=Path,
+        metavar="POSTERIOR.nc",
+        help="draw the parameters of the material of every shot from this posterior, all of them together; written by "
+        "warpimpact identify",
+    )
+
+
 def add_computing(parser: argparse.ArgumentParser) -> None:
     """Where to compute: a device, or the workers of a cluster."""
     add_device(parser)

@@ -103,12 +103,11 @@ def _log_standing() -> "Callable[[Standing], None]":
 def _running(standing: "Standing") -> str:
     """Running estimates and failed shots as one short line."""
     from warpimpact.analysis.numbers import interval_text, plus_minus
-    from warpimpact.analysis.summary import UNITS
 
     def told(measure: "Measure", estimate: "Estimate") -> str:
         if measure.is_binary:  # not in the middle of its interval
             return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, '{:.4g}'.format)})"
-        return plus_minus(estimate, ".5g", ".2g") + UNITS[measure.units]
+        return plus_minus(estimate.times(measure.display.factor), ".5g", ".2g") + measure.display.suffix
 
     parts = [
         f"{measure.text} {told(measure, estimate)}"

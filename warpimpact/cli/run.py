@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 from warpimpact.results import attributes as attr
 
 from .mistakes import memory_told
-from .options import Commands, add_campaign, add_command, add_computing, add_count, add_output, add_overwrite
+from .options import (
+    Commands,
+    add_campaign,
+    add_command,
+    add_computing,
+    add_count,
+    add_output,
+    add_overwrite,
+    add_posterior,
+)
 from .paths import check_place, check_suffix
 from .plain import say
 from .progress import show_standing, warn
@@ -29,13 +38,7 @@ def add_run(commands: Commands) -> None:
     add_output(parser, "RESULT.nc", "result file (default: the campaign's name, in this folder)")
     add_computing(parser)
     add_count(parser)
-    parser.add_argument(
-        "--posterior",
-        type=Path,
-        metavar="POSTERIOR.nc",
-        help="draw the parameters of the material of every shot from this posterior, all of them together; written by "
-        "warpimpact identify",
-    )
+    add_posterior(parser)
     parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted run; start a new one if there is none"
     )

@@ -22,6 +22,11 @@ def add_inspect(commands: Commands) -> None:
     )
     add_result(parser)
     parser.add_argument("--campaign", action="store_true", help="print only the campaign that the result contains")
+    parser.add_argument(
+        "--discrepancy",
+        action="store_true",
+        help="of a run with a posterior: count the discrepancy that the fit found in the intervals by parameters",
+    )
 
 
 def _inspect(arguments: argparse.Namespace) -> None:
@@ -29,7 +34,8 @@ def _inspect(arguments: argparse.Namespace) -> None:
     from warpimpact.results import files
 
     with files.opened(arguments.result) as dataset:
-        print(dataset.attrs[attr.CAMPAIGN] if arguments.campaign else inspect_text(dataset))
+        asked = dataset.assign_attrs({attr.DISCREPANCY_COUNTS: 1}) if arguments.discrepancy else dataset
+        print(dataset.attrs[attr.CAMPAIGN] if arguments.campaign else inspect_text(asked))
 
 
 def add_plot(commands: Commands) -> None:

@@ -21,7 +21,7 @@ from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import variables as v
-from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.measures import STATUSES, Measure, place_of_standoff
 
 Array = NDArray[np.float64]
 
@@ -154,7 +154,7 @@ def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) ->
         return np.asarray(outcomes.status == STATUSES[condition.variable])
     values: Array = getattr(outcomes, condition.variable)
     if condition.standoff is not None:
-        values = values[:, int(np.abs(np.subtract(standoffs, condition.standoff)).argmin())]
+        values = values[:, place_of_standoff(standoffs, condition.standoff)]
     (variable,) = (one for one in v.HIT_NUMBERS if one == condition.variable)
     shown = np.degrees(values) if variable.units == "degree" else values
     return np.asarray(shown > condition.limit if condition.above else shown < condition.limit)

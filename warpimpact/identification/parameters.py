@@ -13,8 +13,9 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError
 from warpimpact.campaign.problems import complaint
 from warpimpact.campaign.text import CampaignError
 from warpimpact.scene import AnyCore, Interaction, Plate
-from warpimpact.scene.distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
+from warpimpact.scene.distributions import EDGE, AnyDistribution, Distribution
 from warpimpact.scene.model import Array, Model
+from warpimpact.scene.scatter import in_si
 from warpimpact.scene.units import quoted
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path
 
@@ -91,7 +92,7 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
         FitError: names the place.
     """
     try:
-        return _DISTRIBUTION.validate_python({name: _in_si(read, name, part) for name, part in given.items()})
+        return _DISTRIBUTION.validate_python(in_si(read, given))
     except ValidationError as error:
         told = error.errors(include_url=False)[0]
         where = ".".join(str(part) for part in told["loc"] if part != given.get("distribution"))
@@ -100,16 +101,6 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
         raise FitError(f"{place}{'.' if where else ''}{where}: {said}") from None
     except ValueError as error:
         raise FitError(f"{place}.{error}") from None
-
-
-def _in_si(read: Any, name: str, part: Any) -> Any:
-    """A parameter of a distribution, which may have the unit of its quantity."""
-    if name in PURE_NUMBERS:
-        return part
-    try:
-        return [read(one) for one in part] if isinstance(part, list) else read(part)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
 
 
 def is_distribution(value: Any) -> bool:

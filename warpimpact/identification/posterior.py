@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -20,6 +21,7 @@ from warpimpact.identification.parameters import Parameter
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior as files
 from warpimpact.results.variables import HIT_Y, HIT_Z
+from warpimpact.scene.display import UNITS
 from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
 
 Array = NDArray[np.float64]
@@ -135,8 +137,11 @@ def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
 
 
 def _described(parameter: Parameter) -> dict[str, str]:
-    units = {"rad": "degree", "": "1", "m/s": "m s-1"}.get(parameter.unit, parameter.unit)
-    return {"units": units, files.PATH: json.dumps(parameter.path), "prior": parameter.prior.model_dump_json()}
+    return {
+        "units": UNITS[parameter.unit].stored,
+        files.PATH: json.dumps(parameter.path),
+        "prior": parameter.prior.model_dump_json(),
+    }
 
 
 def _labels(fit: Fit) -> list[tuple[int, int]]:
@@ -211,7 +216,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         attr.TITLE: fit.title,
         attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact identify",
         files.FIT: fit.text,
-        files.MATERIAL: _material(fit),
+        files.MATERIAL: _material(fit, sampled),
         **made,
         attr.SEED: fit.sampling.seed,
         files.EFFECTIVE: sampled.effective,
@@ -227,10 +232,20 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
     }
 
 
-def _material(fit: Fit) -> str:
+def _material(fit: Fit, sampled: Sampled) -> str:
+    found = discrepancies(fit, sampled.points)
+    sizes = {"m s-1": found.get("velocity"), "degree": found.get("angle")}
+    missed = {unit: _median(size, sampled) for unit, size in sizes.items() if size is not None}
+    missed |= {"degree": math.degrees(missed["degree"])} if "degree" in missed else {}
     scene = fit.scene_of(fit.shots[0])
     plate = scene.target.layers[0].model_dump(include={str(name) for name in _OF_PLATE})
-    return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump()})
+    return json.dumps({"plate": plate, "interaction": scene.interaction.model_dump(), "discrepancy": missed})
+
+
+def _median(values: Array, sampled: Sampled) -> float:
+    """Of the posterior."""
+    order = np.argsort(values)
+    return float(values[order][np.searchsorted(np.cumsum(sampled.weights.values[order]), 0.5)])
 
 
 def is_converged(fit: Fit, sampled: Sampled, noise: float) -> bool:

@@ -23,7 +23,7 @@ from warpimpact.identification.parameters import (
     read_priors,
     with_medians,
 )
-from warpimpact.results.measures import Measure
+from warpimpact.results.measures import Measure, place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
 from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
@@ -75,7 +75,7 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     record = _model(Record, data.get("record", {}), f"{name}: record")
     numerics = _model(Numerics, {"fidelity": "draft"} | _table(data, "numerics", name), f"{name}: numerics")
     shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
-    selection = tuple(_condition(one, f"{name}: selection") for one in _selection(data, name))
+    selection = tuple(_condition(one, record, f"{name}: selection") for one in _selection(data, name))
     if any(one.variable == "bending_stress" for one in selection):
         record = record.model_copy(update={"bending": True})
     kinds = {one.kind for shot in shots for one in shot.observations}
@@ -178,10 +178,12 @@ def _gives(tables: Any, path: Path) -> bool:
     return True
 
 
-def _condition(text: Any, place: str) -> Measure:
+def _condition(text: Any, record: Record, place: str) -> Measure:
     """A condition such as "perforated" or "bending_stress < 1.5 GPa"."""
     try:
         measure = Measure.parse(f"P({text})")
+        if measure.standoff is not None:
+            place_of_standoff(record.standoffs, measure.standoff)
     except ValueError as error:
         raise FitError(f'{place}: {error}; a condition is "perforated" or "bending_stress < 1.5 GPa"') from None
     return measure

@@ -10,23 +10,15 @@ import xarray
 from warpimpact.identification.posterior import LARGEST_NOISE, learnt, together
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior as files
+from warpimpact.scene.display import STORED, Unit
 from warpimpact.statistics.importance import LARGEST_K
-
-UNITS = {
-    "Pa": ("GPa", 1e-9),
-    "m": ("mm", 1e3),
-    "s": ("µs", 1e6),
-    "kg": ("g", 1e3),
-    "degree": ("°", 1.0),
-    "1": ("", 1.0),
-}
-"""Units that people read, and the factor to them."""
 
 
 def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
     """Unit of a parameter as it is shown, and the factor to it."""
     units = str(array.attrs.get("units", "1"))
-    return UNITS.get(units, (units.replace(" s-1", "/s"), 1.0))
+    unit = STORED.get(units, Unit(units, units))
+    return unit.shown, unit.factor
 
 
 def posterior_text(tree: xarray.DataTree) -> str:

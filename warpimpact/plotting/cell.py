@@ -25,7 +25,9 @@ from warpimpact.analysis.summary import breaks_promise
 from warpimpact.kernels.status import LayerStatus
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import outlines, passed
+from warpimpact.results.dataset import passed
+from warpimpact.results.outlines import outlines
+from warpimpact.scene.display import STORED
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -49,17 +51,6 @@ where it did not reach the layer."""
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW, v.LAYER_STANDOFF_PITCH, v.LAYER_STANDOFF_YAW}
 _BEHIND = {v.RESIDUAL_VELOCITY, v.DEFLECTION}  # a ricochet has them, too, but in front of the plate
 _MM = 1e3
-# Units as shown, and the factor from the units of the Dataset.
-_SHOWN_UNITS = {
-    "m s-1": (" m/s", 1.0),
-    "rad s-1": (" rad/s", 1.0),
-    "degree": ("°", 1.0),
-    "J": (" J", 1.0),
-    "s": (" µs", 1e6),
-    "N m": (" N m", 1.0),
-    "Pa": (" GPa", 1e-9),
-    "m": (" mm", 1e3),
-}
 
 
 class Shown(NamedTuple):
@@ -86,7 +77,7 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
         ValueError: the variable cannot be mapped, or the Dataset has no such stand-off or layer.
     """
     array = _selected(dataset, variable, standoff, layer)
-    unit, factor = _SHOWN_UNITS[array.attrs["units"]]
+    unit = STORED[array.attrs["units"]]
     exists = np.isfinite(array.values) & (passed(dataset) if variable in _BEHIND else True)
     title = name = words(
         variable.removeprefix("layer_").removeprefix("standoff_") if variable in v.LAYER_NUMBERS else variable
@@ -99,8 +90,8 @@ def shown(dataset: xarray.Dataset, variable: str, standoff: float | None = None,
         title += f", layer {_number(dataset, layer)}"
     if array.attrs["long_name"] != title:
         title += f"\n{array.attrs['long_name']}"
-    values = np.where(exists, array.values.astype(np.float64) * factor, np.nan)
-    return Shown(values, f"{name} [{unit.strip()}]", title, variable in _SIGNED)
+    values = np.where(exists, array.values.astype(np.float64) * unit.factor, np.nan)
+    return Shown(values, f"{name} [{unit.shown}]", title, variable in _SIGNED)
 
 
 def _number(dataset: xarray.Dataset, layer: int | None) -> int:
@@ -135,9 +126,9 @@ def shots_text(dataset: xarray.Dataset) -> str:
 
 def range_text(array: xarray.DataArray) -> str:
     """The value that all hits share, or the range of the values, with its unit."""
-    unit, factor = _SHOWN_UNITS[array.attrs["units"]]
-    lowest, highest = f"{array.values.min() * factor:.4g}", f"{array.values.max() * factor:.4g}"
-    return f"{lowest}{unit}" if lowest == highest else f"{lowest} to {highest}{unit}"
+    unit = STORED[array.attrs["units"]]
+    lowest, highest = f"{array.values.min() * unit.factor:.4g}", unit.text(array.values.max(), ".4g")
+    return highest if f"{lowest}{unit.suffix}" == highest else f"{lowest} to {highest}"
 
 
 def limits(dataset: xarray.Dataset) -> Array:

@@ -15,13 +15,13 @@ from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
-from warpimpact.studies.limit import QUANTILES, promise_line, quantiles
+from warpimpact.studies.limit import QUANTILES, quantiles
+from warpimpact.studies.limit_text import promise_line, shown_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
-_UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
@@ -60,7 +60,7 @@ def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
 def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
     """Limits of hits at one place, with the secant of the obliquity from the least oblique one on; where all have one
     obliquity, against the inclination of the core."""
-    unit, factor = _UNITS[quantity]
+    unit, factor = shown_unit(quantity)
     figure = Figure(figsize=(7.4, 5.2), layout="constrained")
     axes = figure.subplots()
     value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
@@ -97,7 +97,7 @@ def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
 
 def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
     """The share of the limits up to every value; those beyond the largest value tried keep it below 1."""
-    unit, factor = _UNITS[quantity]
+    unit, factor = shown_unit(quantity)
     found = dataset[v.LIMITS[quantity].value].values
     found = np.sort(found[~np.isnan(found)])
     share = np.arange(1, len(found) + 1) / len(found)

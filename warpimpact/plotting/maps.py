@@ -13,7 +13,15 @@ from matplotlib.figure import Figure
 from warpimpact.analysis.hit_map import is_folded
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.cell import Shown, draw_status, draw_values, limits, scale_of, shots_text, shown, words
-from warpimpact.plotting.distribution import dispersion, is_uncertain, marginals, uncertainty
+from warpimpact.plotting.distribution import (
+    averaged,
+    dispersion,
+    is_drawn,
+    is_uncertain,
+    marginals,
+    mean_and_spread,
+    uncertainty,
+)
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
@@ -39,8 +47,11 @@ _MOST_COLUMNS = 3
 def hit_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """Map of one variable of the Dataset over the hit points; hits without a value are grey.
 
-    Args and errors are those of `cell.shown`.
+    Where hits draw their parameters from a posterior, it shows the mean and the spread at every place. Args and errors
+    are those of `cell.shown`.
     """
+    if is_drawn(dataset):
+        return mean_and_spread(dataset, variable, standoff)
     figure, (axes,) = _sheet_of_one(dataset, maps=1, columns=1)
     _draw(axes, dataset, shown(dataset, variable, standoff))
     return figure
@@ -53,7 +64,7 @@ def hit_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: fl
         datasets: results by the names that their maps get; the others as in `hit_map`.
     """
     figure, panels = _sheet(list(datasets.values()), columns=min(_MOST_COLUMNS, len(datasets)))
-    columns = [shown(dataset, variable, standoff) for dataset in datasets.values()]
+    columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
     scale = scale_of([column.values for column in columns], signed=columns[0].signed)
     last = len(panels) - 1
     for place, (axes, (name, dataset), column) in enumerate(zip(panels, datasets.items(), columns, strict=True)):
@@ -85,7 +96,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
     alike = f"; all {names[int(statuses[0])]}" if len(statuses) == 1 else ""
     figure, panels = _sheet_of_one(dataset, maps=len(columns) + (not alike), columns=2, note=alike)
     for axes, column in zip(panels, columns, strict=False):
-        _draw(axes, dataset, column)
+        _draw(axes, dataset, averaged(dataset, column))
     if not alike:
         draw_status(panels[-1], dataset)
     _share_legend(figure, panels)

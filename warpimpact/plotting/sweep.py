@@ -10,11 +10,12 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.summary import UNITS, estimated
+from warpimpact.analysis.summary import estimated
 from warpimpact.plotting.cell import words
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
+from warpimpact.scene.display import STORED
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -87,12 +88,11 @@ def _label(measure: Measure) -> str:
     if measure.kind == "share":
         return f"share {words(measure.variable)}"
     at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-    return f"mean {words(measure.variable)}{at} [{UNITS[measure.units].strip()}]\nof the cores that passed"
+    return f"mean {words(measure.variable)}{at} [{measure.display.shown}]\nof the cores that passed"
 
 
 def _axis_label(values: xarray.DataArray) -> str:
-    unit = values.attrs.get("units", "1")
-    shown = {"degree": "°", "1": ""}.get(unit, unit.replace(" s-1", "/s"))
+    shown = STORED[values.attrs.get("units", "1")].shown
     return f"{words(str(values.name))} [{shown}]" if shown else words(str(values.name))
 
 
@@ -118,7 +118,7 @@ def _tell_shares(
 def _draw(axes: Axes, places: xarray.DataArray, estimates: Sequence[Estimate], colour: str, label: str) -> None:
     values = np.array([one.value for one in estimates])
     ends = np.array([[one.value - one.low for one in estimates], [one.high - one.value for one in estimates]])
-    x = places.values if places.dtype.kind == "f" else np.arange(len(values))
+    x = places.values * STORED[places.attrs["units"]].factor if places.dtype.kind == "f" else np.arange(len(values))
     bars = np.clip(np.nan_to_num(ends), 0.0, None)
     axes.errorbar(x, values, yerr=bars, fmt="o-", color=colour, capsize=3.0, label=label)
     if places.dtype.kind != "f":

@@ -53,8 +53,16 @@ def weight_figure(comparison: Comparison) -> Figure | None:
     for axes in figure.axes:
         labels |= {label: handle for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(list(labels.values()), list(labels), loc="outside lower center", ncols=4, frameon=False)
-    figure.suptitle("Targets against their weight; 95 % intervals", fontsize="medium")
+    title = "\n".join(["Targets against their weight; 95 % intervals", *_solid_plates(comparison)])
+    figure.suptitle(title, fontsize="medium")
     return figure
+
+
+def _solid_plates(comparison: Comparison) -> list[str]:
+    """What the solid plates are, a line for each material."""
+    told = [plate.solid.partition(" mm of ") for plate in comparison.plates if plate.solid]
+    thicknesses = {material: ", ".join(one for one, _, of in told if of == material) for _, _, material in told}
+    return [f"solid plates: {some} mm of {material}" for material, some in thicknesses.items()]
 
 
 def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:

@@ -17,7 +17,8 @@ from warpimpact.plotting.cell import STATUS_COLOURS, Shown, limits, nearest_hits
 from warpimpact.plotting.poses import Pose, poses_behind, poses_in_plate, silhouette
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import hit_numbers, outlines
+from warpimpact.results.dataset import hit_numbers
+from warpimpact.results.outlines import outlines
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

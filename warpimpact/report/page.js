@@ -13,7 +13,7 @@
   const library = document.createElement("script");
   library.textContent = await unpacked("plotly");
   document.head.append(library);
-  const config = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+  const config = { displaylogo: false, responsive: true, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
   const STATUS = "status", MISSING = "#9e9e9e", CHOSEN = "#d55e00";
   const font = { family: "system-ui, sans-serif", size: 12 };
   // Four digits; less than a thousandth of a unit is rounding.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from base64 import b64encode
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
@@ -21,9 +22,9 @@ from plotly.offline import get_plotlyjs
 
 import warpimpact
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
-from warpimpact.analysis.numbers import interval_text, number_text
+from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.report.words import compared, study_table, told
+from warpimpact.report.words import compared, conclusion, study_table, told
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
@@ -72,10 +73,12 @@ def write_report(
             for hit in followed(hits)
         }
         drawn["first"] = telling(datasets[name], hits)
+    comparison = compared(datasets) if len(datasets) > 1 else None
     page = _page(
         data=data,
         results=[result | {"shown": few.sizes["hit"]} for result, few in zip(results, shown, strict=True)],
-        comparison=compared(datasets) if len(datasets) > 1 else None,
+        comparison=comparison,
+        conclusion=conclusion(results, comparison),
         study=None if study is None else study_table(study),
     )
     with aside(path) as file:
@@ -106,6 +109,11 @@ def telling(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
     return int(hit_numbers(chosen)[np.nanargmax(tilt)]) if np.isfinite(tilt).any() else hits[0]
 
 
+def _without_addresses(script: str) -> str:
+    """A script that names no place in a network but namespaces: of maps, and of where a chart would be uploaded to."""
+    return re.sub(r"https?://(?!www\.w3\.org/)", "", script)
+
+
 def _packed(text: str) -> str:
     """A text compressed by gzip, as base64; the same text gives the same bytes."""
     return b64encode(gzip.compress(text.encode(), mtime=0)).decode()
@@ -119,11 +127,11 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
     return environment.get_template("page.html").render(
         results=results,
         pixels_per_mm=_PLATE_WIDTH / max(result["plate"]["y"] for result in results),
-        plotly=_packed(get_plotlyjs()),
+        plotly=_packed(_without_addresses(get_plotlyjs())),
         packed=_packed(json.dumps(data, separators=(",", ":"), allow_nan=False)),
         variables=data["variables"],
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
-        texts={"number": number_text, "interval": interval_text, "units": SHOWN_UNITS},
+        texts={"number": number_text, "interval": interval_text, "intervals": intervals_text, "units": SHOWN_UNITS},
         **content,
     )

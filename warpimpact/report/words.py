@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 from base64 import b64encode
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
 
+from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
-from warpimpact.analysis.effectiveness import depth_note, effectiveness
-from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.summary import UNITS, estimated, means_of, promise_text, sampling_note, slices
+from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effectiveness
+from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
+from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note, slices
+from warpimpact.analysis.survival import draws_note
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import outlines, passed
+from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.outlines import outlines
 from warpimpact.studies.accuracy import QUANTITIES
 from warpimpact.studies.accuracy_text import study_text
 
@@ -55,6 +59,8 @@ class Row(NamedTuple):
 def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
+    promise = promise_text(dataset)
+    numerics = f"Numerics: {promise}." if promise else "The error of the numerics is not known."
     return {
         "name": name,
         "title": attributes.get(attr.TITLE, "untitled"),
@@ -62,8 +68,9 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "passed": sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])),
         "asked": _asked(dataset),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
-        "promise": promise_text(dataset),
-        "caveats": [*_caveats(dataset), *filter(None, [depth_note(measures)])],
+        "promise": promise,
+        "numerics": numerics,
+        "caveats": [numerics, *_caveats(dataset), *filter(None, [depth_note(measures), solid_note(dataset)])],
         "tables": _tables(dataset),
         "statuses": list(_statuses(dataset)),
         "numbers": list(_numbers(dataset)),
@@ -89,6 +96,23 @@ def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, Any]:
         "head": RANKING_HEAD,
         "picture": b64encode(picture.getvalue()).decode(),
     }
+
+
+def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
+    """What a reader wants first, a sentence each: what passes of every plate, and which plate is best at what."""
+    told = []
+    for result in results:
+        first = next(iter(result["measures"]))
+        interval = intervals_text(first.low, first.high, first.parameters)
+        told.append(
+            f"{result['name']}: {result['passed']} of {result['hits']} cores pass. {first.label}"
+            f"{SHOWN_UNITS[first.units]} {number_text(first.value)}"
+            + ("" if interval == "-" else f" ({interval})")
+            + ("" if math.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's")
+            + f". {result['numerics']}"
+        )
+    best = [] if comparison is None else [f"Best at {label}: {who}." for label, who in comparison["best"]]
+    return [*told, *best]
 
 
 def study_table(study: xarray.Dataset) -> dict[str, Any]:
@@ -131,11 +155,9 @@ def _asked(dataset: xarray.Dataset) -> str:
 
 def _caveats(dataset: xarray.Dataset) -> list[str]:
     """What limits the numbers of a result, a sentence each, beside every table of them."""
-    promise = promise_text(dataset)
-    numerics = "The error of the numerics is not known." if promise is None else f"Numerics: {promise}."
     chance = "Intervals describe the hits that were drawn."
     model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
-    return [sentence for sentence in (chance, sampling_note(dataset), numerics, model) if sentence]
+    return [sentence for sentence in (chance, sampling_note(dataset), draws_note(dataset), model) if sentence]
 
 
 def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
@@ -170,7 +192,9 @@ def _plain(value: object) -> str:
 def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
     for measure, estimate in estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES]).items():
         if estimate.value > 0.0:
-            yield Row(words(measure.variable), f"{estimate.value:.2%}", f"{estimate.low:.2%} to {estimate.high:.2%}")
+            yield Row(
+                words(measure.variable), f"{estimate.value:.2%}", intervals_text(*ends_of(estimate), "{:.2%}".format)
+            )
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
@@ -178,9 +202,8 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
             at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
-            unit = UNITS[measure.units]
-            interval = interval_text(estimate.low, estimate.high, "{:.2f}".format)
-            yield Row(f"mean {words(measure.variable)}{at}", f"{estimate.value:.2f}{unit}", interval)
+            interval = intervals_text(*ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
+            yield Row(f"mean {words(measure.variable)}{at}", measure.display.text(estimate.value, ".2f"), interval)
 
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -23,12 +23,12 @@ _TEXTS = (
     *(attr.MATERIAL, attr.RESOLUTION, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
     *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.LAYERS, attr.PRECISION, attr.MACHINE),
     *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION, attr.SWEEP),
-    attr.BURST,
+    *(attr.BURST, attr.DISCREPANCY),
     *(f"{name}_units" for name in attr.UNITS),
 )
 _TABLES = (
     *(attr.SWEEP, attr.CORE, attr.PLATE, attr.IMPACT, attr.MATERIAL, attr.LAYERS, attr.NUMERICS_GIVEN),
-    *(attr.RESOLUTION, attr.BURST),
+    *(attr.RESOLUTION, attr.BURST, attr.DISCREPANCY),
 )
 """Texts that are JSON objects."""
 _COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS, attr.SHOTS_AT_A_PLATE)
@@ -215,6 +215,8 @@ def _attribute_fault(told: dict[str, Any]) -> str | None:
 
 
 def _is_allowed(name: str, value: Any) -> bool:
+    if name in v.OUTLINE_VARIABLES:
+        return np.asarray(value).dtype.kind == "f"
     if name in _TEXTS:
         return isinstance(value, str) and (name not in _TABLES or _is_table(value))
     if name in _PAIRS:

@@ -7,7 +7,6 @@ and opens with plain ``xarray.open_dataset``.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +16,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.layers import faces, fields, own_columns, sections
+from warpimpact.results.outlines import in_memory, outlines_in
 from warpimpact.results.table import Table
-from warpimpact.scene import Plate
 
 if TYPE_CHECKING:
     import xarray
@@ -94,7 +93,7 @@ def to_table(
 
 def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **told: Any) -> xarray.Dataset:
     """The Dataset of the hit map; the arguments are those of `to_table`."""
-    return to_table(scene, shots, outcomes, **told).to_xarray()
+    return in_memory(to_table(scene, shots, outcomes, **told).to_xarray())
 
 
 def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:
@@ -239,37 +238,6 @@ def _in_units(variable: v.Variable, values: Any) -> Any:
     if getattr(values, "dtype", None) == np.bool_:
         return values.astype(np.int8)  # netCDF has no truth values
     return np.degrees(values) if variable.units == "degree" else values
-
-
-def outlines(dataset: xarray.Dataset, layer: int = 0) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes of a layer, 0 the plate, [m], each of shape (vertex,), by the axis "y" and "z", with a NaN
-    between one and the next.
-
-    Those of a Dataset that was read or chosen without them follow from its plate, as those of layers do. Only those of
-    a mask cannot: they are empty then.
-    """
-    if not layer and v.OUTLINE_Y in dataset.variables:
-        return {axis: dataset[name].values for axis, name in v.OUTLINE.items()}
-    told = json.loads(dataset.attrs.get(attr.LAYERS, "{}")).get(str(layer), {})
-    offset = told.get("offset", (0.0, 0.0))
-    text = json.dumps({name: told[name] for name in Plate.model_fields if name in told}) if layer else None
-    try:
-        plate = Plate.model_validate_json(text or dataset.attrs.get(attr.PLATE, ""))
-    except ValueError:  # without a plate, or the file of its mask
-        return dict.fromkeys(v.OUTLINE, np.empty(0))
-    halves = [0.5 * float(side) for side in dataset.attrs[attr.PLATE_PERIOD]]
-    found = outlines_in(plate, *((-half - at, half - at) for half, at in zip(halves, offset, strict=True)))
-    return {axis: found[name] + at for (axis, name), at in zip(v.OUTLINE.items(), offset, strict=True)}
-
-
-def outlines_in(
-    plate: Plate, y_range: tuple[float, float], z_range: tuple[float, float]
-) -> dict[str, NDArray[np.float64]]:
-    """Outlines of the holes in a rectangle [m], by OUTLINE_VARIABLES, with a NaN between one and the next."""
-    gap = np.full((1, 2), np.nan)
-    rows = [row for outline in plate.pattern.outlines(y_range, z_range) for row in (gap, outline)]
-    vertices = np.concatenate(rows[1:]) if rows else np.empty((0, 2))
-    return {v.OUTLINE_Y: vertices[:, 0], v.OUTLINE_Z: vertices[:, 1]}
 
 
 def status_codes(dataset: Result) -> dict[str, int]:

@@ -8,7 +8,7 @@ import shutil
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import netCDF4
 
@@ -18,6 +18,7 @@ from warpimpact.results.checks import fault, history_fault, packing_fault, study
 from warpimpact.results.dataset import numbered
 from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import write_table
+from warpimpact.results.outlines import in_a_file, in_memory
 from warpimpact.results.table import Table
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
         OutputError: The file cannot be written; what was there before is untouched.
     """
     with uninterrupted(), aside(path) as file:
-        _write(dataset, file)
+        write_table(in_a_file(Table.from_xarray(dataset)), file)
 
 
 def write_shard(table: Table, path: Path, named: Callable[[Path], Path]) -> None:
@@ -56,31 +57,8 @@ def write_shard(table: Table, path: Path, named: Callable[[Path], Path]) -> None
         write_table(table, file, compressed=False)
 
 
-def _write(dataset: xarray.Dataset, file: Path) -> None:
-    """Write a Dataset, with the coordinates that have a group of their own in it."""
-    groups = {group: [name for name in names if name in dataset.coords] for group, names in v.GROUPS.items()}
-    hits = dataset.drop_vars([name for names in groups.values() for name in names])
-    hits.to_netcdf(file, encoding=_encoding(hits), format="NETCDF4", engine="netcdf4")
-    for group, names in groups.items():
-        if names:
-            inner = dataset[names].reset_coords(names).drop_attrs(deep=False)
-            inner.to_netcdf(file, mode="a", group=group, encoding=_encoding(inner), format="NETCDF4", engine="netcdf4")
-
-
 CHUNK = 2**15
 """Hits per chunk of a joined file: 256 KiB of one variable."""
-
-
-def _encoding(dataset: xarray.Dataset) -> dict[str, dict[str, Any]]:
-    """How variables are stored: compressed."""
-    encoding: dict[str, dict[str, Any]] = {
-        str(name): {"zlib": True, "complevel": 1}
-        for name, array in dataset.variables.items()
-        if array.dtype.kind in "if"  # netCDF compresses no strings
-    }
-    for name in dataset.coords:
-        encoding.setdefault(str(name), {})["_FillValue"] = None  # CF: a coordinate has no missing values
-    return encoding
 
 
 @contextmanager
@@ -300,5 +278,6 @@ def _joined(path: Path) -> xarray.Dataset:
     for name in dataset.dims:
         if name != v.HIT and name in dataset.coords:
             dataset = dataset.set_xindex(str(name))
+    dataset = in_memory(dataset)
     dataset.set_close(root.close)
     return dataset

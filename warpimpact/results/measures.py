@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,6 +15,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
+from warpimpact.scene.display import STORED, Unit
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealt, Estimate
 
@@ -23,14 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _KINDS: dict[str, Any] = {
-    "m s-1": Speed,
-    "degree": Angle,
-    "J": Energy,
-    "s": Time,
-    "N m": Moment,
-    "Pa": Stress,
-    "m": Length,
-    "1": Number,
+    quantity(kind).display.stored: kind for kind in (Speed, Angle, Energy, Time, Moment, Stress, Length, Number)
 }
 """Types of the quantities that have these units in the Dataset."""
 _VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in v.SHOT_VARIABLES}
@@ -113,6 +108,11 @@ class Measure:
         return cls(text, kind, name, standoff)
 
     @property
+    def least(self) -> float:
+        """What no value is below."""
+        return -math.inf if self.variable in _SIGNED else 0.0
+
+    @property
     def is_binary(self) -> bool:
         """Whether the values of single shots are 0 or 1."""
         return self.kind in ("probability", "share")
@@ -121,6 +121,11 @@ class Measure:
     def units(self) -> str:
         """Those of the Dataset; "1" for a probability."""
         return "1" if self.is_binary else _VARIABLES[self.variable].units
+
+    @property
+    def display(self) -> Unit:
+        """How its values are shown."""
+        return STORED[self.units]
 
     def in_units(self, value: object) -> float:
         """SI value of a difference of this measure that a user wrote."""
@@ -131,14 +136,18 @@ class Measure:
         return _shown(self.units, value)
 
     def values(self, dataset: Result) -> Array:
-        """The number of every shot, shape [hits]; NaN for a shot that does not count."""
+        """The number of every shot, shape [hits]; NaN for a shot that does not count.
+
+        Raises:
+            ValueError: the result does not have the stand-off.
+        """
         if self.kind == "share" and self.variable == v.BROKEN:
             return np.asarray(dataset[v.BROKEN].values, dtype=np.float64)  # NaN of a failed shot
         if self.kind == "share":
             return np.where(failed(dataset), np.nan, dataset[v.STATUS].values == STATUSES[self.variable])
         column = np.asarray(dataset[self.variable].values)
         if self.standoff is not None:
-            column = column[:, np.abs(dataset[v.STANDOFF].values - self.standoff).argmin()]
+            column = column[:, place_of_standoff(dataset[v.STANDOFF].values, self.standoff)]
         counts = ~failed(dataset) if self.variable in v.LIMIT_VARIABLES else passed(dataset)
         values = np.where(counts, column.astype(np.float64), np.nan)
         if self.kind == "mean":
@@ -147,6 +156,19 @@ class Measure:
             return values
         beyond = values > self.limit if self.above else values < self.limit
         return np.where(np.isnan(values), np.nan, beyond)
+
+
+def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
+    """Place of a stand-off [m] among those that there are.
+
+    Raises:
+        ValueError: it is none of them.
+    """
+    found = np.flatnonzero(np.isclose(distances, standoff, rtol=1e-9, atol=0.0))
+    if not len(found):
+        known = ", ".join(f"{distance * 1e3:g} mm" for distance in distances) or "not given"
+        raise ValueError(f"got {standoff * 1e3:g} mm, but the stand-offs are {known}")
+    return int(found[0])
 
 
 def _shown(units: str, value: float) -> float:
@@ -172,8 +194,7 @@ class Tally:
 
     def estimate(self) -> Estimate:
         """The estimate from the shots so far."""
-        found = self._dealt.estimate()
-        return found if self.measure.variable in _SIGNED else found.within(0.0)
+        return self._dealt.estimate().within(self.measure.least)
 
 
 def dealing(dataset: Result) -> dict[str, Any]:

@@ -82,6 +82,13 @@ class Table:
         """From dimensions, values and attributes of every variable, as xarray takes them."""
         return cls(_columns({**data, **coordinates}), frozenset(coordinates), dict(attrs))
 
+    @classmethod
+    def from_xarray(cls, dataset: xarray.Dataset) -> Table:
+        """That of a Dataset, in memory."""
+        told = {str(name): (one.dims, one.values, one.attrs) for name, one in dataset.variables.items()}
+        coordinates = {name: one for name, one in told.items() if name in dataset.coords}
+        return cls.of({name: one for name, one in told.items() if name not in coordinates}, coordinates, dataset.attrs)
+
     @property
     def sizes(self) -> dict[str, int]:
         """Extents of the dimensions."""

@@ -142,6 +142,7 @@ def described(
         | ({attr.LIGAMENT: ligament} if math.isfinite(ligament) else {})
         | (_symmetry(group, computed) if campaign.hits.irreducible else {})
         | ({} if campaign.burst is None else _burst(campaign.burst))
+        | ({} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)})
         | dict(attributes),
         double=is_double(campaign),
     )

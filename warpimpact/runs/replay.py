@@ -29,6 +29,7 @@ _OF_A_MAP = (
     *(attr.COUNT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.COMPUTED_HITS, attr.IMAGES),
     attr.SHOTS_AT_A_PLATE,
     attr.BURST,
+    *v.OUTLINE_VARIABLES,
 )
 
 

@@ -20,6 +20,7 @@ from warpimpact.results.dataset import failed, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
 from warpimpact.runs.progress import Follow, Standing
 from warpimpact.runs.shards import Parts, claimed, extent, manifest
@@ -56,7 +57,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
         held = _Held(extent(total, campaign.at_a_plate))
         end = _fill(campaign, held, team, progress or (lambda standing: None))
     table = joined(held.load(index) for index in range(end.shards))
-    return table.assign_attrs(_attributes(table, end)).to_xarray()
+    return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
 
 
 def run_to_file(

@@ -29,6 +29,7 @@ from .scene import Record, Scene
 from .shots import Hits, Impact, Shots
 from .symmetry import IDENTITY, Symmetry, symmetries_used
 from .target import Layer, Target
+from .units import Radians
 
 __all__ = [
     "IDENTITY",
@@ -57,6 +58,7 @@ __all__ = [
     "Plate",
     "PolynomialCore",
     "ProfileCore",
+    "Radians",
     "Record",
     "Sampler",
     "Scatter",

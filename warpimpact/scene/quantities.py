@@ -1,5 +1,8 @@
-"""The quantities of a scene that may differ from shot to shot: where a campaign has them, and what may be done with
-them."""
+"""The quantities of a scene that something is done with: where a campaign has them, how they are read, and what may be
+done with each. Their units are in units.py.
+
+Any of them, and all else that a campaign has, may be swept.
+"""
 
 from __future__ import annotations
 
@@ -16,60 +19,85 @@ from .units import (
     NonNegativeStress,
     Number,
     Obliquity,
+    PositiveDensity,
     PositiveLength,
     PositiveMass,
     PositiveSpeed,
     PositiveStress,
+    PositiveTime,
     Tilt,
 )
 
 
 class Quantity(NamedTuple):
-    """A quantity that may differ from shot to shot.
+    """A quantity of a scene.
 
     Attributes:
         table: that of a campaign file which has it; of what layers have, that of the plate.
         type: as it is read.
         by_layer: whether each layer has its own.
+        scatters: whether it may have a distribution, and so differ from shot to shot.
+        listed: whether a list of hits may have it.
+        drawn: whether it may be drawn from a posterior.
     """
 
     table: str
     type: Any
     by_layer: bool = False
+    scatters: bool = True
+    listed: bool = True
+    drawn: bool = False
+
+
+def _of_material(table: str, kind: Any) -> Quantity:
+    """What only a posterior gives shot by shot."""
+    return Quantity(table, kind, scatters=False, listed=False, drawn=True)
 
 
 QUANTITIES: Mapping[str, Quantity] = {
+    "hit_y": Quantity("hits", Length, scatters=False),
+    "hit_z": Quantity("hits", Length, scatters=False),
     "velocity": Quantity("impact", PositiveSpeed),
     "obliquity": Quantity("impact", Obliquity),
     "azimuth": Quantity("impact", Angle),
     "pitch": Quantity("impact", Tilt),
     "yaw": Quantity("impact", Tilt),
     "spin": Quantity("impact", AngularVelocity),
-    "resistance": Quantity("plate", NonNegativeStress, by_layer=True),
-    "shear_coefficient": Quantity("plate", NonNegativeNumber, by_layer=True),
-    "degradation": Quantity("plate", Annotated[Number, Field(ge=0, le=1)], by_layer=True),
+    "resistance": Quantity("plate", NonNegativeStress, by_layer=True, drawn=True),
+    "shear_coefficient": Quantity("plate", NonNegativeNumber, by_layer=True, drawn=True),
+    "degradation": Quantity("plate", Annotated[Number, Field(ge=0, le=1)], by_layer=True, drawn=True),
     "thickness": Quantity("plate", PositiveLength, by_layer=True),
     "mass": Quantity("core", PositiveMass),
     "strength": Quantity("core", PositiveStress),
-    "offset_y": Quantity("layer", Length, by_layer=True),
-    "offset_z": Quantity("layer", Length, by_layer=True),
+    "offset_y": Quantity("layer", Length, by_layer=True, listed=False),
+    "offset_z": Quantity("layer", Length, by_layer=True, listed=False),
+    "degradation_interval": _of_material("plate", PositiveTime),
+    "degradation_distance": _of_material("plate", PositiveLength),
+    "degradation_length": _of_material("plate", PositiveLength),
+    "density": Quantity("plate", PositiveDensity, scatters=False, listed=False),
+    "static": _of_material("interaction", NonNegativeNumber),
+    "linear": _of_material("interaction", NonNegativeNumber),
+    "quadratic": _of_material("interaction", NonNegativeNumber),
+    "onset": _of_material("interaction", NonNegativeNumber),
 }
 """By name."""
+SCATTERED = {name: quantity for name, quantity in QUANTITIES.items() if quantity.scatters}
+LISTED = tuple(name for name, quantity in QUANTITIES.items() if quantity.listed)
 BY_LAYER = tuple(name for name, quantity in QUANTITIES.items() if quantity.by_layer)
-OF_THE_SCENE = tuple(name for name, quantity in QUANTITIES.items() if quantity.table in ("plate", "core"))
+OF_THE_SCENE = tuple(name for name, quantity in SCATTERED.items() if quantity.table in ("plate", "core"))
 """Quantities of plate and core that may differ from shot to shot."""
 
-_DRAWN = [name for name, quantity in QUANTITIES.items() if quantity.table != "layer"]
-_DRAWN_BEHIND = ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
-DRAWN = len(_DRAWN)
+_IN_FRONT = [name for name, quantity in SCATTERED.items() if quantity.table != "layer"]
+_BEHIND = ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
+DRAWN = len(_IN_FRONT)
 """Columns of random numbers that all but the layers behind the plate have."""
 
 
 def drawn_columns(layers: int) -> int:
     """How many columns of random numbers there are for a target of so many layers."""
-    return DRAWN + len(_DRAWN_BEHIND) * (layers - 1)
+    return DRAWN + len(_BEHIND) * (layers - 1)
 
 
 def drawn_column(name: str, layer: int = 0) -> int:
     """The column of random numbers of a quantity. So its draws do not depend on which other quantities scatter."""
-    return drawn_columns(layer) + _DRAWN_BEHIND.index(name) if layer else _DRAWN.index(name)
+    return drawn_columns(layer) + _BEHIND.index(name) if layer else _IN_FRONT.index(name)

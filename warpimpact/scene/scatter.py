@@ -19,7 +19,7 @@ from pydantic import (
 
 from .distributions import EDGE, PURE_NUMBERS, AnyDistribution, Distribution
 from .model import Model
-from .quantities import QUANTITIES, Quantity
+from .quantities import LISTED, QUANTITIES, SCATTERED, Quantity
 from .shots import OF_A_BURST, Shots
 from .units import Radians, in_radians, quantity
 
@@ -38,6 +38,15 @@ def check_range(name: str, low: float, high: float, known: Mapping[str, Quantity
             allowed = error.errors()[0]["msg"].replace("Input should", "it must")
             reached = f"{math.degrees(value):.6g} deg" if read.unit == "rad" else f"{value:.6g}"
             raise ValueError(f"reaches {reached}, but {allowed}") from None
+
+
+def in_si(read: Any, given: Mapping[str, Any]) -> dict[str, Any]:
+    """A distribution as it was given, its parameters in SI; they may have units of the quantity that `read` reads.
+
+    Raises:
+        ValueError: names the parameter.
+    """
+    return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in given.items()}
 
 
 class Scattering(Model):
@@ -89,7 +98,7 @@ class Scatter(Scattering):
     Of what each layer has its own, there is a distribution or None by layer; a distribution alone is that of the plate.
     """
 
-    _quantities = QUANTITIES
+    _quantities = SCATTERED
 
     velocity: AnyDistribution | None = None
     obliquity: AnyDistribution | None = None
@@ -116,7 +125,7 @@ class Scatter(Scattering):
     @property
     def given(self) -> dict[tuple[str, int], Distribution]:
         """The distributions that are given, by name and layer; what is not of a layer stands with the plate, 0."""
-        named = [(name, getattr(self, name)) for name in QUANTITIES]
+        named = [(name, getattr(self, name)) for name in SCATTERED]
         by_layer = [(name, value if isinstance(value, tuple) else (value,)) for name, value in named]
         return {(name, k): one for name, layers in by_layer for k, one in enumerate(layers) if one is not None}
 
@@ -127,10 +136,7 @@ class Scatter(Scattering):
 
 
 def _in_si(known: Quantity, value: Any) -> Any:
-    if not isinstance(value, dict):
-        return value
-    read = quantity(known.type)
-    return {name: part if name in PURE_NUMBERS else _read(read, name, part) for name, part in value.items()}
+    return in_si(quantity(known.type), value) if isinstance(value, dict) else value
 
 
 def _marked(value: Any, mark: Callable[[float], Any]) -> Any:
@@ -144,5 +150,5 @@ def _read(read: Any, name: str, value: Any) -> Any:
         raise ValueError(f"{name}: {error}") from None
 
 
-assert set(QUANTITIES) == set(Scatter.model_fields)
-assert {"hit_y", "hit_z", *QUANTITIES, *OF_A_BURST} == set(Shots.__dataclass_fields__)
+assert set(SCATTERED) == set(Scatter.model_fields)
+assert {*LISTED, *SCATTERED, *OF_A_BURST} == set(Shots.__dataclass_fields__)

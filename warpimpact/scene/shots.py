@@ -13,9 +13,9 @@ from pydantic import Field, model_validator
 from .files import Column, InputFile, read_columns
 from .model import Array, Model
 from .plate import Plate
-from .quantities import BY_LAYER
+from .quantities import BY_LAYER, LISTED, QUANTITIES
 from .target import Target
-from .units import Angle, AngularVelocity, Length, Mass, Number, Obliquity, PositiveSpeed, Speed, Stress, Tilt, quantity
+from .units import Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, quantity
 
 _RIGHT_ANGLE = np.pi / 2
 
@@ -24,32 +24,21 @@ _REPLICATES = 16
 9 % wider than over very many."""
 
 
-_ANGLES = ("obliquity", "azimuth", "pitch", "yaw")
 OF_A_BURST = ("sample", "burst_order", "nearest_earlier_hit")
 """Columns of shots that share their plates."""
 
 
 EXPORTED = {"impact_velocity": "velocity", "impact_pitch": "pitch", "impact_yaw": "yaw"}
 """Names of columns in an exported result, and those of a list of hits."""
-_UNITS: dict[str, Any] = {
-    **dict.fromkeys(("hit_y", "hit_z", "thickness"), Length),
-    **dict.fromkeys(_ANGLES, Angle),
-    "velocity": Speed,
-    "spin": AngularVelocity,
-    "resistance": Stress,
-    "mass": Mass,
-    "shear_coefficient": Number,
-    "degradation": Number,
-}
 
 
 def _in_si(name: str, column: Column, file: str) -> Array:
     """Values of a column of a list of hits in SI and radians; a number without a unit is degrees for an angle."""
-    kind = _UNITS[name]
+    kind = quantity(QUANTITIES[name].type)
     if not column.unit:
-        return np.radians(column.values) if kind is Angle else column.values
+        return np.radians(column.values) if kind.unit == "rad" else column.values
     try:
-        factor = quantity(kind)(f"1 {column.unit}")
+        factor = kind(f"1 {column.unit}")
     except ValueError as error:
         raise ValueError(f"{file}, line 1: {name}: {error}") from None
     values: Array = column.values * factor
@@ -139,7 +128,8 @@ class Hits(Model):
         if self.file is None:
             return None
         required = ("hit_y", "hit_z")
-        columns = read_columns(self.file, required, _listable(required), EXPORTED)
+        optional = tuple(name for name in LISTED if name not in required)
+        columns = read_columns(self.file, required, optional, EXPORTED)
         return {name: _in_si(name, column, self.file.name) for name, column in columns.items()}
 
     @property
@@ -285,9 +275,3 @@ class Shots:
         return type(parts[0])(
             **{name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns}
         )
-
-
-def _listable(required: tuple[str, ...]) -> tuple[str, ...]:
-    """Quantities that a list of hits may have beside those required: one number per shot."""
-    foreign = {*required, *OF_A_BURST}
-    return tuple(f.name for f in fields(Shots) if f.name not in foreign and not f.name.startswith("offset_"))

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from .display import UNITS, Unit
+
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
 _LARGEST = 1e30
@@ -32,7 +34,47 @@ else:
 
 
 class Radians(float):
-    """An angle that was read. A number that a person gives for an angle is degrees; this one stays as it is."""
+    """An angle that was read. A number that a person gives for an angle is degrees; this one stays as it is.
+
+    So do its sums and differences, and its products and quotients with numbers: half an `impact.obliquity` is half the
+    angle wherever it is given. What is added to it is radians.
+    """
+
+    __array_priority__ = 1000.0  # so that numpy's numbers leave what they are combined with to it
+
+    def __add__(self, other: Any) -> Any:
+        return _angle(float(self) + other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return _angle(float(self) - other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return _angle(other - float(self))
+
+    def __mul__(self, other: Any) -> Any:
+        product = float(self) * other
+        return product if isinstance(other, Radians) else _angle(product)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        quotient = float(self) / other
+        return quotient if isinstance(other, Radians) else _angle(quotient)
+
+    def __neg__(self) -> "Radians":
+        return Radians(-float(self))
+
+    def __abs__(self) -> "Radians":
+        return Radians(abs(float(self)))
+
+    def __round__(self, digits: int | None = None) -> Any:  # type: ignore[override]  # else it is a plain float
+        return _angle(round(float(self), digits))
+
+
+def _angle(value: Any) -> Any:
+    return Radians(value) if isinstance(value, Real) else value
 
 
 @dataclass(frozen=True)
@@ -67,6 +109,15 @@ class _Quantity:
     def as_read(self, number: float) -> float:
         """A number in SI as a value that is read as it is."""
         return Radians(number) if self.unit == "rad" else number
+
+    @property
+    def display(self) -> Unit:
+        """How it is stored and shown."""
+        return UNITS[self.unit]
+
+    def text(self, value: float) -> str:
+        """A value in SI as people see it."""
+        return self.display.text(math.degrees(value) if self.unit == "rad" else value)
 
     def _from_text(self, text: str) -> float:
         if len(text) > MOST_QUOTED:
@@ -149,7 +200,9 @@ def _by_pint(unit: str, si_unit: str) -> float:
     except Exception as error:  # pint's parser lets tokenizer, syntax, type and value errors through
         raise LookupError(unit) from error
     try:
-        return float(_registry().Quantity(1.0, parsed).to(si_unit).magnitude)
+        factor = float(_registry().Quantity(1.0, parsed).to(si_unit).magnitude)
+        turns = si_unit == "rad/s" and "radian" not in _registry().get_root_units(parsed)[1]._units
+        return 2.0 * math.pi * factor if turns else factor  # a frequency counts turns
     except pint.DimensionalityError:
         raise ValueError(unit) from None
 

@@ -30,6 +30,8 @@ class Estimate:
     Attributes:
         count: number of shots that count.
         spread: standard deviation over these shots.
+        parameters: interval of the number for the true parameters, which are one draw of a posterior; None where shots
+            draw none, NaN where the hits do not tell it. `low` and `high` are by the drawn hits alone.
     """
 
     value: float
@@ -37,16 +39,24 @@ class Estimate:
     high: float
     count: int
     spread: float
+    parameters: tuple[float, float] | None = None
 
     @property
     def half_width(self) -> float:
         """Half of the interval's length."""
         return 0.5 * (self.high - self.low)
 
+    def times(self, factor: float) -> Self:
+        """The estimate in another unit."""
+        value, low, high, spread = (factor * one for one in (self.value, self.low, self.high, self.spread))
+        parameters = self.parameters and (factor * self.parameters[0], factor * self.parameters[1])
+        return replace(self, value=value, low=low, high=high, spread=spread, parameters=parameters)
+
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate of a number that lies between two others: no end of its interval is beyond them."""
-        low, high = (end if math.isnan(end) else min(max(end, least), most) for end in (self.low, self.high))
-        return replace(self, low=low, high=high)
+        ends = (self.low, self.high, *(self.parameters or ()))
+        low, high, *more = (end if math.isnan(end) else min(max(end, least), most) for end in ends)
+        return replace(self, low=low, high=high, parameters=(more[0], more[1]) if more else None)
 
 
 def estimate_of(kind: str, values: Array, **dealt: Any) -> Estimate:

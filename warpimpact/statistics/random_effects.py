@@ -19,6 +19,10 @@ FEWEST = 8
 """Groups with two numbers or more that are needed."""
 
 
+_FEWEST_FREE = 3.0
+"""Degrees of freedom of a variance that the scatter within groups nearly hides."""
+
+
 class Positive(NamedTuple):
     """Share of the groups whose true mean is positive, and the lower end of its one-sided interval."""
 
@@ -69,6 +73,42 @@ def positive_share(
     share = float(np.mean(_above(*_true_means(found, max(0.0, whole - noise)))))
     at_least = float(ndtr(lowest / math.sqrt(largest))) if largest > 0.0 else float(lowest > 0.0)
     return Positive(share, min(share, at_least))
+
+
+def interval_of_means(
+    numbers: Array,
+    groups: NDArray[np.number],
+    *,
+    images: int = 1,
+    confidence: float = 0.95,
+    beside: float = 0.0,
+) -> tuple[float, float]:
+    """Interval that contains the true means of so many of the groups; NaN if fewer than `FEWEST` groups have two
+    numbers.
+
+    The means of the groups scatter more than the true means. They are drawn together until they have the variance of
+    these (T. A. Louis, Journal of the American Statistical Association 79 (1984) 393). Student's quantile in the place
+    of the normal one allows for the error of that variance, with the degrees of freedom of F. E. Satterthwaite,
+    Biometrics Bulletin 2 (1946) 110.
+
+    Args:
+        numbers, groups, images: as in `positive_share`.
+        beside: standard deviation of something independent that adds to every true mean.
+    """
+    from scipy.special import ndtri, stdtrit
+
+    found = _grouped(numbers, groups, images)
+    if len(found.means) < FEWEST:
+        return math.nan, math.nan
+    whole, noise = float(found.means.var(ddof=1)), float(found.noises.mean())
+    count, tail = len(found.means), 0.5 * (1.0 - confidence)
+    share = max(0.0, whole - noise) / whole if whole > 0.0 else 0.0
+    free = max(_FEWEST_FREE, (count - 1) * share**2)
+    stretch = float(stdtrit(free, tail) / ndtri(tail)) * math.sqrt(1.0 + 1.0 / count)
+    means = found.centre + stretch * math.sqrt(share) * (found.means - found.means.mean())
+    spread = beside * ndtri((np.arange(64) + 0.5) / 64) if beside > 0.0 else np.zeros(1)
+    low, high = np.quantile(np.add.outer(means, spread), [tail, 1.0 - tail], method="hazen")
+    return float(low), float(high)
 
 
 def _grouped(numbers: Array, groups: NDArray[np.number], images: int) -> _Groups:

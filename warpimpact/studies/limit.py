@@ -11,15 +11,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
-from warpimpact.analysis.numbers import interval_text
-from warpimpact.analysis.proxy import proxy
+from warpimpact.analysis.survival import over_draws
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.posterior import Posterior
 from warpimpact.campaign.text import CampaignError
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.limits import solid_limits, with_solid_limits
+from warpimpact.results.limits import with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import HitMap, at_solid, described, pilot_of
@@ -37,7 +39,6 @@ from warpimpact.solver.limit import (
     with_velocity,
 )
 from warpimpact.solver.limit_promise import PILOT, LimitPromise, keep_limits
-from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.resolution import Fidelity
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -47,7 +48,6 @@ if TYPE_CHECKING:
 
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
-_UNITS = {"velocity": ("m/s", 1.0), "thickness": ("mm", 1e3)}
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,8 @@ class LimitMap(HitMap):
         promise: LimitPromise | None = how["promise"]
         device, images = how.get("device", "auto"), len(campaign.symmetries)
         begin = time.perf_counter()
-        limits = self._search(
+        limits = self._search_drawn(
+            campaign.drawn,
             campaign.scene,
             shots[::images],
             campaign.numerics if promise is None else promise.fidelity,
@@ -145,7 +146,8 @@ class LimitMap(HitMap):
         plate, promise, progress, hits = campaign.target.solid, how["promise"], how.get("progress"), found.sizes["hit"]
         scene = campaign.scene.model_copy(update={"target": plate})
         begin = time.perf_counter()
-        limits = replace(self, layer=0)._search(
+        limits = replace(self, layer=0)._search_drawn(
+            campaign.drawn,
             scene,
             at_solid(campaign, how["solid"]),
             campaign.numerics if promise is None else promise.fidelity,
@@ -204,11 +206,36 @@ class LimitMap(HitMap):
         tried = limits.shots.own_of(campaign.target, "thickness", self.layer)
         return with_thickness(self.layer, shots, np.repeat(tried, images))
 
+    def _search_drawn(
+        self, drawn: Posterior | None, scene: Scene, shots: Shots, numerics: Any, progress: Progress | None, **how: Any
+    ) -> Limits:
+        """Limits of shots, some of which may need a scene of their own for their draw of a posterior."""
+        if drawn is None or not drawn.of_scene:
+            return self._search(scene, shots, numerics, progress=progress, **how)
+        places: list[NDArray[np.int64]] = []
+        parts: list[Limits] = []
+        for which, own in drawn.scenes(scene, shots):
+            follow = progress and _from(sum(map(len, places)), len(shots), progress)
+            parts.append(self._search(own, shots[which], numerics, progress=follow, **how))
+            places.append(which)
+        order = np.argsort(np.concatenate(places), kind="stable")
+        numbers = ("value", "lower", "upper", "runs", "converged")
+        return Limits(
+            **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
+            shots=Shots.joined([part.shots for part in parts])[order],
+            outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
+        )
+
     def _search(self, scene: Scene, shots: Shots, numerics: Any, **how: Any) -> Limits:
         how |= {"numerics": numerics, "tolerance": self.tolerance}
         if self.quantity == "velocity":
             return limit_velocity(scene, shots, highest=self.highest, **how)
         return limit_thickness(scene, shots, layer=self.layer, **how)
+
+
+def _from(before: int, total: int, progress: Progress) -> Progress:
+    """The progress of a part of some shots, told as that of all of them."""
+    return lambda done, _: progress(before + done, total)
 
 
 def _of_images(progress: Progress | None, images: int) -> Progress | None:
@@ -245,89 +272,7 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     for name, share in QUANTILES.items():
         estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
         ends = (estimate.value, estimate.low, estimate.high)
+        estimate = over_draws(dataset, estimate, counted, units="m s-1", kind="quantile")
         value_, low, high = (math.inf if end >= highest else end for end in ends)
         found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
     return found
-
-
-_MOST_LISTED = 12
-
-
-def limits_text(dataset: xarray.Dataset) -> str:
-    """What a search found, as a short table: V50 and V05, and every hit of a short list."""
-    told = dataset.attrs
-    quantity = told[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
-    value, lower, upper, runs, converged = (dataset[name].values for name in v.LIMITS[quantity])
-    rows = []
-    if len(value) <= _MOST_LISTED:
-        rows.append(f"{'hit':>4} {'obliquity':>10} {f'limit {quantity}':>16}   between")
-        for hit, obliquity in enumerate(dataset[v.OBLIQUITY].values):
-            ends = f"{factor * lower[hit]:.5g} and {factor * upper[hit]:.5g} {unit}"
-            rows.append(f"{hit:>4} {obliquity:>9.4g}° {factor * value[hit]:>11.5g} {unit:<4}   {ends}")
-        rows += _proxy_lines(dataset)
-    else:
-        for name, estimate in quantiles(dataset).items():
-            ends = interval_text(factor * estimate.low, factor * estimate.high, "{:.5g}".format)
-            what = "perforate" if quantity == "velocity" else "have a smaller limit"
-            share = f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"
-            rows.append(f"{name} = {factor * estimate.value:.5g} {unit}   95 % interval {ends}   ({share})")
-    if broken := int(np.isnan(value).sum()):
-        rows.append(f"{broken} hits failed, and count in none of these numbers")
-    beyond, missed = int(np.isposinf(value).sum()), int((value == 0.0).sum())
-    if beyond:
-        rows.append(f"{beyond} hits have no limit {quantity} up to {factor * told[attr.LIMIT_HIGHEST]:g} {unit}")
-    if missed:
-        rows.append(f"{missed} hits touch no material")
-    if open_ := int((converged == 0).sum()) - int(np.isnan(value).sum()):
-        rows.append(
-            f"{open_} hits were not found to {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
-        )
-    rows += _solid_lines(dataset)
-    rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
-    rows.append(promise_line(dataset))
-    return "\n".join(rows)
-
-
-def _solid_lines(dataset: xarray.Dataset) -> list[str]:
-    """The solid plate that replaces the whole target, and what its search cost; none without one."""
-    reference = solid_limits(dataset)
-    if reference is None:
-        return []
-    quantity = dataset.attrs[attr.LIMIT]
-    unit, factor = _UNITS[quantity]
-    value = reference[v.LIMITS[quantity].value].values
-    found = f"{factor * float(np.nanmean(value)):.5g} {unit}" + (", mean" if len(value) > 1 else "")
-    density = float(dataset.attrs[attr.AREAL_DENSITY])
-    if quantity == "thickness":
-        found += f", {float(np.nanmean(value)) * reference.attrs[attr.LIMIT_DENSITY]:.4g} kg/m²"
-        found += f" (the target as given has {density:.4g} kg/m²)"
-    else:
-        found += f", of {density:.4g} kg/m² as the target"
-    hits = f"{len(value)} hit{'s' if len(value) > 1 else ''}"
-    seconds = float(dataset.attrs[attr.SOLID_LIMIT_TIME])
-    return [f"solid plate in place of the whole target: limit {quantity} {found}; {hits} searched in {seconds:.2g} s"]
-
-
-def _proxy_lines(dataset: xarray.Dataset) -> list[str]:
-    """The proxy beside the limit thickness of a solid plate; none of another search."""
-    found = proxy(dataset) if dataset.attrs[attr.LIMIT] == "thickness" else None
-    if found is None:
-        return []
-    rows = ["proxy: energy over presented area and resistance, as a depth, and its ratio to the limit thickness"]
-    rows.append(f"{'hit':>4} {'inclination':>12} {'proxy':>12}   ratio")
-    for hit, (inclination, depth, ratio) in enumerate(zip(*found, strict=True)):
-        rows.append(f"{hit:>4} {inclination:>11.4g}° {1e3 * depth:>9.4g} mm   {ratio:.3f}")
-    return rows
-
-
-def promise_line(dataset: xarray.Dataset) -> str:
-    """How far off the limits are estimated to be."""
-    told = dataset.attrs
-    unit, factor = _UNITS[told[attr.LIMIT]]
-    of_layer = f"thickness of layer {told[attr.LIMIT_LAYER]}; " if told[attr.LIMIT_LAYER] else ""
-    ends = f"{of_layer}ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
-    if attr.LIMIT_ERROR_SHOWN not in told:
-        return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
-    kept = "" if told[attr.LIMIT_PROMISE_KEPT] else ", more than the fidelity promises"
-    return f"{ends}; against a finer level 90 % of the hits are within {told[attr.LIMIT_ERROR_SHOWN]}{kept}"

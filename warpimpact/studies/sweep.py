@@ -25,11 +25,13 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Impact, Interaction, Plate
+from warpimpact.scene.display import UNITS
 from warpimpact.scene.units import quoted
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys need no table in front of them, as there is no other key of that name."""
 _WHOLE = ("core", "plate", "plate.pattern", "interaction")
+_WHOLE_OF_A_LAYER = re.compile(r"layer\.\d+(\.pattern)?")
 """Tables that may be swept as a whole."""
 _IN_GROUPS = {str(name) for group in v.GROUPS.values() for name in group}
 """Holes and shots at the solid plate, which only the results of the points hold."""
@@ -61,8 +63,10 @@ class Input:
     @property
     def name(self) -> str:
         """Name of the dimension: that of the variable of a hit map that holds the input, else the last part of the
-        key."""
+        key; of a layer the whole key, as "layer_0_thickness"."""
         last = self.key.rpartition(".")[2]
+        if self.key.startswith("layer."):
+            return self.key.replace(".", "_")
         return next((str(one) for one in v.SHOT_VARIABLES if one.field == last), last)
 
 
@@ -132,7 +136,7 @@ def _input(key: str, values: Any, path: str) -> Input:
     place = _resolved(key, path)
     if not isinstance(values, list) or not values:
         raise CampaignError(f"{path}: sweep.{key}: got {quoted(values)}, but it must be a list of values")
-    if place not in _WHOLE:
+    if place not in _WHOLE and not _WHOLE_OF_A_LAYER.fullmatch(place):
         labels = tuple(value if isinstance(value, str) else json.dumps(value, default=str) for value in values)
         given = tuple(values)
     else:
@@ -161,13 +165,23 @@ def _resolved(key: str, path: str) -> str:
 
 def _place(data: dict[str, Any], key: str, value: Any, path: str) -> None:
     """Put a value at its place in a campaign."""
-    *tables, last = key.split(".")
-    for table in tables:
-        inner = data.setdefault(table, {})
-        if not isinstance(inner, dict):
-            raise CampaignError(f"{path}: sweep: {key} leads through {table}, which is no table")
-        data = inner
-    data[last] = value
+    *tables, last = _parts(key)
+    if tables[:1] == ["layer"] and "layer" not in data:
+        raise CampaignError(f"{path}: sweep: got {quoted(key)}, but the campaign has no [[layer]]")
+    inside: Any = data
+    for part in tables:
+        entries: dict[Any, Any] = dict(enumerate(inside)) if isinstance(inside, list) else inside
+        inside = entries.setdefault(part, {} if entries is inside else None)
+        if not isinstance(inside, dict | list):
+            raise CampaignError(f"{path}: sweep: {key} leads through {part}, which is no table")
+    if isinstance(inside, list) and last not in range(len(inside)):
+        raise CampaignError(f"{path}: sweep: {key} leads to {last}, but its list has {len(inside)} entries")
+    inside[last] = value
+
+
+def _parts(key: str) -> list[str | int]:
+    """The parts of a dotted place; a number is that of an entry of a list."""
+    return [int(part) if part.isdecimal() else part for part in key.split(".")]
 
 
 def folder_of(output: Path) -> Path:
@@ -263,10 +277,10 @@ def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
     numbers = [_value(one.key, campaign) for campaign in campaigns]
     if found is None or not all(isinstance(number, int | float) for number in numbers):
         return one.name, np.array(one.labels), {"long_name": one.key}
-    unit = next((_unit(mark) for mark in _marks(found) if _unit(mark) is not None), "") or "1"
-    if unit == "rad":
-        return one.name, np.degrees(np.array(numbers, dtype=float)), {"units": "degree", "long_name": one.key}
-    return one.name, np.array(numbers, dtype=float), {"units": unit.replace("/s", " s-1"), "long_name": one.key}
+    unit = next(filter(None, map(_unit, _marks(found))), "")
+    values = np.array(numbers, dtype=float)
+    told = {"units": UNITS[unit].stored, "long_name": one.key}
+    return one.name, np.degrees(values) if unit == "rad" else values, told
 
 
 def _marks(field: FieldInfo) -> Iterator[Any]:
@@ -281,17 +295,14 @@ def _unit(mark: Any) -> str | None:
 
 
 def _field(key: str, campaign: Campaign) -> FieldInfo | None:
-    *tables, last = key.split(".")
-    model: Any = campaign
-    for table in tables:
-        model = getattr(model, table, None)
-    return getattr(type(model), "model_fields", {}).get(last)
+    table, _, last = key.rpartition(".")
+    return getattr(type(_value(table, campaign)), "model_fields", {}).get(last)
 
 
 def _value(key: str, campaign: Campaign) -> Any:
     value: Any = campaign
-    for part in key.split("."):
-        value = getattr(value, part, None)
+    for part in _parts(key) if key else ():
+        value = value[part] if isinstance(part, int) and isinstance(value, tuple) else getattr(value, str(part), None)
     return value
 
 

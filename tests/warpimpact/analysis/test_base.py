@@ -1,5 +1,6 @@
 """Protection in the base behind a plate: what counts where, by hand; rankings by it; the proxy beside the limit."""
 
+import json
 import math
 from pathlib import Path
 
@@ -19,7 +20,8 @@ from warpimpact.plotting import comparison_figure, weight_figure
 from warpimpact.results.dataset import described
 from warpimpact.results.files import ResultError
 from warpimpact.results.variables import LIMITS, STATUS
-from warpimpact.studies.limit import LimitMap, limits_text
+from warpimpact.studies.limit import LimitMap
+from warpimpact.studies.limit_text import limits_text
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -185,20 +187,28 @@ def test_the_figure_against_weight_shows_the_base_beside_the_solid_plate(make_pl
     assert weight_figure(compare([alone, alone], ["a", "b"])) is None
 
 
-def test_a_solid_plate_that_can_stop_no_core_is_told_of(make_plate_result) -> None:
+def test_what_the_solid_plate_is_stands_beside_the_ratios(make_plate_result) -> None:
     result = layered(make_plate_result(np.zeros(6), 0.0, Status.ARRESTED), np.ones(6, dtype=int), np.full(6, 5e-3))
     solid = result.assign_coords(
         solid_status=("solid_hit", [np.int8(0)]),
         solid_residual_velocity=("solid_hit", [300.0]),
         solid_tilt=(("solid_hit", "standoff"), np.zeros((1, 2))),
     )
-    told = "which weakens by time and so stops no core"
-    by_time = solid.assign_attrs(material='{"degradation": 0.8, "degradation_interval": 1e-6}')
-    assert told in effectiveness_text(by_time)
-    assert told in comparison_text(compare([by_time, by_time], ["a", "b"]))
-    by_path = solid.assign_attrs(material='{"degradation": 0.8, "degradation_distance": 1e-3}')
-    assert told not in effectiveness_text(by_path)
-    assert told not in effectiveness_text(solid.assign_attrs(material='{"degradation": 1.0}'))
+
+    def of(**material: float) -> xarray.Dataset:
+        return solid.assign_attrs(material=json.dumps({"resistance": 2.6e9, "density": 7850.0} | material))
+
+    plate, by_time = "The solid plate is 3 mm of 2.6 GPa, which ", of(degradation=0.8, degradation_interval=1e-6)
+    whole, never = "weakens, through its whole thickness at once, to 0.8 in 1", "it stops no core, however slow"
+    for text in (effectiveness_text(by_time), comparison_text(compare([by_time, by_time], ["a", "b"]))):
+        assert plate + whole in text
+        assert never in text
+    by_path = effectiveness_text(of(degradation=0.8, degradation_distance=1e-3))
+    assert f"{plate}{whole} mm of path" in by_path
+    assert never not in by_path
+    assert f"{plate}does not weaken" in effectiveness_text(of(degradation=1.0))
+    title = weight_figure(compare([by_time, by_time], ["a", "b"])).get_suptitle()
+    assert "solid plates: 3, 3 mm of 2.6 GPa, which weakens, through" in title
 
 
 def test_the_figure_of_limits_stands_over_the_weight_that_the_target_needs(make_plate_result) -> None:

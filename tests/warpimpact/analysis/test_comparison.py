@@ -215,7 +215,7 @@ def test_differences_of_material_are_named(make_plate_result) -> None:
     )
     (note,) = compare([steel, other, plate], ["a", "b", "c"]).notes
     assert note == (
-        "The plates differ in material, which no ranking allows for: resistance (a 2.6e+09 Pa, b 1.8e+09 Pa); "
+        "The plates differ in material, which no ranking allows for: resistance (a 2.6 GPa, b 1.8 GPa); "
         "static (a 1, b 2)."
     )
     assert not compare([steel, steel], ["a", "b"]).notes

@@ -10,6 +10,7 @@ from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiven
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.results.files import ResultError
+from warpimpact.scene import Radians
 
 TRIALS = 100
 LEAST = 88  # 95 % of 100 trials: 95 ± 2.2, three standard deviations below
@@ -44,7 +45,11 @@ def test_what_counts_where(mixed) -> None:
     assert measures["residual_energy_fraction_worst_point"].hit == 1
     assert measures["stopped_share"].value == pytest.approx(2 / 5)
     assert measures["tilted_share"].value == pytest.approx(3 / 5)  # broadside and stopped; not 20°, nor base first
-    assert named(mixed, angle=math.radians(5.0))["tilted_share"].value == pytest.approx(5 / 5)
+    assert named(mixed, angle=5.0)["tilted_share"].value == pytest.approx(5 / 5)
+    assert named(mixed, angle="5 deg") == named(mixed, angle=Radians(math.radians(5.0))) == named(mixed, angle=5.0)
+    with pytest.raises(ResultError, match="angle: got 95, but it must be at least 0 and less than 90 deg"):
+        named(mixed, angle=95)
+    assert named(mixed, standoff="50 mm") == named(mixed, standoff=0.05)
     assert named(mixed, standoff=0.05)["tilted_share"].value == pytest.approx(2 / 5)
 
 
@@ -68,7 +73,7 @@ def test_numbers_without_a_valid_interval_have_none(make_plate_result) -> None:
     assert math.isnan(few[name].low)
     assert many[name].low < many[name].value < many[name].high
     assert math.isnan(many["residual_energy_fraction_worst_point"].low)
-    images = make_plate_result(np.linspace(500.0, 900.0, 400), symmetries="(y, z), (-y, z)")
+    images = make_plate_result(np.linspace(500.0, 900.0, 400), images=2)
     assert math.isnan(named(images)[name].low)
 
 
@@ -117,7 +122,7 @@ def test_a_solid_plate_is_its_own_reference(make_plate_result) -> None:
 
 
 def test_a_stand_off_that_is_not_there_is_refused(mixed) -> None:
-    with pytest.raises(ResultError, match=r"^standoff: got 100 mm, but the result has 50 mm, 130 mm$"):
+    with pytest.raises(ResultError, match=r"^standoff: got 100 mm, but the stand-offs are 50 mm, 130 mm$"):
         effectiveness(mixed, standoff=0.1)
 
 

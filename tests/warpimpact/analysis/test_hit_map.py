@@ -90,7 +90,7 @@ def test_xarray_plots_it(make_result: ResultMaker) -> None:
     [
         ({"variable": "angular_velocity"}, '"angular_velocity" cannot be mapped; choose one of impact_velocity'),
         ({"variable": "hit_y"}, '"hit_y" cannot be mapped'),
-        ({"variable": "tilt", "standoff": 0.2}, "no stand-off of 0.2 m; it has 0.05, 0.13 m"),
+        ({"variable": "tilt", "standoff": 0.2}, "got 200 mm, but the stand-offs are 50 mm, 130 mm"),
         ({"variable": "tilt", "method": "cubic"}, 'method: got "cubic", but it must be "nearest" or "linear"'),
         ({"variable": "status", "method": "linear"}, "codes cannot be interpolated"),
         ({"variable": "tilt", "pixels": 0}, "pixels: got 0, but it must be at least 1"),

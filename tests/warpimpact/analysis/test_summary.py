@@ -32,6 +32,12 @@ def test_counts_every_status(mixed):
     }
 
 
+def test_a_failed_shot_is_no_broken_core(mixed):
+    broken = mixed.assign(broken=("hit", [1.0, 0.0, 1.0, 0.0, np.nan]))
+    assert summary(broken).broken == 2
+    assert "broken" in summary_text(broken)
+
+
 def test_passed_means_perforated_or_missed(mixed):
     assert passed(mixed).tolist() == [True, False, False, True, False]
 

@@ -46,7 +46,7 @@ def test_the_campaigns_are_plausible(path: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         if path.stem == "base_armour":  # its cores were turned by a plate before
-            warnings.filterwarnings("ignore", "hits.file, column yaw: read as 85 deg", Implausible)
+            warnings.filterwarnings("ignore", "hits.file, column yaw: read as 85°", Implausible)
         text = path.read_text(encoding="utf-8")
         read = read_plates if "[[plate]]" in text else read_sweep if "[sweep]" in text else Campaign.from_toml
         read(path)
@@ -65,7 +65,7 @@ def test_the_campaigns_are_plausible(path: Path) -> None:
         ),
         (
             ('resistance = "2600 MPa"', "resistance = 2600"),
-            'plate.resistance: read as 2600 Pa, but 10 to 20000 MPa is usual; "2600 MPa" was probably meant, '
+            'plate.resistance: read as 2600 Pa, but 0.01 to 20 GPa is usual; "2600 MPa" was probably meant, '
             "which needs its unit",
         ),
         (
@@ -75,7 +75,7 @@ def test_the_campaigns_are_plausible(path: Path) -> None:
         ),
         (
             ('velocity = "825 m/s"', 'velocity = "825 m/s"\nyaw = "70 deg"'),
-            "impact.yaw: read as 70 deg, but up to 60 deg is usual",
+            "impact.yaw: read as 70°, but up to 60° is usual",
         ),
     ],
 )

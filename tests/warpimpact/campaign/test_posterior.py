@@ -1,15 +1,20 @@
 """Campaigns with a posterior: every shot draws its parameters from it, all together."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray
 
+from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.summary import summary
+from warpimpact.campaign import posterior as drawing
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
+from warpimpact.plotting import hit_map, overview
 from warpimpact.results import posterior as files
 from warpimpact.results.files import read
 from warpimpact.runs.replay import replay
@@ -46,14 +51,14 @@ time_step = "2 us"
 """
 
 
-def posterior(folder: Path, **of_scene: float) -> Path:
+def posterior(folder: Path, interval: str = "degradation_interval", **of_scene: float) -> Path:
     """A posterior of resistance, friction and interval, where each tells the others; `of_scene` scatters lengths."""
     rng = np.random.default_rng(0)
     share = rng.random(DRAWS)
     columns = {
         "resistance": (["plate", "resistance"], 2e9 + 1e9 * share),
         "shear_coefficient": (["plate", "shear_coefficient"], 0.1 * share),
-        "degradation_interval": (["plate", "degradation_interval"], 1e-6 * (1.0 + share)),
+        interval: (["plate", interval], (1e-6 if interval.endswith("interval") else 1e-3) * (1.0 + share)),
         "spacing_y": (["plate", "pattern", "spacing", 0], 0.02 + share),
         "discrepancy_velocity": (["discrepancy", "velocity"], share),
     }
@@ -64,9 +69,11 @@ def posterior(folder: Path, **of_scene: float) -> Path:
             for name, (path, values) in columns.items()
         }
     )
+    given = {"degradation_distance": "1 mm"} if interval == "degradation_distance" else {}
     material = {
-        "plate": Plate(thickness="9 mm", resistance="2 GPa", degradation=0.8).model_dump(exclude={"pattern"}),
+        "plate": Plate(thickness="9 mm", resistance="2 GPa", degradation=0.8, **given).model_dump(exclude={"pattern"}),
         "interaction": Interaction().model_dump(),
+        "discrepancy": {"m s-1": 7.0, "degree": 3.0},
     }
     told = {files.FIT: "", files.MATERIAL: json.dumps(material), "warpimpact_version": "0"}
     groups = {name: xarray.Dataset({"a": 1}) for name in files.GROUPS} | {"posterior": draws}
@@ -99,6 +106,54 @@ def test_a_draw_is_a_function_of_the_seed_and_the_number(tmp_path: Path) -> None
     assert (whole.resistance == parts.resistance).all()
     other = campaign(tmp_path / "posterior.nc", ("seed = 4", "seed = 5")).sampler().shots(0, 256)
     assert (whole.resistance != other.resistance).mean() > 0.9
+
+
+def test_the_seed_chooses_from_all_draws_and_each_has_as_many_hits(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr(drawing, "MOST_DRAWS", 10)
+    path, used = posterior(tmp_path), []
+    for seed in ("4", "5"):
+        drawn = campaign(path, ("seed = 4", f"seed = {seed}")).sampler().shots(0, 100).posterior_draw
+        places, counts = np.unique(drawn, return_counts=True)
+        assert counts.tolist() == [10] * 10
+        used.append(set(places.tolist()))
+    assert used[0] != used[1]
+    assert max(used[0]) > 10
+
+
+def test_a_mean_has_an_interval_by_hits_and_one_by_parameters(tmp_path: Path) -> None:
+    """Velocities that the draw alone decides: the mean of all hits is certain, that of the true material is not."""
+    result = run(campaign(posterior(tmp_path)), device="cpu")
+    velocity = 700.0 + result["posterior_draw"].values
+    result["residual_velocity"].values[:] = velocity
+    low, high = summary(result).residual_velocity.parameters
+    assert (low, high) == pytest.approx(np.quantile(np.unique(velocity), [0.025, 0.975]), abs=2.0)
+    text = inspect_text(result)
+    assert "by hits 7" in text
+    assert f", by parameters {low:.2f} to {high:.2f}" in text
+    assert "The discrepancy that the fit found, 7 m/s and 3°, does not count in them" in text
+    wider = summary(result.assign_attrs(discrepancy_counts=1)).residual_velocity.parameters
+    assert wider[1] - wider[0] > high - low + 1.0
+    shown = overview(result).axes[0].get_title()
+    assert shown.endswith("mean of hits nearby")
+    assert hit_map(result, "residual_velocity").axes[3].get_ylabel() == "spread over draws and conditions [m/s]"
+
+
+def test_limits_have_both_intervals_too(tmp_path: Path, monkeypatch, capsys) -> None:
+    """Slower cores, that a plate can stop; lengths need a scene for each draw."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(drawing, "MOST_DRAWS", 8)
+    path = posterior(tmp_path, interval="degradation_distance", degradation_length=3e-4)
+    changed = CAMPAIGN.replace("degradation = 0.8", 'degradation = 0.8\ndegradation_distance = "1 mm"')
+    changed = (
+        changed.replace("count = 256", "count = 16")
+        .replace("replicates = 8", "")
+        .replace('"12 mm", "12 mm"', '"60 mm", "60 mm"')
+    )
+    Path("c.toml").write_text(changed, encoding="utf-8")
+    assert main(["limit", "c.toml", "--posterior", path.name, "--tolerance", "20 m/s", "--device", "cpu", "-q"]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"V50 = \d+\S* m/s   95 % interval by hits .* to .*, by parameters \d+.* to ", told)
+    assert "those by parameters contain the number for 95 % of the draws" in told
 
 
 def test_images_share_their_draw(tmp_path: Path) -> None:

@@ -143,6 +143,7 @@ def test_an_altered_result_is_read_or_refused_in_a_sentence(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     draw = random.Random(f"{command} {seed}")
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, *_, **__: figure.draw_without_rendering())
     for attempt in itertools.count():  # some alterations do not fit each other, or netCDF
         try:
             altered(result, draw).to_netcdf("a.nc")
@@ -150,7 +151,8 @@ def test_an_altered_result_is_read_or_refused_in_a_sentence(
             assert attempt < 100
         else:
             break
-    result.to_netcdf("b.nc")
+    if "b.nc" in COMMANDS[command]:
+        result.to_netcdf("b.nc")
     code = main(COMMANDS[command])
     said = capsys.readouterr().err
     assert code in (0, 2, 3), said + "".join(path.read_text() for path in tmp_path.glob("warpimpact_bug_*"))

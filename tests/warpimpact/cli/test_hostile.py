@@ -165,26 +165,30 @@ from warpimpact.cli import main
 from warpimpact.runs.run import run_to_file  # its imports take memory of their own
 from warpimpact.solver.device import find_device
 resource.setrlimit(resource.RLIMIT_DATA, (2**30, 2**30))
-sys.exit(main(sys.argv[1:]))
+for path in sys.argv[1:]:
+    assert main(["run", path, "-o", path + ".nc", "--device", "cpu"]) == 2
 """
 
 
-@pytest.mark.parametrize("case", ["a tiny length", "a long array", "a huge shape", "noise", "nested use"])
-def test_a_hostile_campaign_is_refused_within_a_gibibyte(case: str, tmp_path: Path) -> None:
-    path = tmp_path / "a.toml"
-    if case in CAMPAIGNS:
-        text, expected = CAMPAIGNS[case]
-    else:
-        name, content, expected = FILES[case]
-        (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-        text = listed(name) if name.endswith("csv") else masked(name)
-    path.write_text(text, encoding="utf-8")
-    command = [sys.executable, "-c", LIMITED, "run", str(path), "-o", str(tmp_path / "a.nc"), "--device", "cpu"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-    assert expected in done.stderr
-    assert done.stderr.splitlines()[-1].startswith("warpimpact: error: ")
-    assert "Traceback" not in done.stderr
+def test_hostile_campaigns_are_refused_within_a_gibibyte(tmp_path: Path) -> None:
+    cases = ("a tiny length", "a long array", "a huge shape", "noise", "nested use")
+    paths = [tmp_path / case / "a.toml" for case in cases]
+    for case, path in zip(cases, paths, strict=True):
+        path.parent.mkdir()
+        if case in CAMPAIGNS:
+            text = CAMPAIGNS[case][0]
+        else:
+            name, content, _ = FILES[case]
+            (path.parent / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+            text = masked(name)
+        path.write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, *map(str, paths)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    for case, said in zip(cases, done.stderr.splitlines(), strict=True):
+        assert said.startswith("warpimpact: error: ")
+        assert (CAMPAIGNS | FILES)[case][-1] in said
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", "x" * 5000, "y" * 300, "."])
@@ -250,7 +254,10 @@ def test_a_result_shows_no_control_characters(
     assert capsys.readouterr().out.startswith("$\\frac\\x1b[31m$\n")
 
 
-def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> None:
+def test_a_title_is_no_formula(
+    make_result: Callable[..., xarray.Dataset], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, *_, **__: figure.draw_without_rendering())
     path = tmp_path / "a.nc"
     files.write(make_result(100).assign_attrs(title=r"costs 5 $ or $\notacommand{"), path)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 0
@@ -307,18 +314,23 @@ def test_any_quantity_is_read_or_refused(text: str) -> None:
         assert np.isfinite(quantity(Length)(text))
 
 
+@pytest.fixture
+def written(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> bytes:
+    """A result file."""
+    files.write(make_result(20), tmp_path / "a.nc")
+    return (tmp_path / "a.nc").read_bytes()
+
+
 @SMALL
 @given(st.integers(0, 10**9), st.integers(1, 40), st.booleans())
 def test_a_result_file_with_flipped_bits_is_read_or_refused(
-    make_result: Callable[..., xarray.Dataset],
+    written: bytes,
     tmp_path_factory: pytest.TempPathFactory,
     seed: int,
     flips: int,
     cut: bool,
 ) -> None:
-    path = tmp_path_factory.mktemp("flipped") / "a.nc"
-    files.write(make_result(20), path)
-    data, draw = bytearray(path.read_bytes()), random.Random(seed)
+    data, path, draw = bytearray(written), tmp_path_factory.mktemp("flipped") / "a.nc", random.Random(seed)
     for _ in range(flips):
         data[draw.randrange(len(data))] ^= 1 << draw.randrange(8)
     path.write_bytes(data[: draw.randrange(len(data))] if cut else data)

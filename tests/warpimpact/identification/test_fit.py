@@ -88,6 +88,10 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (("seed = 3", "sets = 3"), "sampling: sets: got 3, but it must be greater than or equal to 64"),
         (("title =", 'selection = ["whole"]\ntitle ='), 'selection: got "whole", but it must be one of perforated'),
         (
+            ("title =", 'selection = ["tilt@20mm < 3 deg"]\ntitle ='),
+            "selection: got 20 mm, but the stand-offs are 50 mm;",
+        ),
+        (
             (RESISTANCE, "resistance = 2e9"),
             "but a prior is a distribution such as",
         ),

@@ -12,7 +12,7 @@ from PIL import Image
 
 from warpimpact.kernels.status import LayerStatus, Status
 from warpimpact.plotting import cell, hit_map, hit_maps, overview, save_beside, save_maps, status_map
-from warpimpact.results.dataset import outlines
+from warpimpact.results.outlines import outlines
 from warpimpact.scene import NoPattern
 
 MIXED = np.array([Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED])
@@ -155,8 +155,8 @@ def test_signed_angles_have_a_neutral_zero(perforated, variable):
 def test_hole_outline_is_white_between_black_on_any_colour(perforated, variable):
     figure = hit_map(perforated, variable)
     (line,) = figure.axes[0].lines
-    np.testing.assert_allclose(line.get_xdata(), perforated["outline_y"] * 1e3)
-    np.testing.assert_allclose(line.get_ydata(), perforated["outline_z"] * 1e3)
+    np.testing.assert_allclose(line.get_xdata(), outlines(perforated)["y"] * 1e3)
+    np.testing.assert_allclose(line.get_ydata(), outlines(perforated)["z"] * 1e3)
     figure.set_dpi(400)
     picture = Picture(figure)
     for z in np.linspace(-1.5, 1.5, 9):
@@ -296,7 +296,7 @@ def test_what_cannot_be_mapped_is_named(perforated, variable):
 
 
 def test_an_absent_standoff_is_named(perforated):
-    with pytest.raises(ValueError, match=r"no stand-off of 0\.2 m; it has 0\.05, 0\.13 m"):
+    with pytest.raises(ValueError, match="got 200 mm, but the stand-offs are 50 mm, 130 mm"):
         hit_map(perforated, "tilt", 0.2)
 
 

@@ -38,6 +38,13 @@ def data_of(path: Path) -> dict:
     return json.loads(gzip.decompress(b64decode(found)))
 
 
+def scripts_of(text: str) -> tuple[str, str]:
+    """Plotly, as the page unpacks it, and the page's own script."""
+    (packed,) = re.findall(r'<script id="plotly" type="application/gzip">(.*?)</script>', text)
+    (own,) = re.findall(r"<script>(.*?)</script>", text, flags=re.DOTALL)
+    return gzip.decompress(b64decode(packed)).decode(), own
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Holds the results of two plates and their report."""
@@ -104,7 +111,10 @@ def test_page_compares_the_plates(folder: Path, make_result: ResultMaker, tmp_pa
     with files.opened(folder / "narrow.nc") as narrow, files.opened(folder / "<b>wide.nc") as wide:
         comparison = compare([narrow, wide], names)
     assert all(f"<p>{sentence}</p>" in text for sentence in conditions(comparison))
+    short = text[: text.index('id="asked"', text.index("<main>"))]
+    assert "narrow: 400 of 400 cores pass. residual energy fraction, mean " in short
     for label, who in best_rows(comparison):
+        assert f"<li>Best at {label}: {who}.</li>" in short
         assert f"<tr><td>{label}</td><td>{who}</td></tr>" in text
     for ranking in rankings(comparison):
         assert f"<caption>{ranking.title}</caption>" in text
@@ -146,6 +156,10 @@ def test_the_first_trajectory_is_the_one_that_tilts_most_and_only_statuses_that_
 
 def test_page_loads_nothing_and_escapes_what_files_say(folder: Path) -> None:
     text = (folder / "a.html").read_text()
+    library, script = scripts_of(text)
+    for part in (library, script, re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)):
+        assert not re.search(r"https?://(?!www\.w3\.org/)", part)
+    assert "showSendToCloud: false" in script
     own = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
     assert not re.search(r'(src|href)="(?!data:|#)', own)
     assert "default-src 'none'" in own

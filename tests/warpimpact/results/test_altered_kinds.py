@@ -27,7 +27,6 @@ def layered() -> xarray.Dataset:
 MAPS: dict[str, tuple[Change, str]] = {
     "a face without the other": (lambda d: d.drop_vars("layer_rear"), 'no variable "layer_rear" beside'),
     "no depth": (lambda d: d.drop_vars("depth"), 'no variable "depth" beside'),
-    "half of the outlines": (lambda d: d.drop_vars("outline_z"), 'no variable "outline_z" beside "outline_y"'),
     "the solid plate along another": (lambda d: d.rename(solid_hit="shot"), "is along"),
 }
 

@@ -2,18 +2,20 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign
+from warpimpact import Campaign, open_result
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import is_choice, outlines, solid_reference
+from warpimpact.results.dataset import is_choice, solid_reference
 from warpimpact.results.measures import dealing
+from warpimpact.results.outlines import outlines
 from warpimpact.runs.run import run
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -70,8 +72,9 @@ def test_holes_follow_from_the_plate_where_the_outlines_were_left_behind(
     result: xarray.Dataset, plain: xarray.Dataset
 ) -> None:
     assert v.OUTLINE_Y not in plain.variables
-    for axis, outline in outlines(plain).items():
-        np.testing.assert_allclose(outline, result[v.OUTLINE[axis]], rtol=1e-12)
+    with xarray.open_dataset(plain.encoding["source"], group="plate") as stored:
+        for axis, outline in outlines(plain).items():
+            np.testing.assert_array_equal(outline, stored[v.OUTLINE[axis]])
     without = plain.drop_attrs().assign_attrs(plate_period=plain.attrs["plate_period"])
     assert [len(outline) for outline in outlines(without).values()] == [0, 0]
 
@@ -131,3 +134,29 @@ def test_a_study_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFi
     for command in ("inspect", "plot", "export"):
         assert main([command, str(tmp_path / "study.nc")]) == 2
         assert "is a study of the numerics, as warpimpact study writes, not a map of hits" in capsys.readouterr().err
+
+
+def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path: Path) -> None:
+    other = run(
+        Campaign.from_text(TEXT.replace("staggered = true", "staggered = false"), name="b", folder=Path()), device="cpu"
+    )
+    for name, one in (("a", result), ("b", other)):
+        files.write(one, tmp_path / f"{name}.nc")
+    with open_result(tmp_path / "a.nc") as a, open_result(tmp_path / "b.nc") as b:
+        lengths = [len(outlines(one)["y"]) for one in (a, b)]
+        along_hits = xarray.concat([a, b], "hit")
+        by_plate = xarray.concat([a, b], "plate")
+    assert lengths[0] != lengths[1]
+    assert along_hits["tilt"].shape == (256, 2)
+    assert by_plate["residual_velocity"].shape == (2, 128)
+    np.testing.assert_array_equal(by_plate["residual_velocity"][1], other["residual_velocity"])
+
+
+def test_the_outlines_of_a_mask_are_kept(make_result: Any, tmp_path: Path) -> None:
+    one = make_result()  # no attribute tells its plate
+    assert one.attrs[v.OUTLINE_Y].shape == (5,)
+    files.write(one, tmp_path / "a.nc")
+    read = files.read(tmp_path / "a.nc")
+    np.testing.assert_array_equal(outlines(read)["y"], one.attrs[v.OUTLINE_Y])
+    read.isel(hit=[1, 3]).to_netcdf(tmp_path / "few.nc")
+    np.testing.assert_array_equal(outlines(files.read(tmp_path / "few.nc"))["z"], one.attrs[v.OUTLINE_Z])

@@ -59,3 +59,8 @@ def test_what_failed_or_stayed_counts_where_it_says() -> None:
         tally = Tally(Measure.parse(text))
         tally.add(mixed)
         assert (tally.estimate().value, tally.estimate().count) == (pytest.approx(value), count), text
+
+
+def test_a_standoff_that_a_result_lacks_is_refused() -> None:
+    with pytest.raises(ValueError, match="got 100 mm, but the stand-offs are 130 mm"):
+        Measure.parse("P(tilt@100mm > 30 deg)").values(shard_of(np.zeros(3)))

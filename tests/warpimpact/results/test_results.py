@@ -2,7 +2,6 @@
 
 import dataclasses
 import os
-from pathlib import Path
 
 import netCDF4
 import numpy as np
@@ -12,6 +11,7 @@ import xarray
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
+from warpimpact.results.outlines import outlines
 from warpimpact.results.variables import (
     BURST_VARIABLES,
     EXIT_VARIABLES,
@@ -49,15 +49,13 @@ CONTRACT = {
     "exit_velocity": (("hit", "axis"), "m s-1"),
     "exit_axis": (("hit", "axis"), "1"),
     "exit_position": (("hit", "axis"), "m"),
-    "outline_y": (("vertex",), "m"),
-    "outline_z": (("vertex",), "m"),
 }
 
 
 def test_variables_are_those_of_the_contract(make_result):
     dataset = make_result()
     assert {name: (array.dims, array.attrs["units"]) for name, array in dataset.variables.items()} == CONTRACT
-    assert set(dataset.coords) == {"hit", "hit_y", "hit_z", "standoff", "axis", "outline_y", "outline_z"}
+    assert set(dataset.coords) == {"hit", "hit_y", "hit_z", "standoff", "axis"}
     assert dataset["hit"].values.tolist() == [0, 1, 2, 3]
     assert all(array.attrs["long_name"] for array in dataset.variables.values())
     assert dataset["axis"].values.tolist() == ["x", "y", "z"]
@@ -128,10 +126,10 @@ def test_attributes_follow_cf_and_carry_the_run(make_result):
 
 
 def test_outlines_are_separated_by_nan(make_result):
-    dataset = make_result(pattern=TWO_HOLES)
+    found = outlines(make_result(pattern=TWO_HOLES))
     right, left = np.array([2.0, 0.0, 0.0, 2.0, 2.0]), np.array([1.0, 1.0, -1.0, -1.0, 1.0])
-    np.testing.assert_allclose(dataset["outline_y"] * 1e3, [*(right + 1.0), np.nan, *(right - 3.0)], atol=1e-12)
-    np.testing.assert_allclose(dataset["outline_z"] * 1e3, [*left, np.nan, *left], atol=1e-12)
+    np.testing.assert_allclose(found["y"] * 1e3, [*(right + 1.0), np.nan, *(right - 3.0)], atol=1e-12)
+    np.testing.assert_allclose(found["z"] * 1e3, [*left, np.nan, *left], atol=1e-12)
 
 
 @pytest.mark.parametrize("pattern", [NoPattern(), TWO_HOLES])
@@ -140,7 +138,8 @@ def test_file_opens_with_plain_xarray_and_is_identical(make_result, tmp_path, pa
     path = tmp_path / "out.nc"
     files.write(dataset, path)
     with xarray.open_dataset(path) as file:
-        xarray.testing.assert_identical(file.load(), dataset.drop_dims("vertex"))
+        kept = {name: value for name, value in dataset.attrs.items() if not name.startswith("outline")}
+        xarray.testing.assert_identical(file.load(), dataset.drop_attrs(deep=False).assign_attrs(kept))
     with xarray.open_datatree(path) as tree:
         assert tree["plate"]["outline_y"].dims == ("vertex",)
     xarray.testing.assert_identical(files.read(path), dataset)
@@ -164,11 +163,11 @@ def test_write_replaces_an_existing_file(make_result, tmp_path):
 def break_off(error: BaseException):
     """A writer that stops half-way, as on a full disk or after Ctrl-C."""
 
-    def to_netcdf(self, path, **_):
-        Path(path).write_bytes(b"half a file")
+    def write_table(table, file, **_):
+        file.write_bytes(b"half a file")
         raise error
 
-    return to_netcdf
+    return write_table
 
 
 @pytest.mark.parametrize(
@@ -183,7 +182,7 @@ def break_off(error: BaseException):
 def test_breaking_off_leaves_the_folder_as_it_was(make_result, tmp_path, monkeypatch, error, raised, before):
     for name, text in before.items():
         (tmp_path / name).write_text(text)
-    monkeypatch.setattr(xarray.Dataset, "to_netcdf", break_off(error))
+    monkeypatch.setattr(files, "write_table", break_off(error))
     with pytest.raises(raised):
         files.write(make_result(), tmp_path / "out.nc")
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == before

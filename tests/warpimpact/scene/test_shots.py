@@ -9,6 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 from warpimpact.scene import CirclePattern, Hits, Impact, Plate, Sampler, make_shots
+from warpimpact.scene.quantities import LISTED, QUANTITIES
+from warpimpact.scene.units import quantity
 
 PERIOD = (16e-3, 8e-3)
 CELL = Plate(thickness="4 mm", resistance=1e9, pattern=CirclePattern(diameter="5 mm", spacing=PERIOD))
@@ -51,6 +53,15 @@ def test_a_grid_has_nearly_square_cells(count: int, shape: tuple[int, int]) -> N
     assert len(points) == len(y) * len(z)
     assert y == pytest.approx(-y[::-1], abs=1e-18)
     assert y[0] == pytest.approx(PERIOD[0] * (0.5 / shape[0] - 0.5), rel=1e-14)
+
+
+def test_a_list_may_have_every_quantity_of_a_shot(tmp_path: Path) -> None:
+    names = [name for name in LISTED if name not in ("hit_y", "hit_z")]
+    (tmp_path / "hits.csv").write_text(f"hit_y,hit_z,{','.join(names)}\n0,0{',0.5' * len(names)}\n")
+    shots = make_shots(Impact(velocity=825), Hits(sampling="list", file=tmp_path / "hits.csv"), CELL)
+    for name in names:
+        in_degrees = quantity(QUANTITIES[name].type).unit == "rad"
+        assert shots.columns[name].item() == (math.radians(0.5) if in_degrees else 0.5), name
 
 
 def test_a_list_gives_its_hits(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Quantities: SI numbers and strings with units come out as SI floats, everything else is refused."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -26,6 +27,8 @@ from warpimpact.scene import units
         (units.Angle, 180, math.pi),
         (units.Angle, "0.1 rad", 0.1),
         (units.AngularVelocity, "60 rpm", 2 * math.pi),
+        (units.AngularVelocity, "2.7 kHz", 5400 * math.pi),  # a frequency counts turns
+        (units.AngularVelocity, "1 deg/s", math.pi / 180),
         (units.Inertia, "1.5 g cm^2", 1.5e-7),
         (units.Number, "5 %", 0.05),
         (units.Number, "0.05", 0.05),
@@ -71,6 +74,27 @@ def test_an_angle_that_was_read_is_not_read_again() -> None:
     assert angle.validate_python(once) == once == pytest.approx(math.radians(20))
     assert angle.validate_json(angle.dump_json(once)) == once
     assert angle.validate_python(angle.dump_python(once)) == once
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        lambda angle: 1.5 * angle,
+        lambda angle: np.float64(3.0) * angle / 2,
+        lambda angle: angle + 0.5 * angle,
+        lambda angle: angle + np.radians(10.0),
+        lambda angle: np.radians(10.0) + angle,
+        lambda angle: -(angle - 2.5 * angle),
+        lambda angle: sum([angle, angle, -angle / 2]),
+        lambda angle: abs(round(-1.5 * angle, 15)),
+    ],
+)
+def test_an_angle_that_was_read_stays_an_angle_in_arithmetic(changed: Callable[[units.Radians], object]) -> None:
+    angle = TypeAdapter(units.Angle)
+    assert angle.validate_python(changed(angle.validate_python(20))) == pytest.approx(math.radians(30), rel=1e-14)
+    assert type(units.Radians(2.0) / units.Radians(1.0)) is float
+    assert isinstance(np.ones(2) * units.Radians(2.0), np.ndarray)
+    assert isinstance(units.Radians(2.0) * np.ones(2), np.ndarray)
 
 
 @pytest.mark.parametrize(("unit", "si_unit"), units.COMMON)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from warpimpact.statistics.random_effects import FEWEST, positive_share
+from warpimpact.statistics.random_effects import FEWEST, interval_of_means, positive_share
 
 TRIALS = 200
 LEAST = 181  # 95 % of 200 trials: 190 ± 3.1, three standard deviations below
@@ -25,6 +25,20 @@ def test_the_share_of_a_known_model(groups: int, shots: int, between: float, mea
         found.append(answer)
     assert np.mean([answer.share for answer in found]) == pytest.approx(known, abs=0.03)
     assert sum(answer.at_least <= known for answer in found) >= LEAST
+
+
+def test_the_interval_of_the_true_means_of_a_known_model() -> None:
+    """64 groups of 16 numbers, which scatter four times as much as the true means."""
+    numbers, covered = np.random.default_rng(7), []
+    of = np.tile(np.arange(64), 16)
+    for _ in range(TRIALS):
+        values = 5.0 + numbers.normal(size=64)[of] + 4.0 * numbers.normal(size=1024)
+        low, high = interval_of_means(values, of)
+        covered.append(ndtr(high - 5.0) - ndtr(low - 5.0))
+    assert np.mean(covered) == pytest.approx(0.95, abs=0.02)
+    wide = interval_of_means(values, of, beside=1.0)
+    assert wide[1] - wide[0] == pytest.approx(np.sqrt(2.0) * (high - low), rel=0.1)
+    assert np.isnan(interval_of_means(values[:64], of[:64])).all()
 
 
 def test_shares_that_seldom_differ() -> None:

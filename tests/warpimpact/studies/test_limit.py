@@ -18,7 +18,8 @@ from warpimpact.runs.team import local_team
 from warpimpact.scene import make_shots
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.studies.limit import LimitMap, limits_text, quantiles, told_of
+from warpimpact.studies.limit import LimitMap, quantiles, told_of
+from warpimpact.studies.limit_text import limits_text
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = """\

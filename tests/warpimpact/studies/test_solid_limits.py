@@ -15,7 +15,8 @@ from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 from warpimpact.runs.team import local_team
-from warpimpact.studies.limit import LimitMap, limits_text
+from warpimpact.studies.limit import LimitMap
+from warpimpact.studies.limit_text import limits_text
 
 LAYER = '[[layer]]\ngap = "60 mm"\nthickness = "2 mm"\nresistance = "2600 MPa"\n'
 TEXT = """\

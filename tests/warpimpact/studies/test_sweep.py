@@ -13,7 +13,7 @@ from warpimpact.plotting.sweep import sweep_figure
 from warpimpact.results import files
 from warpimpact.runs.run import run
 from warpimpact.studies import sweep as module
-from warpimpact.studies.sweep import folder_of, read_sweep, run_sweep
+from warpimpact.studies.sweep import folder_of, joined, read_sweep, run_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 TEXT = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8").replace('"standard"', '"draft"')
@@ -44,6 +44,21 @@ def test_every_point_is_what_its_campaign_gives(folder: Path) -> None:
         for name in ("status", "residual_velocity", "tilt", "exit_velocity"):
             np.testing.assert_array_equal(point[name], alone[name], err_msg=name)
     assert sweep["impact_velocity"].dims == ("hit",)  # which is the same at every point
+
+
+def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
+    layers = '[[layer]]\nthickness = "2 mm"\nresistance = "1 GPa"\n' * 2
+    given = '[sweep]\n"layer.1.thickness" = ["3 mm", "5 mm"]\n"layer.0.pattern" = [{ name = "a", shape = "none" }]\n'
+    (tmp_path / "a.toml").write_text(TEXT.replace("[hits]", f"{layers}[hits]") + given, encoding="utf-8")
+    sweep = read_sweep(tmp_path / "a.toml")
+    assert [one.name for one in sweep.inputs] == ["layer_1_thickness", "layer_0_pattern"]
+    assert [one.layer[1].thickness for one in sweep.campaigns.values()] == [3e-3, 5e-3]
+    found = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
+    assert found["layer_1_thickness"].values.tolist() == [3e-3, 5e-3]
+    assert found["layer_1_thickness"].attrs == {"units": "m", "long_name": "layer.1.thickness"}
+    (tmp_path / "a.toml").write_text(TEXT + given, encoding="utf-8")
+    with pytest.raises(CampaignError, match=r'got "layer.1.thickness", but the campaign has no \[\[layer\]\]'):
+        read_sweep(tmp_path / "a.toml")
 
 
 def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
