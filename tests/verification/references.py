@@ -207,7 +207,7 @@ def depth_of_degradation_residual(
     degradation_depth: float,
     resolution: int = 8,
 ) -> float:
-    """Residual velocity [m/s] with degradation by path at a finite ℓ and a depth d (§4.5), of a plate of any thickness.
+    """Residual velocity [m/s] with degradation by path at a finite ℓ and a depth d (§4.8), of a plate of any thickness.
 
     The core goes straight, so the exposure S needs no velocity. When the tip is at X', station u at depth X' − u
     touches. At (p, x) count those within d of x: the annulus between the stations X' − x − d and X' − x + d, in the
@@ -258,7 +258,7 @@ def depth_of_degradation_residual(
 
 
 def work_of_depth(thickness: float, degradation: float, degradation_distance: float, degradation_depth: float) -> float:
-    """Thickness [m] without degradation of the same work, ℓ → 0 (§4.5): ∫₀^h β^(min(x, d)/Δs) dx."""
+    """Thickness [m] without degradation of the same work, ℓ → 0 (§4.8): ∫₀^h β^(min(x, d)/Δs) dx."""
     decay = -log(degradation) / degradation_distance
     near = min(thickness, degradation_depth)
     return (1 - exp(-decay * near)) / decay + (thickness - near) * exp(-decay * near)
