@@ -38,6 +38,6 @@ clean:
 $(INSTALLED): pyproject.toml Makefile
 	$(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/pip install --quiet --upgrade pip
-	$(VENV)/bin/pip install --quiet --editable '.[dev]'
+	PYTHONWARNINGS='ignore:Editable installation' $(VENV)/bin/pip install --quiet --editable '.[dev]'
 	echo "$(CURDIR)" > "$$($(VENV)/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')/warpimpact.pth"
 	touch $@

@@ -3,6 +3,7 @@
 import os
 import sys
 from importlib.metadata import version as version_of
+from importlib.util import find_spec
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -23,6 +24,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx.ext.doctest",
     "sphinx.ext.mathjax",
+    *(name for name in ["sphinx-mathjax-offline"] if find_spec(name)),  # formulas without a network, of the extra docs
     "from_the_code",
     "from_the_benchmarks",
 ]

@@ -19,10 +19,11 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the bending for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, motion, resistances = core_surface.build(variant), rigid_body.build(variant), damping.build(variant)
-    Surface, Pose = surfaces.Surface, surfaces.Pose
-    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
-    Touches, Footprint, Sums = contact.build(variant).Touches, footprint.build(variant).Footprint, resistances.Sums
+    use = variant.use(core_surface, rigid_body, damping, contact, footprint)
+    Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
+    Body, State, Load = use.rigid_body.Body, use.rigid_body.State, use.rigid_body.Load
+    Change = use.rigid_body.Change
+    Touches, Footprint, Sums = use.contact.Touches, use.footprint.Footprint, use.damping.Sums
 
     @wp.struct
     class Sections:
@@ -64,14 +65,14 @@ def build(variant: Variant) -> SimpleNamespace:
     def mean_force(sums: Sums, dv: vec3, dw: vec3):
         """Force on a ring [N], mean over the step, if the velocities change by (dv, dw) more than foreseen."""
         slopes = sums.slopes
-        return sums.force - half * (resistances.damping_vv(slopes) * dv + resistances.damping_vw(slopes) * dw)
+        return sums.force - half * (use.damping.damping_vv(slopes) * dv + use.damping.damping_vw(slopes) * dw)
 
     @wp.func
     def mean_moment(sums: Sums, dv: vec3, dw: vec3):
         """Moment of a ring about the centre of mass [N m], likewise."""
         slopes = sums.slopes
-        coupled = wp.transpose(resistances.damping_vw(slopes)) * dv
-        return sums.moment - half * (coupled + resistances.damping_ww(slopes) * dw)
+        coupled = wp.transpose(use.damping.damping_vw(slopes)) * dv
+        return sums.moment - half * (coupled + use.damping.damping_ww(slopes) * dw)
 
     @wp.func
     def across(vector: vec3):
@@ -102,8 +103,8 @@ def build(variant: Variant) -> SimpleNamespace:
         a disc, whose axial moment of inertia is twice the transverse one.
         """
         worst = before
-        dv, dw, felt_v, felt_w = motion.velocity_change(body, load, dt)
-        share = motion.restraint_of(body, state, dv, dw)
+        dv, dw, felt_v, felt_w = use.rigid_body.velocity_change(body, load, dt)
+        share = use.rigid_body.restraint_of(body, state, dv, dw)
         gyration = (pose.omega[0] * (body.inertia_axial / body.inertia_transverse - one)) * across(pose.omega)
         spun = pose.omega[0] * across(pose.omega)
         turning = (share / dt) * dw + gyration
@@ -114,10 +115,7 @@ def build(variant: Variant) -> SimpleNamespace:
             here = slot * surface.rings + index
             area = zero
             if index >= found.first_ring and index <= found.last_ring:
-                if wp.static(variant.layered):
-                    area = touches.total_area[here]
-                else:
-                    area = touches.ring_area[here]
+                area = touches.total_area[here]
             if area > zero:
                 sums = touches.sums[here]
                 force += share * mean_force(sums, felt_v - foreseen.velocity, felt_w - foreseen.omega)

@@ -49,58 +49,60 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load in the block layout for one variant: a single plate, float32."""
     real = variant.real
     zero, half = real(0.0), real(0.5)
-    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    memories, resistances, touching, block = (part.build(variant) for part in (exposure, damping, contact, lanes))
-    whole = fixed_point.build(variant)
-    Surface, Pose, Plate, Window = surfaces.Surface, surfaces.Pose, grid.Plate, grid.Window
-    Law, Load, Slopes, Footprint = laws.Law, motion.Load, resistances.Slopes, footprint.build(variant).Footprint
-    Fields, Touches = memories.Fields, touching.Touches
-    reals, integers = memory.build(real), memory.build(wp.int32)
-    read, read_index = reals.read, integers.read
+    use = variant.use(
+        contact, core_surface, damping, exposure, fixed_point, footprint, interaction, lanes, plate_grid, rigid_body
+    )
+    Surface, Pose, Plate = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Plate
+    Window = use.plate_grid.Window
+    Law, Load, Slopes = use.interaction.Law, use.rigid_body.Load, use.damping.Slopes
+    Footprint = use.footprint.Footprint
+    Fields, Touches = use.exposure.Fields, use.contact.Touches
+    read, part_of, read_index = memory.build(real).read, memory.build(real).part_of, memory.build(wp.int32).read
 
     @wp.func
     def own_fields(fields: Fields, slot: wp.int32):
         """The fields of a block alone: exposure and gain in shared memory, the filter's room in that of its slot."""
-        nodes = fields.cells_y * fields.cells_z
         own = fields
         if wp.static(variant.degrades):
-            own.exposure = block.own_exposure(fields.exposure, slot, nodes)
-            own.gain = block.own_gain(fields.gain, slot, nodes)
-            own.filtered = block.own_room(fields.filtered, slot, nodes)
+            own.exposure = use.lanes.own_exposure(fields.exposure, slot, fields.nodes)
+            own.gain = use.lanes.own_gain(fields.gain, slot, fields.nodes)
+            own.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
         return own
 
     @wp.func
     def open_window(
-        plate: Plate, thickness: real, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64
+        plate: Plate, thickness: real, fields: Fields, layer: wp.int32, hit_y: wp.float64, hit_z: wp.float64
     ):
-        """A block's window about a hit, on an untouched plate; `fields` are the block's own."""
-        window = touching.open_window(plate, thickness, fields, 0, hit_y, hit_z)
+        """The window of a layer about a hit, on an untouched plate; `fields` are the block's own."""
+        window = use.exposure.open_window(plate, thickness, fields, layer, hit_y, hit_z)
         if wp.static(variant.degrades):
-            block.barrier()
+            use.lanes.barrier()
         return window
 
     @wp.func
-    def expose(fields: Fields, touches: Touches, base: wp.int32, begin: wp.int32, end: wp.int32, units: real):
+    def expose(
+        fields: Fields, window: Window, touches: Touches, base: wp.int32, begin: wp.int32, end: wp.int32, units: real
+    ):
         """Add the exposure of this lane's patches, of those with begin ≤ j < end, to the plate."""
-        j = begin + block.lane()
+        j = begin + use.lanes.lane()
         while j < end:
             gain = read(touches.gain, base + j)
             if gain > zero:
                 cell = read_index(touches.cell, base + j)
                 y, z = read(touches.y, base + j), read(touches.z, base + j)
-                whole.scatter(fields.gain, fields.cells_z, cell, y, z, gain * units)
-            j += block.count()
+                use.fixed_point.scatter(fields.gain, window.cells_z, cell, y, z, gain * units)
+            j += use.lanes.count()
 
     @wp.func
     def total_slopes(slopes: Slopes):
         """Sum over the lanes."""
         total = Slopes()
-        total.aa = block.total(slopes.aa)
-        total.ar = block.total_pair(slopes.ar)
-        total.rr = block.total_triple(slopes.rr)
-        total.al = block.total_pair(slopes.al)
-        total.rl = block.total_triple(slopes.rl)
-        total.ll = block.total_triple(slopes.ll)
+        total.aa = use.lanes.total(slopes.aa)
+        total.ar = use.lanes.total_pair(slopes.ar)
+        total.rr = use.lanes.total_triple(slopes.rr)
+        total.al = use.lanes.total_pair(slopes.al)
+        total.rl = use.lanes.total_triple(slopes.rl)
+        total.ll = use.lanes.total_triple(slopes.ll)
         return total
 
     @wp.func
@@ -120,34 +122,39 @@ def build(variant: Variant) -> SimpleNamespace:
         load = Load()
         begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
         base = slot * surface.rings * surface.around - begin
-        touching.find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
-        load.touching = block.any_of(touching.meet(plate, touches, base + begin, end - begin) > zero)
+        use.contact.find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
+        load.touching = use.lanes.any_of(use.contact.meet(plate, touches, base + begin, end - begin) > zero)
         if load.touching:
             if wp.static(variant.degrades):
                 coarsest = zero
                 for index in range(found.first_closing, found.last_closing + 1):
                     coarsest = wp.max(coarsest, read(surface.area, index))
-                units = whole.units(law, window, coarsest, wp.length(pose.velocity), dt)
-                expose(fields, touches, base, begin, end, units)
-                block.barrier()
-                whole.measure(fields.gain, window, found.box, units)
-                block.barrier()
-                memories.spread(plate, fields, window, found.box)
-                block.barrier()
-            sums = touching.sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
-            load.force = block.total_triple(sums.force)
-            load.moment = block.total_triple(sums.moment)
+                units = use.fixed_point.units(law, window, coarsest, wp.length(pose.velocity), dt)
+                expose(fields, window, touches, base, begin, end, units)
+                use.lanes.barrier()
+                use.fixed_point.measure(fields.gain, window, found.box, units)
+                use.lanes.barrier()
+                use.exposure.spread(plate, fields, window, found.box)
+                use.lanes.barrier()
+            sums = use.contact.sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
+            load.force = use.lanes.total_triple(sums.force)
+            load.moment = use.lanes.total_triple(sums.moment)
             slopes = total_slopes(sums.slopes)
             load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
-            load.damping_vv = half * resistances.damping_vv(slopes)
-            load.damping_vw = half * resistances.damping_vw(slopes)
-            load.damping_ww = half * resistances.damping_ww(slopes)
+            load.damping_vv = half * use.damping.damping_vv(slopes)
+            load.damping_vw = half * use.damping.damping_vw(slopes)
+            load.damping_ww = half * use.damping.damping_ww(slopes)
             if wp.static(variant.degrades):
-                block.barrier()
-                memories.settle(plate, fields, window, found.box)
-                block.barrier()
+                use.lanes.barrier()
+                use.exposure.settle(plate, fields, window, found.box)
+                use.lanes.barrier()
         return load
 
     return SimpleNamespace(
-        Fields=Fields, own_fields=own_fields, open_window=open_window, load_on=load_on, lane=block.lane
+        Fields=Fields,
+        Touches=Touches,
+        own_fields=own_fields,
+        open_window=open_window,
+        load_on=load_on,
+        lane=use.lanes.lane,
     )

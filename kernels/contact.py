@@ -20,15 +20,14 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
     real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    grips, resistances, memories, block = (part.build(variant) for part in (grip, damping, exposure, lanes))
-    Footprint, Sums = footprint.build(variant).Footprint, resistances.Sums
-    Surface, Pose = surfaces.Surface, surfaces.Pose
-    Plate, Fields, Window = grid.Plate, memories.Fields, grid.Window
-    Law, Load = laws.Law, motion.Load
-    ring_of, patch_at = surfaces.ring_of, surfaces.patch_at
-    reals, integers = memory.build(real), memory.build(wp.int32)
-    read, write, read_index, write_index = reals.read, reals.write, integers.read, integers.write
+    use = variant.use(core_surface, damping, exposure, footprint, grip, interaction, lanes, plate_grid, rigid_body)
+    Footprint, Sums = use.footprint.Footprint, use.damping.Sums
+    Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
+    Plate, Fields, Window = use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
+    Law, Load = use.interaction.Law, use.rigid_body.Load
+    ring_of, patch_at = use.core_surface.ring_of, use.core_surface.patch_at
+    read, write = memory.build(real).read, memory.build(real).write
+    read_index, write_index = memory.build(wp.int32).read, memory.build(wp.int32).write
 
     @wp.struct
     class Touches:
@@ -39,7 +38,7 @@ def build(variant: Variant) -> SimpleNamespace:
         of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
         planes. `ring_area` is the area of all
         patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
-        `total_area` is the area of a ring in all layers of a target.
+        `total_area` is the area of a ring in all layers of the target.
         """
 
         area: wp.array(dtype=real)
@@ -54,16 +53,6 @@ def build(variant: Variant) -> SimpleNamespace:
         ring_area: wp.array(dtype=real)
         sums: wp.array(dtype=Sums)
         total_area: wp.array(dtype=real)
-
-    @wp.func
-    def open_window(
-        plate: Plate, thickness: real, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64
-    ):
-        """A slot's window about a hit, on an untouched plate."""
-        window = grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
-        if wp.static(variant.degrades):
-            memories.blank(fields, window)
-        return window
 
     @wp.func
     def find_touches(
@@ -81,45 +70,45 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """Fill in the touches of the patches begin ≤ j < end, from index `base` + begin on, as if there were material
         everywhere."""
-        per_node = laws.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
+        per_node = use.interaction.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
         # A ring outside the slab, between others, may be outside the window, too. It touches nothing.
         last_cell = window.first + (window.cells_y - 1) * window.cells_z - 2
         j = begin
         if wp.static(variant.window > 0):
-            j += block.lane()
+            j += use.lanes.lane()
         while j < end:
             ring = ring_of(surface, pose, j)
             patch = patch_at(pose, ring, read(surface.cosine, j), read(surface.sine, j))
-            grip = grips.grip_of(law, pose, ring, patch)
-            face = grips.face_of(ring, patch, grip.shift)
-            immersed = surfaces.immersed_area(pose, ring, patch, window.thickness, dt)
+            grip = use.grip.grip_of(law, pose, ring, patch)
+            face = use.grip.face_of(ring, patch, grip.shift)
+            immersed = use.core_surface.immersed_area(pose, ring, patch, window.thickness, dt)
             if wp.static(variant.rimmed):
-                immersed *= grid.on_plate(plate, window, patch.y, patch.z)
+                immersed *= use.plate_grid.on_plate(plate, window, patch.y, patch.z)
             area = grip.share * immersed
             write(touches.area, base + j, area)
-            slope = laws.steady_slope(law, grip.share, grip.slope, face.closing)
+            slope = use.interaction.steady_slope(law, grip.share, grip.slope, face.closing)
             write(touches.slope, base + j, slope * immersed)
             write(touches.shift, base + j, grip.shift)
-            write(touches.gain, base + j, per_node * area * wp.abs(grips.normal_along_x(pose, patch, face)))
-            write_index(touches.tile, base + j, grid.tile_at(plate, window, patch.y, patch.z))
-            cell = grid.cell_at(window, patch.y, patch.z)
+            write(touches.gain, base + j, per_node * area * wp.abs(use.grip.normal_along_x(pose, patch, face)))
+            write_index(touches.tile, base + j, use.plate_grid.tile_at(plate, window, patch.y, patch.z))
+            cell = use.plate_grid.cell_at(window, patch.y, patch.z)
             index = wp.clamp(cell.index, window.first, last_cell)
             if wp.static(variant.deep):
-                plane = grid.planes_at(window, patch.x)
+                plane = use.plate_grid.planes_at(window, patch.x)
                 write(touches.x, base + j, plane - wp.floor(plane))
                 index += wp.int32(wp.floor(plane)) * window.nodes
             write_index(touches.cell, base + j, index)
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
             if wp.static(variant.window > 0):
-                j += block.count()
+                j += use.lanes.count()
             else:
                 j += 1
 
     @wp.func
     def meet(plate: Plate, touches: Touches, first: wp.int32, count: wp.int32):
         """Restrict touches to material, from index `first` on; return the area that presses on it [m²]."""
-        return grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
+        return use.plate_grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
 
     @wp.func
     def expose(surface: Surface, fields: Fields, window: Window, touches: Touches, first: wp.int32):
@@ -135,9 +124,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 gain = read(touches.gain, i)
                 if wp.static(variant.deep):
                     ahead = read(touches.x, i) * gain
-                    memories.scatter(fields.gain, fields.cells_z, cell + window.nodes, y, z, ahead)
+                    use.exposure.scatter(fields.gain, window.cells_z, cell + window.nodes, y, z, ahead)
                     gain -= ahead
-                memories.scatter(fields.gain, fields.cells_z, cell, y, z, gain)
+                use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, gain)
             j += 1
 
     def summing(weakened: bool) -> Any:
@@ -165,26 +154,26 @@ def build(variant: Variant) -> SimpleNamespace:
             llcc, llcs, llss = real(0.0), real(0.0), real(0.0)
             j = begin
             if wp.static(variant.window > 0):
-                j += block.lane()
+                j += use.lanes.lane()
             while j < end:
                 ring = ring_of(surface, pose, j)
                 cosine, sine = read(surface.cosine, j), read(surface.sine, j)
                 patch = patch_at(pose, ring, cosine, sine)
-                face = grips.face_of(ring, patch, read(touches.shift, base + j))
+                face = use.grip.face_of(ring, patch, read(touches.shift, base + j))
                 left = one
                 if wp.static(weakened):
                     cell = read_index(touches.cell, base + j)
                     y, z = read(touches.y, base + j), read(touches.z, base + j)
-                    exposed = memories.gather(fields.exposure, fields.cells_z, cell, y, z)
+                    exposed = use.exposure.gather(fields.exposure, window.cells_z, cell, y, z)
                     if wp.static(variant.deep):
-                        ahead = memories.gather(fields.exposure, fields.cells_z, cell + window.nodes, y, z)
+                        ahead = use.exposure.gather(fields.exposure, window.cells_z, cell + window.nodes, y, z)
                         exposed = wp.max(zero, exposed + read(touches.x, base + j) * (ahead - exposed))
-                    left = laws.remaining(law, exposed)
+                    left = use.interaction.remaining(law, exposed)
                 area = left * read(touches.area, base + j)
-                stress = laws.normal_stress(law, face.closing)
+                stress = use.interaction.normal_stress(law, face.closing)
                 slope = left * read(touches.slope, base + j) * stress
                 if wp.static(variant.rate_dependent):
-                    slope += area * laws.stress_slope(law, face.closing)
+                    slope += area * use.interaction.stress_slope(law, face.closing)
                 # Traction = stress × (−n + η t), t against the sliding velocity.
                 f_axial, f_outward, f_around = -face.axial, -face.outward, -face.around
                 if wp.static(variant.rubs):
@@ -192,7 +181,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     s_outward = patch.velocity_outward - face.closing * face.outward
                     s_around = patch.velocity_around - face.closing * face.around
                     sliding = wp.sqrt(s_axial * s_axial + s_outward * s_outward + s_around * s_around)
-                    rubbing = laws.friction_per_speed(law, sliding, pose.speed)
+                    rubbing = use.interaction.friction_per_speed(law, sliding, pose.speed)
                     f_axial -= rubbing * s_axial
                     f_outward -= rubbing * s_outward
                     f_around -= rubbing * s_around
@@ -225,7 +214,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 llcs += turn * kc * sine
                 llss += turn * ks * sine
                 if wp.static(variant.window > 0):
-                    j += block.count()
+                    j += use.lanes.count()
                 else:
                     j += 1
             sums = Sums()
@@ -262,11 +251,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def keep_sums(touches: Touches, index: wp.int32, sums: Sums):
         """Keep what the second pass sums over a ring, of all layers together."""
-        if wp.static(variant.layered):
-            touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
-            touches.sums[index] = resistances.joined(touches.sums[index], sums)
-        else:
-            touches.sums[index] = sums
+        touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
+        touches.sums[index] = use.damping.joined(touches.sums[index], sums)
 
     @wp.func
     def summed(
@@ -326,32 +312,33 @@ def build(variant: Variant) -> SimpleNamespace:
                     for index in range(first, last + 1):
                         if touches.ring_area[slot * surface.rings + index] > zero:
                             expose(surface, fields, window, touches, base + index * surface.around)
-                    memories.spread(plate, fields, window, found.box)
+                    use.exposure.spread(plate, fields, window, found.box)
             sums = Sums()
             if wp.static(variant.bends):
                 for index in range(first, last + 1):
                     if touches.ring_area[slot * surface.rings + index] > zero:
                         part = summed(surface, law, fields, window, touches, pose, base, index, index)
                         keep_sums(touches, slot * surface.rings + index, part)
-                        sums = resistances.joined(sums, part)
+                        sums = use.damping.joined(sums, part)
             else:
                 sums = summed(surface, law, fields, window, touches, pose, base, first, last)
             load.force = sums.force
             load.moment = sums.moment
             slopes = sums.slopes
             load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
-            load.damping_vv = half * resistances.damping_vv(slopes)
-            load.damping_vw = half * resistances.damping_vw(slopes)
-            load.damping_ww = half * resistances.damping_ww(slopes)
+            load.damping_vv = half * use.damping.damping_vv(slopes)
+            load.damping_vw = half * use.damping.damping_vw(slopes)
+            load.damping_ww = half * use.damping.damping_ww(slopes)
             if wp.static(variant.degrades):
                 if weakens(window):
-                    memories.settle(plate, fields, window, found.box)
+                    use.exposure.settle(plate, fields, window, found.box)
         return load
 
     return SimpleNamespace(
         Fields=Fields,
         Touches=Touches,
-        open_window=open_window,
+        own_fields=use.exposure.own_fields,
+        open_window=use.exposure.open_window,
         clear_sums=clear_sums,
         find_touches=find_touches,
         meet=meet,

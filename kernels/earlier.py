@@ -18,8 +18,8 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of earlier hits for one variant."""
     real = variant.real
-    memories, grid = exposure.build(variant), plate_grid.build(variant)
-    Fields, Plate, Window = memories.Fields, grid.Plate, grid.Window
+    use = variant.use(exposure, plate_grid)
+    Fields, Plate, Window = use.exposure.Fields, use.plate_grid.Plate, use.plate_grid.Window
 
     @wp.struct
     class Earlier:
@@ -96,7 +96,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def row_of(earlier: Earlier, window: Window, slot: wp.int32, order: wp.int32):
         """Index of the first node of a shot's window among those of its slot."""
-        return (slot * (earlier.count - 1) + order) * earlier.nodes + window.first
+        return (slot * earlier.count + order) * earlier.nodes + window.first
 
     @wp.func
     def begin(earlier: Earlier, slot: wp.int32, shot: wp.int32):
@@ -121,7 +121,7 @@ def build(variant: Variant) -> SimpleNamespace:
         order = shot % earlier.count
         row = row_of(earlier, window, slot, order)
         nodes = window.planes * window.nodes
-        memories.clear(earlier.exposure, row, nodes)
+        use.exposure.clear(earlier.exposure, row, nodes)
         for before in range(order):
             other = (slot * earlier.count + before) * earlier.layers + layer
             if earlier.open[other]:

@@ -18,20 +18,25 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the exposure for one variant."""
     real = variant.real
     half = real(0.5)
-    read, write = memory.build(real).read, memory.build(real).write
-    grid, block, split = plate_grid.build(variant), lanes.build(variant), lanes.split(variant)
-    Plate, Window, Box = grid.Plate, grid.Window, grid.Box
+    read, write, part_of = memory.build(real).read, memory.build(real).write, memory.build(real).part_of
+    use, split = variant.use(lanes, plate_grid), lanes.split(variant)
+    Plate, Window, Box = use.plate_grid.Plate, use.plate_grid.Window, use.plate_grid.Box
 
     @wp.struct
     class Fields:
-        """Scratch of all slots, each planes × cells_y × cells_z: exposure [s], exposure gained in the step [s], and
-        room for the filter."""
+        """Scratch of all slots, or of one: exposure [s], exposure gained in the step [s], and room for the filter.
+
+        A slot has `nodes` of each. The window of a layer has planes of cells_y × cells_z of them, from number `first`
+        on; shape [layers].
+        """
 
         exposure: wp.array(dtype=real)
         gain: wp.array(dtype=real)
         filtered: wp.array(dtype=real)
-        cells_y: wp.int32
-        cells_z: wp.int32
+        nodes: wp.int32
+        first: wp.array(dtype=wp.int32)
+        cells_y: wp.array(dtype=wp.int32)
+        cells_z: wp.array(dtype=wp.int32)
 
     @wp.func
     def gather(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
@@ -160,11 +165,26 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func
-    def blank(fields: Fields, window: Window):
-        """Make the plate untouched: no exposure."""
-        nodes = window.planes * window.nodes
-        clear(fields.exposure, window.first, nodes)
-        clear(fields.gain, window.first, nodes)
+    def own_fields(fields: Fields, slot: wp.int32):
+        """The fields of one slot."""
+        own = fields
+        if wp.static(variant.degrades):
+            own.exposure = part_of(fields.exposure, slot * fields.nodes, fields.nodes)
+            own.gain = part_of(fields.gain, slot * fields.nodes, fields.nodes)
+            own.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
+        return own
+
+    @wp.func
+    def open_window(
+        plate: Plate, thickness: real, fields: Fields, layer: wp.int32, hit_y: wp.float64, hit_z: wp.float64
+    ):
+        """The window of a layer about a hit, on an untouched plate: no exposure."""
+        cells_y, cells_z = fields.cells_y[layer], fields.cells_z[layer]
+        window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit_y, hit_z)
+        if wp.static(variant.degrades):
+            clear(fields.exposure, window.first, window.planes * window.nodes)
+            clear(fields.gain, window.first, window.planes * window.nodes)
+        return window
 
     @wp.func
     def filter_(
@@ -186,7 +206,7 @@ def build(variant: Variant) -> SimpleNamespace:
         above = plate.reach * stride
         filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
         if wp.static(variant.window > 0):
-            block.barrier()  # the other direction reads what other lanes have filtered, and overwrites what they read
+            use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
         filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
 
     # Σ over |i − plane| < reach, and half of the planes at ± reach: the trapezoidal rule over twice the depth. From one
@@ -317,11 +337,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     return SimpleNamespace(
         Fields=Fields,
+        own_fields=own_fields,
+        open_window=open_window,
         gather=gather,
         scatter=scatter,
         scatter_plain=scatter_plain,
         clear=clear,
-        blank=blank,
         spread=spread,
         settle=settle,
     )

@@ -14,15 +14,15 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of whole numbers in a field of float32."""
     real = variant.real
     one, sheet, tiny = real(1.0), real(2.0**24), real(1.0e-30)
-    laws, grid, split = interaction.build(variant), plate_grid.build(variant), lanes.split(variant)
-    Law, Window, Box = laws.Law, grid.Window, grid.Box
+    use, split = variant.use(interaction, plate_grid), lanes.split(variant)
+    Law, Window, Box = use.interaction.Law, use.plate_grid.Window, use.plate_grid.Box
 
     @wp.func
     def units(law: Law, window: Window, coarsest: real, velocity: real, dt: real):
         """Units per exposure [1/s]: 2^24 for what one advancing sheet, or the coarsest patch, gives to a node. So the
         rounding is that of float32, and 128 times as much still fits: a node lies below a few sheets of a core."""
         patches = wp.max(one, coarsest * window.per_cell * window.per_cell)
-        return sheet / (wp.max(laws.exposure_in(law, dt, velocity), tiny) * patches)
+        return sheet / (wp.max(use.interaction.exposure_in(law, dt, velocity), tiny) * patches)
 
     # Bits are copied, because a compiler takes numbers of different types for different numbers.
     @wp.func_native("""

@@ -14,9 +14,9 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the footprint for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, grid, block = (part.build(variant) for part in (core_surface, plate_grid, lanes))
-    Surface, Pose, ring_at = surfaces.Surface, surfaces.Pose, surfaces.ring_at
-    Plate, Window, Box = grid.Plate, grid.Window, grid.Box
+    use = variant.use(core_surface, lanes, plate_grid)
+    Surface, Pose, ring_at = use.core_surface.Surface, use.core_surface.Pose, use.core_surface.ring_at
+    Plate, Window, Box = use.plate_grid.Plate, use.plate_grid.Window, use.plate_grid.Box
     far = wp.constant(2**20)  # nodes away: beyond any window
 
     @wp.struct
@@ -43,7 +43,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def footprint_of(surface: Surface, plate: Plate, window: Window, pose: Pose, dt: real):
         """The footprint at mid-step. Patches act at their centres, so a ring covers centre ± radius."""
-        broadside = surfaces.broadside(pose)
+        broadside = use.core_surface.broadside(pose)
         across_y = wp.sqrt(wp.max(zero, one - pose.axis[1] * pose.axis[1]))
         across_z = wp.sqrt(wp.max(zero, one - pose.axis[2] * pose.axis[2]))
         advance = half * dt * wp.abs(wp.dot(pose.velocity, vec3(pose.axis[0], pose.right[0], pose.up[0])))
@@ -55,15 +55,15 @@ def build(variant: Variant) -> SimpleNamespace:
         plane_low, plane_high = int(far), int(-far)
         index = int(0)
         if wp.static(variant.window > 0):
-            index = block.lane()
+            index = use.lanes.lane()
         while index < surface.rings:
             ring = ring_at(surface, pose, index)
-            reach = surfaces.reach_along_x(ring, pose, broadside, advance, turning)
+            reach = use.core_surface.reach_along_x(ring, pose, broadside, advance, turning)
             foremost, rearmost = ring.centre[0] + reach, ring.centre[0] - reach
             within = foremost > zero and rearmost < window.thickness
             first_ring = wp.min(first_ring, wp.where(within, index, surface.rings))
             last_ring = wp.max(last_ring, wp.where(within, index, -1))
-            closing = within and surfaces.closes(pose, ring)
+            closing = within and use.core_surface.closes(pose, ring)
             first_closing = wp.min(first_closing, wp.where(closing, index, surface.rings))
             last_closing = wp.max(last_closing, wp.where(closing, index, -1))
             not_through += wp.where(rearmost > window.thickness, 0, 1)
@@ -74,18 +74,19 @@ def build(variant: Variant) -> SimpleNamespace:
             y_high = wp.max(y_high, wp.where(within, node_below(window, ring.centre[1] + wide_y), -far))
             z_high = wp.max(z_high, wp.where(within, node_below(window, ring.centre[2] + wide_z), -far))
             if wp.static(variant.deep):
-                plane_low = wp.min(plane_low, wp.where(within, wp.int32(grid.planes_at(window, rearmost)), far))
-                plane_high = wp.max(plane_high, wp.where(within, wp.int32(grid.planes_at(window, foremost)) + 1, -far))
+                behind, ahead = use.plate_grid.planes_at(window, rearmost), use.plate_grid.planes_at(window, foremost)
+                plane_low = wp.min(plane_low, wp.where(within, wp.int32(behind), far))
+                plane_high = wp.max(plane_high, wp.where(within, wp.int32(ahead) + 1, -far))
             if wp.static(variant.window > 0):
-                index += block.count()
+                index += use.lanes.count()
             else:
                 index += 1
         if wp.static(variant.window > 0):
-            first_ring, last_ring = block.least(first_ring), block.most(last_ring)
-            first_closing, last_closing = block.least(first_closing), block.most(last_closing)
-            not_through, not_back = block.most(not_through), block.most(not_back)
-            y_low, y_high = block.least(y_low), block.most(y_high)
-            z_low, z_high = block.least(z_low), block.most(z_high)
+            first_ring, last_ring = use.lanes.least(first_ring), use.lanes.most(last_ring)
+            first_closing, last_closing = use.lanes.least(first_closing), use.lanes.most(last_closing)
+            not_through, not_back = use.lanes.most(not_through), use.lanes.most(not_back)
+            y_low, y_high = use.lanes.least(y_low), use.lanes.most(y_high)
+            z_low, z_high = use.lanes.least(z_low), use.lanes.most(z_high)
         found = Footprint()
         found.first_ring = first_ring
         found.last_ring = last_ring
@@ -117,7 +118,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def clearance_at(plate: Plate, window: Window, y: real, z: real):
         """A lower bound of a point's distance from material: in a hole, or beside a finite plate [m]."""
         beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
-        return wp.max(beside, plate.clear[grid.tile_at(plate, window, y, z)])
+        return wp.max(beside, plate.clear[use.plate_grid.tile_at(plate, window, y, z)])
 
     @wp.func
     def is_clear(plate: Plate, window: Window, found: Footprint):

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import march, rigid_body
-from . import shots as conditions
+from . import march, rigid_body, shots
 from .status import Status
 from .variant import Variant
 
@@ -16,11 +15,10 @@ def build(variant: Variant) -> SimpleNamespace:
     """The free-flight kernel and the struct it fills, for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, undefined = real(0.0), real(wp.nan)
-    motion = rigid_body.build(variant)
-    launch = conditions.build(variant)
-    Shots, Contact = launch.Shots, march.build(variant).Outcomes
-    angular_velocity = motion.angular_velocity
-    axis_at = motion.axis_at
+    use = variant.use(march, rigid_body, shots)
+    Shots, Target, Contact = use.shots.Shots, use.march.Target, use.march.Outcomes
+    angular_velocity = use.rigid_body.angular_velocity
+    axis_at = use.rigid_body.axis_at
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
     MISSED, UNFINISHED = wp.constant(int(Status.MISSED)), wp.constant(int(Status.UNFINISHED))
 
@@ -53,6 +51,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def free_flight(
         # inputs
         shots: Shots,
+        target: Target,
         contact: Contact,
         standoffs: wp.array(dtype=wp.float64),
         ahead: real,
@@ -65,9 +64,9 @@ def build(variant: Variant) -> SimpleNamespace:
         centre of mass, towards the nose [m].
         """
         shot = wp.tid()
-        body = launch.body_of(shots, shot)
+        body = use.shots.body_of(shots, shot)
         status = contact.status[shot]
-        direction = launch.line_of_flight(shots, shot)
+        direction = use.shots.line_of_flight(shots, shot)
         flight = vec3(real(direction[0]), real(direction[1]), real(direction[2]))
         velocity, axis = contact.velocity[shot], contact.axis[shot]
         momentum = contact.angular_momentum[shot]
@@ -84,7 +83,7 @@ def build(variant: Variant) -> SimpleNamespace:
         report.contact_duration[shot] = wp.where(failed, undefined, contact.contact_duration[shot])
         for k in range(standoffs.shape[0]):
             if passes:
-                distance = real(standoffs[k] + launch.own(shots.thickness, shot)) - contact.position[shot][0]
+                distance = real(standoffs[k] + use.march.depth_of(target, shot)) - contact.position[shot][0]
                 then = axis_at(body, axis, momentum, ahead, velocity[0], distance)
                 report_standoff(report, shot, k, then, flight, velocity)
             else:

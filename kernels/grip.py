@@ -13,8 +13,9 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a patch's contact for one variant."""
     real = variant.real
-    surfaces, laws = core_surface.build(variant), interaction.build(variant)
-    Pose, Ring, Patch, Law = surfaces.Pose, surfaces.Ring, surfaces.Patch, laws.Law
+    use = variant.use(core_surface, interaction)
+    Pose, Ring, Patch = use.core_surface.Pose, use.core_surface.Ring, use.core_surface.Patch
+    Law = use.interaction.Law
 
     @wp.struct
     class Face:
@@ -36,7 +37,9 @@ def build(variant: Variant) -> SimpleNamespace:
         """Contact of a curved patch: normal and closing speed vary linearly over it, and only the part that closes in
         touches. Without this, contact along a shank would come and go by whole patches."""
         meridian, around = variations(ring, patch)
-        return laws.contact_of(law, patch.closing, wp.sqrt(meridian * meridian + around * around), pose.speed)
+        return use.interaction.contact_of(
+            law, patch.closing, wp.sqrt(meridian * meridian + around * around), pose.speed
+        )
 
     @wp.func
     def face_of(ring: Ring, patch: Patch, shift: real):

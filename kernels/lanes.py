@@ -133,16 +133,6 @@ def build(variant: Variant) -> SimpleNamespace:
 
         return place
 
-    @wp.func_native(
-        """
-    assert((slot + 1) * nodes <= field.shape[0]);
-    return wp::array_t<KIND>(field.data + slot * nodes, nodes);
-    """.replace("KIND", kind)
-    )
-    def own_room(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real):
-        """The part of a field in global memory that belongs to a slot."""
-        ...
-
     return SimpleNamespace(
         lane=lane,
         count=count,
@@ -155,5 +145,4 @@ def build(variant: Variant) -> SimpleNamespace:
         any_of=any_of,
         own_exposure=own("exposure"),
         own_gain=own("gain"),
-        own_room=own_room,
     )

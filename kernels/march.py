@@ -11,18 +11,22 @@ from . import (
     contact,
     core_surface,
     damping,
+    earlier,
     footprint,
     interaction,
+    lanes,
     layers,
     nodal,
+    one_plate,
+    passage,
     plate_grid,
     rigid_body,
+    shots,
+    target,
+    trace,
 )
-from . import earlier as earlier_hits
-from . import shots as conditions
-from . import trace as tracing
 from .lanes import BLOCKS, LANES
-from .status import Status
+from .status import RUNNING, Status
 from .variant import Variant
 
 
@@ -35,25 +39,30 @@ def build(variant: Variant) -> SimpleNamespace:
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
     spent = real(2.5e-3)  # likewise: at 5 % it does not come back through a layer that it has left
     most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
-    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    prints, bends, launch, traces = (part.build(variant) for part in (footprint, bending, conditions, tracing))
-    stacked, hits = layers.build(variant), earlier_hits.build(variant)
-    scheme = (nodal if variant.nodal else block if variant.window else contact).build(variant)
-    Surface, Pose, Plate, Law = surfaces.Surface, surfaces.Pose, grid.Plate, laws.Law
-    Body, State, Load, Change = motion.Body, motion.State, motion.Load, motion.Change
-    Fields, Footprint, Touches = scheme.Fields, prints.Footprint, contact.build(variant).Touches
-    Sections, Bending = bends.Sections, bends.Bending
-    Shots, Pace, own = launch.Shots, launch.Pace, launch.own
-    Layers, Stack, Passage, Reached = stacked.Layers, stacked.Stack, stacked.Passage, stacked.Reached
-    Earlier = hits.Earlier
-    PERFORATED, ARRESTED, RICOCHETED = (
-        wp.constant(int(s)) for s in (Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED)
+    use = variant.use(
+        bending,
+        core_surface,
+        damping,
+        earlier,
+        footprint,
+        interaction,
+        lanes,
+        passage,
+        plate_grid,
+        rigid_body,
+        shots,
+        trace,
     )
-    MISSED, UNFINISHED, LEFT_WINDOW = (
-        wp.constant(int(s)) for s in (Status.MISSED, Status.UNFINISHED, Status.LEFT_WINDOW)
-    )
-    NOT_FINITE, GAINED_ENERGY = (wp.constant(int(s)) for s in (Status.NOT_FINITE, Status.GAINED_ENERGY))
-    RUNNING = wp.constant(-1)
+    scheme = nodal if variant.nodal else block if variant.window else contact
+    loads, plates = scheme.build(variant), target.build(variant, scheme)
+    reaches = (layers if variant.layered else one_plate).build(variant, scheme)
+    Surface, Pose, Law = use.core_surface.Surface, use.core_surface.Pose, use.interaction.Law
+    Body, State = use.rigid_body.Body, use.rigid_body.State
+    Load, Change = use.rigid_body.Load, use.rigid_body.Change
+    Fields, Footprint, Touches = loads.Fields, use.footprint.Footprint, loads.Touches
+    Sections, Bending = use.bending.Sections, use.bending.Bending
+    Shots, Pace, own = use.shots.Shots, use.shots.Pace, use.shots.own
+    Target, Stack, Passage, Earlier = plates.Target, reaches.Stack, use.passage.Passage, use.earlier.Earlier
 
     @wp.struct
     class Outcomes:
@@ -69,19 +78,6 @@ def build(variant: Variant) -> SimpleNamespace:
         angular_momentum: wp.array(dtype=vec3)
 
     @wp.func
-    def reach_of(surface: Surface, thickness: real, state: State):
-        """Largest distance from the hit [m], in the plane of the plate, of any part of a core that touches nothing."""
-        axis = motion.axis_of(state.attitude)
-        slope = vec3(zero, state.velocity[1], state.velocity[2]) / state.velocity[0]
-        lean = axis - axis[0] * slope  # of the axis against the line of flight
-        steep = wp.length(slope)
-        return (
-            surface.max_radius * (real(1.0) + steep)
-            + surface.bounding_radius * wp.length(vec3(zero, lean[1], lean[2]))
-            + thickness * steep
-        )
-
-    @wp.func
     def ended(
         surface: Surface,
         body: Body,
@@ -91,34 +87,34 @@ def build(variant: Variant) -> SimpleNamespace:
         touched: wp.bool,
         behind: wp.bool,
         initial_energy: real,
-        thickness: real,
+        depth: real,
     ):
         """The final status of a core, or RUNNING.
 
-        A core outside the slab cannot come back if it moves away faster than its rotation moves any part of it. A core
-        that turns back `behind` a layer, and is spent, rests there.
+        A core outside the target, which is `depth` [m] deep, cannot come back if it moves away faster than its rotation
+        moves any part of it. A core that turns back `behind` a layer, and is spent, rests there.
         """
         status = RUNNING
-        energy = motion.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
+        energy = use.rigid_body.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
         along = wp.dot(state.angular_momentum, pose.axis)
         about_axis = half * along * along / body.inertia_axial
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, pose.axis))
         leaving = wp.abs(state.velocity[0])
-        beyond = wp.max(state.position[0] - thickness, -state.position[0])
+        beyond = wp.max(state.position[0] - depth, -state.position[0])
         rest = wp.where(behind and state.velocity[0] < zero, spent, still)
         gone = leaving > turning or beyond > surface.bounding_radius
         if not wp.isfinite(energy):
-            status = NOT_FINITE
+            status = Status.NOT_FINITE
         elif energy > most * initial_energy:
-            status = GAINED_ENERGY
+            status = Status.GAINED_ENERGY
         elif found.through and state.velocity[0] > zero and gone:
-            status = wp.where(touched, PERFORATED, MISSED)
+            status = wp.where(touched, Status.PERFORATED, Status.MISSED)
         elif found.back and state.velocity[0] < zero and gone:
-            status = wp.where(touched, RICOCHETED, MISSED)
+            status = wp.where(touched, Status.RICOCHETED, Status.MISSED)
         elif touched and energy - about_axis < rest * initial_energy:
-            status = ARRESTED
+            status = Status.ARRESTED
         elif not found.inside:
-            status = LEFT_WINDOW
+            status = Status.LEFT_WINDOW
         return status
 
     def march(
@@ -128,11 +124,10 @@ def build(variant: Variant) -> SimpleNamespace:
         order: wp.array(dtype=wp.int32),
         surface: Surface,
         sections: Sections,
-        plate: Plate,
+        target: Target,
         law: Law,
         shots: Shots,
         pace: Pace,
-        target: Layers,
         # scratch
         fields: Fields,
         touches: Touches,
@@ -150,40 +145,22 @@ def build(variant: Variant) -> SimpleNamespace:
         Shots at one plate are numbered in a row, and are computed one after another in one slot.
         """
         shot = order[first + wp.tid()]
-        body = launch.body_of(shots, shot)
-        law = launch.law_of(law, shots, shot)
-        pace = launch.pace_of(pace, shots, shot)
-        speed = own(shots.velocity, shot)
-        dt = launch.step_of(pace, speed, own(shots.obliquity, shot))
-        max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
         slot = wp.tid() % slots
-        thickness = real(own(shots.thickness, shot))
-        if wp.static(variant.burst):
-            hits.begin(earlier, slot, shot)
-        if wp.static(variant.layered):
-            stacked.begin(target, stack, passage, slot, shot)
-            reached = Reached()
-            straight = launch.line_of_flight(shots, shot)
-            flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
-            # A core that slides between two layers never ends: it has gone farther than one that goes straight through.
-            farthest = real(pace.longest_way) + wp.length(vec3(zero, flight[1], flight[2])) / flight[0] * thickness
-        else:
-            hit_y, hit_z = own(shots.hit_y, shot), own(shots.hit_z, shot)
-            if wp.static(variant.window > 0):
-                fields = scheme.own_fields(fields, slot)
-            window = scheme.open_window(plate, thickness, fields, slot, hit_y, hit_z)
-            if wp.static(variant.burst):
-                hits.recall(earlier, fields, plate, window, slot, 0, shot, hit_y, hit_z)
-        state = launch.launch_state(surface, body, shots, shot)
-        axis = motion.axis_of(state.attitude)
-        initial_energy = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+        body = use.shots.body_of(shots, shot)
+        law = plates.law_of(target, law, 0, shot)
+        pace = use.shots.pace_of(pace, shots, shot)
+        speed = own(shots.velocity, shot)
+        dt = use.shots.step_of(pace, speed, own(shots.obliquity, shot))
+        max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
+        depth = real(plates.depth_of(target, shot))
+        fields = loads.own_fields(fields, slot)
+        state = use.shots.launch_state(surface, body, shots, shot)
+        axis = use.rigid_body.axis_of(state.attitude)
+        initial_energy = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
         # Positions are those of mid-step from here on: kicks at mid-step, exact drifts between them.
-        state = motion.drift(body, state, half * dt)
-        status = int(RUNNING)
-        if wp.static(not variant.layered):
-            if grid.clearance(plate, window) > reach_of(surface, thickness, state):
-                status = int(MISSED)
-        touched = bool(False)
+        state = use.rigid_body.drift(body, state, half * dt)
+        reached, status = reaches.begin(surface, target, fields, stack, earlier, passage, shots, slot, shot, state)
+        touched, lost = bool(False), bool(False)
         if wp.static(variant.bends):
             worst = Bending()
             worst.strength = own(shots.strength, shot)
@@ -192,53 +169,35 @@ def build(variant: Variant) -> SimpleNamespace:
         last = Change()
         before_last = Change()
         step = int(0)
-        behind = bool(False)  # the plate
-        while status == RUNNING and step < max_steps:
-            omega = motion.angular_velocity(body, motion.axis_of(state.attitude), state.angular_momentum)
-            pose = surfaces.pose_of(surface, state.position, state.attitude, state.velocity, omega)
+        while status == RUNNING and step < max_steps and not lost:
+            now = (real(step) + half) * dt + skipped
+            omega = use.rigid_body.angular_velocity(
+                body, use.rigid_body.axis_of(state.attitude), state.angular_momentum
+            )
+            pose = use.core_surface.pose_of(surface, state.position, state.attitude, state.velocity, omega)
             # The closing speeds are those at mid-step, if this step changes the velocities as much as the last one did.
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
-            if wp.static(variant.layered):
-                found, reached = stacked.reach(
-                    surface,
-                    body,
-                    target,
-                    fields,
-                    stack,
-                    earlier,
-                    passage,
-                    shots,
-                    slot,
-                    shot,
-                    state,
-                    pose,
-                    reached,
-                    last,
-                    (real(step) + half) * dt + skipped,
-                    flight,
-                    dt,
-                )
-                behind = stacked.is_behind(passage, shot)
-            else:
-                found = prints.footprint_of(surface, plate, window, pose, dt)
-            status = ended(surface, body, state, pose, found, touched, behind, initial_energy, thickness)
+            reached = reaches.reach(
+                surface, body, target, fields, stack, earlier, passage, shots, slot, shot, state, pose, reached, last,
+                now, dt,
+            )  # fmt: skip
+            found = reached.found
+            status = ended(surface, body, state, pose, found, touched, reached.behind, initial_energy, depth)
             if status == RUNNING:
-                if wp.static(variant.layered):
-                    law.onset_jump = stacked.jump_of(target, stack, slot, shot, reached)
-                law.onset = laws.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
-                law.steadied = wp.where(motion.swings(body, before_last, last), steadied * law.onset, zero)
+                law = reaches.law_at(target, law, stack, slot, shot, reached)
+                law.onset = use.interaction.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
+                law.steadied = wp.where(use.rigid_body.swings(body, before_last, last), steadied * law.onset, zero)
                 before_last = last
                 load = Load()
                 before = state
                 free = real(0.0)
                 if found.last_ring >= 0:
-                    if wp.static(variant.layered):
-                        load = stacked.load_on(
-                            surface, target, law, fields, stack, touches, passage, slot, shot, reached, pose, dt
-                        )
-                    else:
-                        load = scheme.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
+                    load = reaches.load_on(
+                        surface, target, law, fields, stack, touches, passage, slot, shot, reached, pose, dt
+                    )
+                else:
+                    free, lost = reaches.free_time(surface, target, shot, state, pose, reached, dt)
                 if load.touching:
                     touched = True
                     contact_steps += 1
@@ -246,50 +205,37 @@ def build(variant: Variant) -> SimpleNamespace:
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
                     if wp.static(variant.bends):
-                        middle = (real(step) + half) * dt + skipped
-                        worst = bends.bent(
-                            worst, surface, sections, body, touches, slot, found, pose, state, load, last, dt, middle
+                        worst = use.bending.bent(
+                            worst, surface, sections, body, touches, slot, found, pose, state, load, last, dt, now
                         )
-                    state = motion.kick(body, state, load, dt)
-                    last = motion.change_between(body, before, state)
+                    state = use.rigid_body.kick(body, state, load, dt)
+                    last = use.rigid_body.change_between(body, before, state)
                 else:
                     last = Change()
                 if pace.rows > 0:
-                    force, moment = motion.mean_load(body, before, load, dt)
-                    now = (real(step) + half) * dt + skipped
-                    traces.record(trace, shot * pace.rows + step, now, state, force, moment)
-                if wp.static(variant.layered):
-                    if found.last_ring < 0:
-                        free = stacked.free_time(surface, target, shot, state, pose, reached, dt)
-                        skipped += free
-                        if wp.length(vec3(zero, state.position[1], state.position[2])) > farthest:
-                            max_steps = step
-                state = motion.drift(body, state, dt + free)
+                    force, moment = use.rigid_body.mean_load(body, before, load, dt)
+                    use.trace.record(trace, shot * pace.rows + step, now, state, force, moment)
+                state = use.rigid_body.drift(body, state, dt + free)
+                skipped += free
                 step += 1
         if pace.rows > 0:
-            traces.record(trace, shot * pace.rows + step, (real(step) + half) * dt + skipped, state, vec3(), vec3())
+            now = (real(step) + half) * dt + skipped
+            use.trace.record(trace, shot * pace.rows + step, now, state, vec3(), vec3())
         if status == RUNNING:
-            status = UNFINISHED
-            if wp.static(variant.layered):
-                if touched and stacked.is_between(target, shot, reached, state.position[0]):
-                    status = ARRESTED
-        if wp.static(variant.layered):
-            stacked.conclude(target, passage, shot, status, reached)
-        if wp.static(variant.burst):
-            if wp.static(variant.layered):
-                stacked.keep(target, fields, stack, earlier, slot, shot)
-            else:
-                hits.keep(earlier, fields, window, slot, shot)
-        axis = motion.axis_of(state.attitude)
+            status = reaches.given_up(target, shot, reached, state, touched)
+        reaches.conclude(target, fields, stack, earlier, passage, slot, shot, status, reached)
+        axis = use.rigid_body.axis_of(state.attitude)
         if wp.static(variant.window > 0):
-            if scheme.lane() > 0:  # all lanes know the outcome
+            if use.lanes.lane() > 0:  # all lanes know the outcome
                 return
         outcomes.status[shot] = status
         outcomes.steps[shot] = step
         outcomes.contact_duration[shot] = real(contact_steps) * dt
         energy_loss = zero
         if touched:
-            energy_loss = initial_energy - motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+            energy_loss = initial_energy - use.rigid_body.kinetic_energy(
+                body, axis, state.velocity, state.angular_momentum
+            )
         outcomes.energy_loss[shot] = energy_loss
         if wp.static(variant.bends):
             bending[shot] = worst
@@ -303,15 +249,16 @@ def build(variant: Variant) -> SimpleNamespace:
         Surface=Surface,
         Sections=Sections,
         Bending=Bending,
-        Plate=Plate,
+        Plate=use.plate_grid.Plate,
         Fields=Fields,
         Touches=Touches,
-        Sums=damping.build(variant).Sums,
+        Sums=use.damping.Sums,
         Law=Law,
         Shots=Shots,
         Outcomes=Outcomes,
         Pace=Pace,
-        Layers=Layers,
+        Target=Target,
+        depth_of=plates.depth_of,
         Stack=Stack,
         Passage=Passage,
         Earlier=Earlier,

@@ -31,4 +31,15 @@ def build(dtype: Any) -> SimpleNamespace:
         """array[index] = value"""
         ...
 
-    return SimpleNamespace(read=read, write=write)
+    @wp.func_native("""
+    assert(first >= 0 && first + count <= array.shape[0]);
+    auto part = array;
+    part.data += first;
+    part.shape[0] = count;
+    return part;
+    """)
+    def part_of(array: wp.array(dtype=dtype), first: wp.int32, count: wp.int32) -> wp.array(dtype=dtype):
+        """array[first : first + count]"""
+        ...
+
+    return SimpleNamespace(read=read, write=write, part_of=part_of)

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, footprint, interaction, plate_grid, rigid_body
+from . import contact, core_surface, footprint, interaction, memory, plate_grid, rigid_body
 from .variant import Variant
 
 
@@ -19,45 +19,57 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a literal step's load for one variant."""
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    surfaces, grid, laws, motion = (part.build(variant) for part in (core_surface, plate_grid, interaction, rigid_body))
-    Surface, Pose, Plate = surfaces.Surface, surfaces.Pose, grid.Plate
-    Window, Law, Load = grid.Window, laws.Law, motion.Load
-    Footprint, Touches = footprint.build(variant).Footprint, contact.build(variant).Touches
+    use = variant.use(contact, core_surface, footprint, interaction, plate_grid, rigid_body)
+    Surface, Pose, Plate = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Plate
+    Window, Law, Load = use.plate_grid.Window, use.interaction.Law, use.rigid_body.Load
+    Footprint, Touches = use.footprint.Footprint, use.contact.Touches
+    part_of = memory.build(real).part_of
 
     @wp.struct
     class Fields:
-        """Scratch of all slots, each cells_y × cells_z: each node's share of the resistance Y, 0 in holes; and 1 where
-        the step touched the node."""
+        """Scratch of all slots, or of one (kernels/exposure.py): each node's share of the resistance Y, 0 in holes; and
+        1 where the step touched the node."""
 
         share: wp.array(dtype=real)
         touched: wp.array(dtype=real)
-        cells_y: wp.int32
-        cells_z: wp.int32
+        nodes: wp.int32
+        first: wp.array(dtype=wp.int32)
+        cells_y: wp.array(dtype=wp.int32)
+        cells_z: wp.array(dtype=wp.int32)
 
     @wp.func
     def outward_of(surface: Surface, pose: Pose, index: wp.int32):
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func
+    def own_fields(fields: Fields, slot: wp.int32):
+        """The fields of one slot."""
+        own = fields
+        own.share = part_of(fields.share, slot * fields.nodes, fields.nodes)
+        own.touched = part_of(fields.touched, slot * fields.nodes, fields.nodes)
+        return own
+
+    @wp.func
     def open_window(
-        plate: Plate, thickness: real, fields: Fields, slot: wp.int32, hit_y: wp.float64, hit_z: wp.float64
+        plate: Plate, thickness: real, fields: Fields, layer: wp.int32, hit_y: wp.float64, hit_z: wp.float64
     ):
-        """A slot's window about a hit: nodes at the centres of the tile's cells, each with its share of the resistance;
-        nothing touched."""
-        window = grid.window_at(plate, thickness, fields.cells_y, fields.cells_z, slot, hit_y, hit_z)
+        """The window of a layer about a hit: nodes at the centres of the tile's cells, each with its share of the
+        resistance; nothing touched."""
+        cells_y, cells_z = fields.cells_y[layer], fields.cells_z[layer]
+        window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit_y, hit_z)
         dy, dz = plate.period_y / wp.float64(plate.tile_y), plate.period_z / wp.float64(plate.tile_z)
         home_y, home_z = wp.int32(wp.floor(hit_y / dy)), wp.int32(wp.floor(hit_z / dz))
         window.y0 = real((wp.float64(home_y) + wp.float64(0.5)) * dy - hit_y)
         window.z0 = real((wp.float64(home_z) + wp.float64(0.5)) * dz - hit_z)
         index = window.first
-        for i in range(fields.cells_y):
-            row = grid.within(real(home_y % plate.tile_y + i - fields.cells_y // 2), plate.tile_y) * plate.tile_z
-            column = grid.within(real(home_z % plate.tile_z - fields.cells_z // 2), plate.tile_z)
-            y = window.y0 + real(i - fields.cells_y // 2) * real(dy)
-            for j in range(fields.cells_z):
+        for i in range(cells_y):
+            row = use.plate_grid.within(real(home_y % plate.tile_y + i - cells_y // 2), plate.tile_y) * plate.tile_z
+            column = use.plate_grid.within(real(home_z % plate.tile_z - cells_z // 2), plate.tile_z)
+            y = window.y0 + real(i - cells_y // 2) * real(dy)
+            for j in range(cells_z):
                 share = plate.tile[row + column]
                 if wp.static(variant.rimmed):
-                    share *= grid.on_plate(plate, window, y, window.z0 + real(j - fields.cells_z // 2) * real(dz))
+                    share *= use.plate_grid.on_plate(plate, window, y, window.z0 + real(j - cells_z // 2) * real(dz))
                 fields.share[index] = share
                 fields.touched[index] = zero
                 index += 1
@@ -78,7 +90,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Σ Y (−n + η t) dS over the points in the slab, t the meridian tangent towards the base."""
         load = Load()
         for index in range(found.first_ring, found.last_ring + 1):
-            ring = surfaces.ring_at(surface, pose, index)
+            ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 outward = outward_of(surface, pose, j)
                 arm = ring.station * pose.axis + ring.radius * outward
@@ -103,7 +115,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def degrade(surface: Surface, fields: Fields, window: Window, found: Footprint, pose: Pose, factor: real):
         """Multiply every node that was touched in this step by β, once even if several points touched it (eq. 6)."""
         for index in range(found.first_ring, found.last_ring + 1):
-            ring = surfaces.ring_at(surface, pose, index)
+            ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 arm = ring.station * pose.axis + ring.radius * outward_of(surface, pose, j)
                 point = pose.position + arm
@@ -132,4 +144,6 @@ def build(variant: Variant) -> SimpleNamespace:
             degrade(surface, fields, window, found, pose, law.degradation)
         return load
 
-    return SimpleNamespace(Fields=Fields, open_window=open_window, load_on=load_on)
+    return SimpleNamespace(
+        Fields=Fields, Touches=Touches, own_fields=own_fields, open_window=open_window, load_on=load_on
+    )

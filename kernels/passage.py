@@ -15,8 +15,8 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the passage through the layers for one variant."""
     real, vec3 = variant.real, variant.vec3
     one = real(1.0)
-    motion = rigid_body.build(variant)
-    Body, State = motion.Body, motion.State
+    use = variant.use(rigid_body)
+    Body, State = use.rigid_body.Body, use.rigid_body.State
     ARRESTED, RICOCHETED, UNFINISHED = (
         wp.constant(int(s)) for s in (Status.ARRESTED, Status.RICOCHETED, Status.UNFINISHED)
     )
@@ -93,10 +93,12 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """Record the attitude at distances behind a layer's rear face [m], of a core that touches nothing on its way.
         The point of the axis that passes them is `ahead` of the centre of mass, towards the nose [m]."""
-        axis = motion.axis_of(state.attitude)
+        axis = use.rigid_body.axis_of(state.attitude)
         for m in range(standoffs.shape[0]):
             distance = standoffs[m] + (rear - state.position[0])
-            then = motion.axis_at(body, axis, state.angular_momentum, ahead, wp.max(state.velocity[0], one), distance)
+            then = use.rigid_body.axis_at(
+                body, axis, state.angular_momentum, ahead, wp.max(state.velocity[0], one), distance
+            )
             passage.standoff_tilt[shot, layer, m] = angle_between(then, flight)
             passage.standoff_pitch[shot, layer, m] = wp.atan2(then[2], then[0])
             passage.standoff_yaw[shot, layer, m] = wp.atan2(then[1], then[0])
@@ -114,7 +116,7 @@ def build(variant: Variant) -> SimpleNamespace:
         flight: vec3,
     ):
         """Record how a core left a layer at a speed [m/s], `since` [s] before the time."""
-        axis = motion.turned(body, motion.axis_of(state.attitude), state.angular_momentum, -since)
+        axis = use.rigid_body.turned(body, use.rigid_body.axis_of(state.attitude), state.angular_momentum, -since)
         passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, PASSED, MISSED)
         passage.velocity[shot, layer] = speed
         passage.tilt[shot, layer] = angle_between(axis, flight)

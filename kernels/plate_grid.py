@@ -50,15 +50,15 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Window:
-        """One slot's part of the fields, and its place on the tile.
+        """The part of a slot's fields that a layer has, and its place on the tile.
 
         `first` is the index of the first node. `home` is that of the node at the hit, so a shot computes the same bits
         in a window of any size. `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds
         the hit, `tile_y` and `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the
-        tile per metre. `thickness` is that of the plate; its front face is `behind` the first of `planes`
-        planes of `nodes` nodes each [m]; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative
-        to the hit [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the
-        fields hold this window, if the target has several layers.
+        tile per metre. `thickness` is that of the plate; its front face is `behind` [m] the first of
+        `planes` planes of `nodes` nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit
+        [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the
+        fields hold this window.
         """
 
         first: wp.int32
@@ -108,24 +108,24 @@ def build(variant: Variant) -> SimpleNamespace:
     def window_at(
         plate: Plate,
         thickness: real,
+        first: wp.int32,
         cells_y: wp.int32,
         cells_z: wp.int32,
-        slot: wp.int32,
         hit_y: wp.float64,
         hit_z: wp.float64,
     ):
-        """The window about a hit. It is computed in float64, so a hit far from the origin loses no accuracy."""
+        """The window about a hit, from node `first` of its slot on. It is computed in float64, so a hit far from the
+        origin loses no accuracy."""
         window = Window()
         window.nodes = cells_y * cells_z
         window.planes = plate.planes
-        window.first = slot * plate.planes * window.nodes
+        window.first = first
         window.home = window.first + (cells_y // 2) * cells_z + cells_z // 2
         window.cells_y = cells_y
         window.cells_z = cells_z
         window.thickness = thickness
         window.per_cell = one / plate.spacing
         window.per_plane = plate.per_plane
-        window.behind = one / plate.per_plane
         # Whole cells of the tile are separate from the rest. So two hits that differ by a lattice vector of whole cells
         # compute the same bits.
         across = hit_y * wp.float64(plate.tile_y) / plate.period_y

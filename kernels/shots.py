@@ -9,7 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from . import core_surface, interaction, rigid_body
+from . import core_surface, rigid_body
 from .variant import Variant
 
 
@@ -18,15 +18,16 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the shots for one variant."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     tiny = wp.float64(1.0e-9)
-    surfaces, laws, motion = (part.build(variant) for part in (core_surface, interaction, rigid_body))
-    Surface, Pose, Law, Body, State = surfaces.Surface, surfaces.Pose, laws.Law, motion.Body, motion.State
+    use = variant.use(core_surface, rigid_body)
+    Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
+    Body, State = use.rigid_body.Body, use.rigid_body.State
 
     @wp.struct
     class Shots:
         """Arrays of shape [1] or [shots], SI and radians.
 
-        Hit point, velocity and attitude on impact (docs/model.md §1); the thickness of the plate [m]; the members of
-        Body and Law, the strength of the core [Pa], and the members of Pace that follow from them.
+        Hit point, velocity and attitude on impact (docs/model.md §1); the members of Body, the strength of the core
+        [Pa], and the members of Pace that follow from them.
         """
 
         hit_y: wp.array(dtype=wp.float64)
@@ -37,17 +38,10 @@ def build(variant: Variant) -> SimpleNamespace:
         pitch: wp.array(dtype=wp.float64)
         yaw: wp.array(dtype=wp.float64)
         spin: wp.array(dtype=wp.float64)
-        thickness: wp.array(dtype=wp.float64)
         mass: wp.array(dtype=real)
         inertia_axial: wp.array(dtype=real)
         inertia_transverse: wp.array(dtype=real)
-        a0: wp.array(dtype=real)
-        a1: wp.array(dtype=real)
-        friction: wp.array(dtype=real)
         strength: wp.array(dtype=real)
-        decay_rate: wp.array(dtype=real)
-        degradation: wp.array(dtype=real)
-        onset_jump: wp.array(dtype=real)
         way: wp.array(dtype=wp.float64)
         longest_time: wp.array(dtype=wp.float64)
         longest_step: wp.array(dtype=wp.float64)
@@ -75,7 +69,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def own(values: wp.array(dtype=Any), shot: wp.int32):
         """The value of one shot."""
-        return values[shot % values.shape[0]]
+        return values[wp.min(shot, values.shape[0] - 1)]
 
     @wp.func
     def body_of(shots: Shots, shot: wp.int32):
@@ -84,17 +78,6 @@ def build(variant: Variant) -> SimpleNamespace:
         body.inertia_axial = own(shots.inertia_axial, shot)
         body.inertia_transverse = own(shots.inertia_transverse, shot)
         return body
-
-    @wp.func
-    def law_of(scene: Law, shots: Shots, shot: wp.int32):
-        law = scene
-        law.a0 = own(shots.a0, shot)
-        law.a1 = own(shots.a1, shot)
-        law.friction = own(shots.friction, shot)
-        law.decay_rate = own(shots.decay_rate, shot)
-        law.degradation = own(shots.degradation, shot)
-        law.onset_jump = own(shots.onset_jump, shot)
-        return law
 
     @wp.func
     def pace_of(scene: Pace, shots: Shots, shot: wp.int32):
@@ -131,8 +114,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """How far the core reaches ahead of its centre of mass along x [m]."""
         front = -surface.bounding_radius
         for index in range(surface.rings):
-            ring = surfaces.ring_at(surface, pose, index)
-            broadside = surfaces.broadside(pose)
+            ring = use.core_surface.ring_at(surface, pose, index)
+            broadside = use.core_surface.broadside(pose)
             middle = ring.station * pose.axis[0] + ring.radius * broadside
             front = wp.max(front, middle + wp.abs(ring.half_axial * pose.axis[0] + ring.half_radial * broadside))
         return front
@@ -149,8 +132,10 @@ def build(variant: Variant) -> SimpleNamespace:
         state = State()
         state.attitude = quat(real(turn[0]), real(turn[1]), real(turn[2]), real(turn[3]))
         state.velocity = real(own(shots.velocity, shot)) * direction
-        state.angular_momentum = (body.inertia_axial * real(own(shots.spin, shot))) * motion.axis_of(state.attitude)
-        pose = surfaces.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())
+        state.angular_momentum = (body.inertia_axial * real(own(shots.spin, shot))) * use.rigid_body.axis_of(
+            state.attitude
+        )
+        pose = use.core_surface.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())
         state.position = (-foremost(surface, pose) / direction[0]) * direction
         return state
 
@@ -159,7 +144,6 @@ def build(variant: Variant) -> SimpleNamespace:
         Pace=Pace,
         own=own,
         body_of=body_of,
-        law_of=law_of,
         pace_of=pace_of,
         step_of=step_of,
         line_of_flight=line_of_flight,

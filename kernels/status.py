@@ -2,6 +2,9 @@
 
 from enum import IntEnum
 
+RUNNING = -1
+"""In the place of a status while a shot has not ended."""
+
 
 class Status(IntEnum):
     """Outcome of one shot; codes from UNFINISHED on are failures of the computation, not of the plate."""

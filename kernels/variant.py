@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import warp as wp
@@ -74,6 +75,10 @@ class Variant:
         given = {field.name: getattr(self, field.name) for field in fields(self)}
         parts = [name if value is True else f"{name}{value}" for name, value in given.items() if value]
         return "_".join(["variant", *parts])
+
+    def use(self, *modules: ModuleType) -> SimpleNamespace:
+        """What some modules build for this variant, each under the module's own name."""
+        return SimpleNamespace(**{module.__name__.rpartition(".")[2]: module.build(self) for module in modules})
 
     def kernel(self, function: Callable[..., None], launch_bounds: tuple[int, ...] | None = None) -> wp.Kernel:
         """The launchable kernel of a device function. It has its own module, so that only launched kernels are

@@ -84,12 +84,16 @@ def plate_of(
     return inputs.plate_of(struct, grid, inputs.Put(device, real))
 
 
-def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str) -> Any:
-    """The Fields of some windows, all values poisoned."""
-    fields = struct()
-    fields.cells_y, fields.cells_z = cells_y, cells_z
+def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str, *, real: Any = wp.float64) -> Any:
+    """The Fields of some slots with one window each, all values poisoned. Seen as a whole, they are those of one slot
+    with as many layers."""
+    fields, nodes = struct(), cells_y * cells_z
+    fields.nodes = nodes
+    sizes = {"first": np.arange(slots) * nodes, "cells_y": np.full(slots, cells_y), "cells_z": np.full(slots, cells_z)}
+    for name, values in sizes.items():
+        setattr(fields, name, wp.array(values, dtype=wp.int32, device=device))
     for name in ("exposure", "gain", "filtered"):
-        setattr(fields, name, poisoned(slots * cells_y * cells_z, wp.float64, device))
+        setattr(fields, name, poisoned(slots * nodes, real, device))
     return fields
 
 
@@ -97,6 +101,6 @@ def poisoned_touches(struct: Any, slots: int, surface: Any, device: str) -> Any:
     """The Touches of some slots, all values poisoned."""
     touches = struct()
     for name, variable in struct.vars.items():
-        patches = 1 if name in ("ring_area", "sums") else surface.around
+        patches = 1 if name in ("ring_area", "sums", "total_area") else surface.around
         setattr(touches, name, poisoned(slots * surface.rings * patches, variable.type.dtype, device))
     return touches

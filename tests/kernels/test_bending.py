@@ -15,15 +15,15 @@ from warpimpact.solver.rings import rings_of
 from .probes import poisoned_touches, surface_of
 
 VARIANT = Variant(double=True, bends=True)
-BENDS, MOTION, SURFACES = bending.build(VARIANT), rigid_body.build(VARIANT), core_surface.build(VARIANT)
+use = VARIANT.use(bending, contact, core_surface, footprint, rigid_body)
 LENGTH, RADIUS, MASS, RINGS = 0.1, 0.1e-3, 4e-3, 201
 FORCE = 1000.0
 ROD = ProfileCore(s=(0.0, LENGTH), r=(RADIUS, RADIUS), mass=MASS)
-Body, Load, State, Change = MOTION.Body, MOTION.Load, MOTION.State, MOTION.Change
-Surface, Pose = SURFACES.Surface, SURFACES.Pose
-Footprint, Touches = footprint.build(VARIANT).Footprint, contact.build(VARIANT).Touches
-Sections, Bending = BENDS.Sections, BENDS.Bending
-bent = BENDS.bent
+Body, Load, State, Change = use.rigid_body.Body, use.rigid_body.Load, use.rigid_body.State, use.rigid_body.Change
+Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
+Footprint, Touches = use.footprint.Footprint, use.contact.Touches
+Sections, Bending = use.bending.Sections, use.bending.Bending
+bent = use.bending.bent
 
 
 @wp.kernel(enable_backward=False)
@@ -42,7 +42,7 @@ def bend(
     load.force = wp.vec3d(wp.float64(0.0), force, wp.float64(0.0))
     load.moment = wp.vec3d(wp.float64(0.0), wp.float64(0.0), surface.station[struck] * force)
     load.touching = True
-    touches.ring_area[struck] = wp.float64(1.0)
+    touches.total_area[struck] = wp.float64(1.0)
     sums = touches.sums[struck]
     sums.force = load.force
     sums.moment = load.moment

@@ -42,7 +42,7 @@ from warpimpact.scene import (
 from warpimpact.solver import blocks, inputs, simulate
 from warpimpact.solver.rings import azimuths_of, rings_of
 
-from .probes import astride, plate_of, poisoned
+from .probes import astride, plate_of, poisoned, poisoned_fields
 
 Array = NDArray[np.float64]
 
@@ -178,12 +178,16 @@ LAID = {"simple": Variant(), "block": Variant(window=CELLS**2)}
 def probe_of(variant: Variant) -> Any:
     """A kernel that computes one step of every pose on its own plate, and what it needs."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
-    surfaces, grid, memories, laws, motion, prints = (
-        part.build(variant) for part in (core_surface, plate_grid, exposure, interaction, rigid_body, footprint)
-    )
+    use = variant.use(core_surface, exposure, footprint, interaction, plate_grid, rigid_body)
     scheme = (block if variant.window else contact).build(variant)
-    Surface, Plate_, Fields, Law, Load = surfaces.Surface, grid.Plate, memories.Fields, laws.Law, motion.Load
-    Touches = contact.build(variant).Touches
+    Surface, Plate_, Fields, Law, Load = (
+        use.core_surface.Surface,
+        use.plate_grid.Plate,
+        use.exposure.Fields,
+        use.interaction.Law,
+        use.rigid_body.Load,
+    )
+    Touches = scheme.Touches
 
     def steps(
         surface: Surface,
@@ -201,11 +205,10 @@ def probe_of(variant: Variant) -> Any:
     ) -> None:
         """Two steps at the same pose: the second one finds the exposure of the first."""
         i = wp.tid()
-        if wp.static(variant.window > 0):
-            fields = scheme.own_fields(fields, i)
-        window = scheme.open_window(plate, thickness, fields, i, wp.float64(0.0), wp.float64(0.0))
-        pose = surfaces.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
-        found = prints.footprint_of(surface, plate, window, pose, dt)
+        fields = scheme.own_fields(fields, i)
+        window = scheme.open_window(plate, thickness, fields, 0, wp.float64(0.0), wp.float64(0.0))
+        pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
+        found = use.footprint.footprint_of(surface, plate, window, pose, dt)
         load = Load()
         for _ in range(2):
             load = scheme.load_on(surface, plate, law, fields, window, touches, i, found, pose, dt)
@@ -225,10 +228,7 @@ def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
     plate = plate_of(Plate_, np.ones((1, 1)), np.array([CELL, CELL]), CELL, "cpu", real=variant.real)
     law = Law()
     law.a0, law.friction, law.onset, law.decay_rate = 2.6e9, 0.05, 2.0, np.log(0.8) / 1e-6
-    fields, touches = Fields(), Touches()
-    fields.cells_y = fields.cells_z = CELLS
-    for name in ("exposure", "gain", "filtered"):
-        setattr(fields, name, poisoned(count * CELLS**2, variant.real, "cpu"))
+    fields, touches = poisoned_fields(Fields, count, CELLS, CELLS, "cpu", real=variant.real), Touches()
     patches = count * surface.rings * surface.around
     for name, variable in Touches.vars.items():
         setattr(touches, name, poisoned(patches, variable.type.dtype, "cpu"))

@@ -19,11 +19,15 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-surfaces, grid, memories, laws, motion, contacts, prints = (
-    part.build(VARIANT) for part in (core_surface, plate_grid, exposure, interaction, rigid_body, contact, footprint)
+use = VARIANT.use(contact, core_surface, exposure, footprint, interaction, plate_grid, rigid_body)
+Surface, Plate, Fields, Law, Load = (
+    use.core_surface.Surface,
+    use.plate_grid.Plate,
+    use.exposure.Fields,
+    use.interaction.Law,
+    use.rigid_body.Load,
 )
-Surface, Plate, Fields, Law, Load = surfaces.Surface, grid.Plate, memories.Fields, laws.Law, motion.Load
-Touches = contacts.Touches
+Touches = use.contact.Touches
 
 CELL = 0.25e-3
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
@@ -53,12 +57,13 @@ def loads(
     small."""
     i = wp.tid()
     slot = first + i
-    window = contacts.open_window(plate, thickness, fields, slot, wp.float64(0.0), wp.float64(0.0))
-    pose = surfaces.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
-    found = prints.footprint_of(surface, plate, window, pose, dt)
+    fields = use.contact.own_fields(fields, slot)
+    window = use.contact.open_window(plate, thickness, fields, 0, wp.float64(0.0), wp.float64(0.0))
+    pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
+    found = use.footprint.footprint_of(surface, plate, window, pose, dt)
     inside[i] = found.inside
     if found.inside:
-        loads[i] = contacts.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
+        loads[i] = use.contact.load_on(surface, plate, law, fields, window, touches, slot, found, pose, dt)
 
 
 LOADS = VARIANT.kernel(loads)

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-surfaces = core_surface.build(VARIANT)
-Surface = surfaces.Surface
+use = VARIANT.use(core_surface)
+Surface = use.core_surface.Surface
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
@@ -45,14 +45,14 @@ def share(
 ) -> None:
     """Share beyond the front face of patches that stand across it and move by ±motion in a step of 2 s."""
     i = wp.tid()
-    pose = surfaces.Pose()
+    pose = use.core_surface.Pose()
     pose.axis = vec3(real(1.0), real(0.0), real(0.0))
-    ring, patch = surfaces.Ring(), surfaces.Patch()
+    ring, patch = use.core_surface.Ring(), use.core_surface.Patch()
     ring.area = real(1.0)
     ring.half_axial = extent[i]
     patch.x = depth[i]
     patch.velocity_axial = motion[i]
-    shares[i] = surfaces.immersed_area(pose, ring, patch, real(EVERYWHERE), real(2.0))
+    shares[i] = use.core_surface.immersed_area(pose, ring, patch, real(EVERYWHERE), real(2.0))
 
 
 def patches(
@@ -77,12 +77,12 @@ def patches(
 ) -> None:
     """Every patch of every pose, in the plate frame; area of a patch, and bounds along x, of every ring."""
     i = wp.tid()
-    pose = surfaces.pose_of(surface, position[i], attitude[i], velocity, omega)
+    pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity, omega)
     speeds[i] = pose.speed
     advance, turning = real(0.5) * dt * wp.abs(velocity[0]), real(0.5) * dt * wp.length(omega)
     for k in range(surface.rings):
-        ring = surfaces.ring_at(surface, pose, k)
-        reach = surfaces.reach_along_x(ring, pose, surfaces.broadside(pose), advance, turning)
+        ring = use.core_surface.ring_at(surface, pose, k)
+        reach = use.core_surface.reach_along_x(ring, pose, use.core_surface.broadside(pose), advance, turning)
         areas[i, k] = ring.area
         low[i, k] = ring.centre[0] - reach
         high[i, k] = ring.centre[0] + reach
@@ -90,7 +90,7 @@ def patches(
             cosine, sine = surface.cosine[ring.first + j], surface.sine[ring.first + j]
             outward = cosine * pose.right + sine * pose.up
             around = cosine * pose.up - sine * pose.right
-            patch = surfaces.patch_at(pose, ring, cosine, sine)
+            patch = use.core_surface.patch_at(pose, ring, cosine, sine)
             arms[i, k, j] = vec3(patch.x, patch.y, patch.z) - pose.position
             normals[i, k, j] = ring.normal_axial * pose.axis + ring.normal_radial * outward
             velocities[i, k, j] = (
@@ -99,7 +99,7 @@ def patches(
             outward_x[i, k, j] = patch.outward_x - outward[0]
             around_x[i, k, j] = patch.around_x - around[0]
             closing[i, k, j] = patch.closing
-            immersed[i, k, j] = surfaces.immersed_area(pose, ring, patch, thickness, dt)
+            immersed[i, k, j] = use.core_surface.immersed_area(pose, ring, patch, thickness, dt)
 
 
 SHARE, PATCHES = VARIANT.kernel(share), VARIANT.kernel(patches)

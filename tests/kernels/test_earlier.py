@@ -5,15 +5,14 @@ import pytest
 import warp as wp
 from scipy.ndimage import map_coordinates
 
-from warpimpact.kernels import earlier as earlier_hits
-from warpimpact.kernels import exposure, plate_grid
+from warpimpact.kernels import earlier, exposure, plate_grid
 from warpimpact.kernels.variant import Variant
 
 from .probes import plate_of, poisoned, poisoned_fields
 
 VARIANT = Variant(double=True, burst=True)
-hits, grid, memories = (part.build(VARIANT) for part in (earlier_hits, plate_grid, exposure))
-Earlier, Plate, Fields, Window = hits.Earlier, grid.Plate, memories.Fields, grid.Window
+use = VARIANT.use(earlier, exposure, plate_grid)
+Earlier, Plate, Fields, Window = use.earlier.Earlier, use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
 
 CELL, CELLS_Y, CELLS_Z = 0.25e-3, 20, 26
 SLOTS, COUNT, SLOT = 2, 3, 1
@@ -30,14 +29,14 @@ def hit(
     added: wp.array(dtype=wp.float64),
     found: wp.array(dtype=wp.float64),
 ) -> None:
-    window = grid.window_at(plate, wp.float64(4.0e-3), fields.cells_y, fields.cells_z, SLOT, y[shot], z[shot])
-    memories.blank(fields, window)
-    hits.begin(earlier, SLOT, shot)
-    hits.recall(earlier, fields, plate, window, SLOT, 0, shot, y[shot], z[shot])
+    fields = use.exposure.own_fields(fields, SLOT)
+    window = use.exposure.open_window(plate, wp.float64(4.0e-3), fields, 0, y[shot], z[shot])
+    use.earlier.begin(earlier, SLOT, shot)
+    use.earlier.recall(earlier, fields, plate, window, SLOT, 0, shot, y[shot], z[shot])
     for k in range(NODES):
         found[k] = fields.exposure[window.first + k]
         fields.exposure[window.first + k] = found[k] + added[shot * NODES + k]
-    hits.keep(earlier, fields, window, SLOT, shot)
+    use.earlier.keep(earlier, fields, window, SLOT, shot)
 
 
 kernel = VARIANT.kernel(hit)

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import contact, core_surface, exposure, footprint, plate_grid
+from warpimpact.kernels import core_surface, exposure, footprint, plate_grid
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore
 
@@ -17,10 +17,13 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-surfaces, grid, memories, contacts, prints = (
-    part.build(VARIANT) for part in (core_surface, plate_grid, exposure, contact, footprint)
+use = VARIANT.use(core_surface, exposure, footprint, plate_grid)
+Surface, Plate, Fields, Footprint = (
+    use.core_surface.Surface,
+    use.plate_grid.Plate,
+    use.exposure.Fields,
+    use.footprint.Footprint,
 )
-Surface, Plate, Fields, Footprint = surfaces.Surface, grid.Plate, memories.Fields, prints.Footprint
 
 CELL = 0.25e-3
 THICKNESS = wp.constant(4.0e-3)
@@ -43,19 +46,20 @@ def footprints(
 ) -> None:
     """The footprints of poses; for each ring, whether it is immersed; for each patch, its first cell."""
     i = wp.tid()
-    window = contacts.open_window(plate, real(THICKNESS), fields, i, wp.float64(0.0), wp.float64(0.0))
-    pose = surfaces.pose_of(surface, position[i], attitude[i], velocity, omega)
-    found[i] = prints.footprint_of(surface, plate, window, pose, dt)
+    fields = use.exposure.own_fields(fields, i)
+    window = use.exposure.open_window(plate, real(THICKNESS), fields, 0, wp.float64(0.0), wp.float64(0.0))
+    pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity, omega)
+    found[i] = use.footprint.footprint_of(surface, plate, window, pose, dt)
     for k in range(surface.rings):
-        ring = surfaces.ring_at(surface, pose, k)
+        ring = use.core_surface.ring_at(surface, pose, k)
         immersed[i, k] = 0
         for j in range(surface.around):
-            patch = surfaces.patch_at(pose, ring, surface.cosine[ring.first + j], surface.sine[ring.first + j])
-            if surfaces.immersed_area(pose, ring, patch, window.thickness, dt) > real(0.0):
+            patch = use.core_surface.patch_at(pose, ring, surface.cosine[ring.first + j], surface.sine[ring.first + j])
+            if use.core_surface.immersed_area(pose, ring, patch, window.thickness, dt) > real(0.0):
                 immersed[i, k] = 1
-            cell = grid.cell_at(window, patch.y, patch.z)
-            rows[i, k, j] = (cell.index - window.first) // fields.cells_z
-            columns[i, k, j] = (cell.index - window.first) % fields.cells_z
+            cell = use.plate_grid.cell_at(window, patch.y, patch.z)
+            rows[i, k, j] = (cell.index - window.first) // window.cells_z
+            columns[i, k, j] = (cell.index - window.first) % window.cells_z
 
 
 FOOTPRINTS = VARIANT.kernel(footprints)

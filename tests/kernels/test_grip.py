@@ -16,8 +16,14 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
-surfaces, laws, contacts = (part.build(VARIANT) for part in (core_surface, interaction, grip))
-Ring, Patch, Law, Grip, Face = surfaces.Ring, surfaces.Patch, laws.Law, laws.Contact, contacts.Face
+use = VARIANT.use(core_surface, grip, interaction)
+Ring, Patch, Law, Grip, Face = (
+    use.core_surface.Ring,
+    use.core_surface.Patch,
+    use.interaction.Law,
+    use.interaction.Contact,
+    use.grip.Face,
+)
 
 SLIDING = 100.0  # [m/s]
 
@@ -31,10 +37,10 @@ def grips(
     faces: wp.array(dtype=Face),
 ) -> None:
     i = wp.tid()
-    pose = surfaces.Pose()
+    pose = use.core_surface.Pose()
     pose.speed = speed
-    grips[i] = contacts.grip_of(law, pose, rings[i], patches[i])
-    faces[i] = contacts.face_of(rings[i], patches[i], grips[i].shift)
+    grips[i] = use.grip.grip_of(law, pose, rings[i], patches[i])
+    faces[i] = use.grip.face_of(rings[i], patches[i], grips[i].shift)
 
 
 GRIPS = VARIANT.kernel(grips)

@@ -17,16 +17,16 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
-laws = interaction.build(VARIANT)
-Law, Contact = laws.Law, laws.Contact
+use = VARIANT.use(interaction)
+Law, Contact = use.interaction.Law, use.interaction.Contact
 
 FRICTION, ONSET = 0.05, 4.0
 A0, A1, A2 = 2.6e9, 4.5e6, 7850.0
 STATIC, SINGLE = Variant(double=True), Variant()
-static = interaction.build(STATIC)
-StaticLaw = static.Law
-singles = interaction.build(SINGLE)
-SingleLaw = singles.Law
+static = STATIC.use(interaction)
+StaticLaw = static.interaction.Law
+single = SINGLE.use(interaction)
+SingleLaw = single.interaction.Law
 
 
 def law(
@@ -43,29 +43,29 @@ def law(
     remaining: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
-    found = laws.contact_of(law, closing[i], variation[i], speed[i])
+    found = use.interaction.contact_of(law, closing[i], variation[i], speed[i])
     touching = closing[i] + found.shift * variation[i] * variation[i]
-    found.slope = laws.steady_slope(law, found.share, found.slope, touching)
+    found.slope = use.interaction.steady_slope(law, found.share, found.slope, touching)
     contacts[i] = found
-    stresses[i] = laws.normal_stress(law, closing[i])
-    slopes[i] = laws.stress_slope(law, closing[i])
-    frictions[i] = laws.friction_per_speed(law, sliding[i], speed[i])
-    remaining[i] = laws.remaining(law, exposures[i])
+    stresses[i] = use.interaction.normal_stress(law, closing[i])
+    slopes[i] = use.interaction.stress_slope(law, closing[i])
+    frictions[i] = use.interaction.friction_per_speed(law, sliding[i], speed[i])
+    remaining[i] = use.interaction.remaining(law, exposures[i])
 
 
 def static_law(law: StaticLaw, closing: wp.array(dtype=real), stresses: wp.array(dtype=real)) -> None:
     i = wp.tid()
-    stresses[i] = static.normal_stress(law, closing[i])
+    stresses[i] = static.interaction.normal_stress(law, closing[i])
 
 
 def onset(law: Law, dt: real, velocity: wp.array(dtype=real), impact: real, onsets: wp.array(dtype=real)) -> None:
     i = wp.tid()
-    onsets[i] = laws.onset_speed(law, dt, velocity[i], impact)
+    onsets[i] = use.interaction.onset_speed(law, dt, velocity[i], impact)
 
 
 def exponential(law: SingleLaw, x: wp.array(dtype=wp.float32), values: wp.array(dtype=wp.float32)) -> None:
     i = wp.tid()
-    values[i] = singles.remaining(law, x[i])
+    values[i] = single.interaction.remaining(law, x[i])
 
 
 LAW, ONSET_SPEED = VARIANT.kernel(law), VARIANT.kernel(onset)

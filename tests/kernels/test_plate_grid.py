@@ -20,9 +20,14 @@ Array = NDArray[np.float64]
 
 VARIANT, SINGLE = Variant(double=True), Variant()
 real = VARIANT.real
-grid, single_grid = plate_grid.build(VARIANT), plate_grid.build(SINGLE)
-memories, single_memories = exposure.build(VARIANT), exposure.build(SINGLE)
-Plate, Fields, Window, Cell, Box = grid.Plate, memories.Fields, grid.Window, grid.Cell, grid.Box
+use, single = (variant.use(exposure, plate_grid) for variant in (VARIANT, SINGLE))
+Plate, Fields, Window, Cell, Box = (
+    use.plate_grid.Plate,
+    use.exposure.Fields,
+    use.plate_grid.Window,
+    use.plate_grid.Cell,
+    use.plate_grid.Box,
+)
 
 CELL = 0.25e-3
 CELLS_Y, CELLS_Z = 24, 30
@@ -41,10 +46,7 @@ def lay(
     windows: wp.array(dtype=Window),
 ) -> None:
     slot = wp.tid()
-    windows[slot] = grid.window_at(
-        plate, real(THICKNESS), fields.cells_y, fields.cells_z, slot, hit_y[slot], hit_z[slot]
-    )
-    memories.blank(fields, windows[slot])
+    windows[slot] = use.exposure.open_window(plate, real(THICKNESS), fields, slot, hit_y[slot], hit_z[slot])
 
 
 def look_up(
@@ -57,8 +59,8 @@ def look_up(
     values: wp.array(dtype=real),
 ) -> None:
     i = wp.tid()
-    cell = grid.cell_at(windows[slot], y[i], z[i])
-    values[i] = memories.gather(field, fields.cells_z, cell.index, cell.y, cell.z)
+    cell = use.plate_grid.cell_at(windows[slot], y[i], z[i])
+    values[i] = use.exposure.gather(field, windows[slot].cells_z, cell.index, cell.y, cell.z)
 
 
 def scatters(
@@ -71,8 +73,8 @@ def scatters(
     native: wp.array(dtype=wp.float32),
 ) -> None:
     for i in range(len(index)):
-        single_memories.scatter_plain(plain, stride, index[i], y[i], z[i], amount[i])
-        single_memories.scatter(native, stride, index[i], y[i], z[i], amount[i])
+        single.exposure.scatter_plain(plain, stride, index[i], y[i], z[i], amount[i])
+        single.exposure.scatter(native, stride, index[i], y[i], z[i], amount[i])
 
 
 def meet(
@@ -85,25 +87,25 @@ def meet(
     count: wp.int32,
     total: wp.array(dtype=wp.float32),
 ) -> None:
-    total[0] = single_grid.meet(area, slope, gain, at, tile, start, count)
+    total[0] = single.plate_grid.meet(area, slope, gain, at, tile, start, count)
 
 
 def cells(fields: Fields, windows: wp.array(dtype=Window), y: real, z: real, found: wp.array(dtype=Cell)) -> None:
     slot = wp.tid()
-    found[slot] = grid.cell_at(windows[slot], y, z)
+    found[slot] = use.plate_grid.cell_at(windows[slot], y, z)
 
 
 def gain(fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, y: real, z: real, amount: real) -> None:
-    cell = grid.cell_at(windows[slot], y, z)
-    memories.scatter(fields.gain, fields.cells_z, cell.index, cell.y, cell.z, amount)
+    cell = use.plate_grid.cell_at(windows[slot], y, z)
+    use.exposure.scatter(fields.gain, windows[slot].cells_z, cell.index, cell.y, cell.z, amount)
 
 
 def spread(plate: Plate, fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, box: Box) -> None:
-    memories.spread(plate, fields, windows[slot], box)
+    use.exposure.spread(plate, fields, windows[slot], box)
 
 
 def settle(plate: Plate, fields: Fields, windows: wp.array(dtype=Window), slot: wp.int32, box: Box) -> None:
-    memories.settle(plate, fields, windows[slot], box)
+    use.exposure.settle(plate, fields, windows[slot], box)
 
 
 LAY, LOOK_UP, CELLS, GAIN, SPREAD, SETTLE = (
@@ -126,7 +128,7 @@ def beneath_kernel(variant: Variant) -> Any:
         shares: wp.array(dtype=real),
     ) -> None:
         i = wp.tid()
-        window = part.window_at(plate, real(THICKNESS), 2, 2, 0, hit_y, hit_z)
+        window = part.window_at(plate, real(THICKNESS), 0, 2, 2, hit_y, hit_z)
         material[i] = plate.tile[part.tile_at(plate, window, y[i], z[i])]
         shares[i] = part.on_plate(plate, window, y[i], z[i])
 

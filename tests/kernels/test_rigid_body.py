@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True)
 real, vec3 = VARIANT.real, VARIANT.vec3
-motion = rigid_body.build(VARIANT)
-Body, State, Load = motion.Body, motion.State, motion.Load
+use = VARIANT.use(rigid_body)
+Body, State, Load = use.rigid_body.Body, use.rigid_body.State, use.rigid_body.Load
 
 COUNT = 64
 MASS, AXIAL, TRANSVERSE = 4.0e-3, 1.5e-8, 1.65e-7  # the paper's core, SI
@@ -39,11 +39,11 @@ def convert(
     """ω from the states' L, and L from that ω."""
     i = wp.tid()
     state = states[i]
-    axis = motion.axis_of(state.attitude)
+    axis = use.rigid_body.axis_of(state.attitude)
     axes[i] = axis
-    rates[i] = motion.angular_velocity(body, axis, state.angular_momentum)
-    momenta[i] = motion.angular_momentum(body, axis, rates[i])
-    energies[i] = motion.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+    rates[i] = use.rigid_body.angular_velocity(body, axis, state.angular_momentum)
+    momenta[i] = use.rigid_body.angular_momentum(body, axis, rates[i])
+    energies[i] = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
 
 
 def drift(
@@ -52,13 +52,13 @@ def drift(
     i = wp.tid()
     state = states[i]
     for _ in range(repeats):
-        state = motion.drift(body, state, dt)
+        state = use.rigid_body.drift(body, state, dt)
     drifted[i] = state
 
 
 def turn(body: Body, states: wp.array(dtype=State), time: real, axes: wp.array(dtype=vec3)) -> None:
     i = wp.tid()
-    axes[i] = motion.turned(body, motion.axis_of(states[i].attitude), states[i].angular_momentum, time)
+    axes[i] = use.rigid_body.turned(body, use.rigid_body.axis_of(states[i].attitude), states[i].angular_momentum, time)
 
 
 def kick(
@@ -72,8 +72,8 @@ def kick(
 ) -> None:
     """The kicked states, and the mean force and moment of each kick."""
     i = wp.tid()
-    kicked[i] = motion.kick(body, states[i], loads[i], dt)
-    force, moment = motion.mean_load(body, states[i], loads[i], dt)
+    kicked[i] = use.rigid_body.kick(body, states[i], loads[i], dt)
+    force, moment = use.rigid_body.mean_load(body, states[i], loads[i], dt)
     forces[i] = force
     moments[i] = moment
 
@@ -328,17 +328,17 @@ def test_kick_that_would_only_add_energy_is_none(device: str) -> None:
 
 
 SINGLE = Variant(double=False)
-of_single = rigid_body.build(SINGLE)
+single = SINGLE.use(rigid_body)
 
 
 def single_energy(
-    body: of_single.Body,
+    body: single.rigid_body.Body,
     axes: wp.array(dtype=SINGLE.vec3),
     momenta: wp.array(dtype=SINGLE.vec3),
     energies: wp.array(dtype=SINGLE.real),
 ) -> None:
     i = wp.tid()
-    energies[i] = of_single.kinetic_energy(body, axes[i], SINGLE.vec3(), momenta[i])
+    energies[i] = single.rigid_body.kinetic_energy(body, axes[i], SINGLE.vec3(), momenta[i])
 
 
 SINGLE_ENERGY = SINGLE.kernel(single_energy)
@@ -350,7 +350,7 @@ def test_energy_of_a_spinning_disc_is_exact_in_single_precision(device: str) -> 
     rng, axial = np.random.default_rng(2), 1.5e-8
     axes = unit_vectors(rng, COUNT).astype(np.float32)
     spin = np.geomspace(1e2, 1e6, COUNT)
-    body = of_single.Body()
+    body = single.rigid_body.Body()
     body.mass, body.inertia_axial, body.inertia_transverse = MASS, axial, 0.5 * axial
     momenta = (axial * spin[:, None] * axes).astype(np.float32)
     found = poisoned(COUNT, SINGLE.real, device)

@@ -167,8 +167,6 @@ def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
     shots = near_bursts()
     march = March(scene_of(paper_plate(), behind), Numerics(fidelity="draft"), shots, wp.get_device("cpu"))
     outcomes = march._empty(march.stage.Outcomes, (len(shots),))
-    if march.variant.layered:
-        march.inputs.place_windows(march._windows(*march.cells))
     order = march.inputs.put(marching.in_turns(np.arange(len(shots)), COUNT, slots), wp.int32)
     scratch = march._scratch(slots, *march.cells)
     for first, number in marching.turns(len(shots), COUNT, slots):

@@ -7,14 +7,22 @@ from pydantic_core import ErrorDetails
 
 from ..scene.units import brief, quoted
 
+MOST_TOLD = 8
+"""Problems that are told of one file."""
+
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
-    """The first problem as a sentence, and how many more there are."""
+    """The first problems as a sentence, and how many more there are."""
     problems = error.errors(include_url=False)
-    place, told = _place(problems[0], data), complaint(problems[0])
-    more = len(problems) - 1
-    also = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
-    return f"{place}: {told}{also}" if place else f"{told}{also}"
+    told = [_told(problem, data) for problem in problems[:MOST_TOLD]]
+    if (more := len(problems) - len(told)) > 0:
+        told.append(f"{more} more problem{'s' if more > 1 else ''}")
+    return "; also ".join(told)
+
+
+def _told(problem: ErrorDetails, data: dict[str, Any]) -> str:
+    place, told = _place(problem, data), complaint(problem)
+    return f"{place}: {told}" if place else told
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:

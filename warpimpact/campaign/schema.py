@@ -171,4 +171,9 @@ def _take_plates(schema: Schema) -> None:
     }
     several = {"type": "array", "items": {"$ref": "#/$defs/NamedPlate"}, "minItems": 2}
     told = schema["properties"]["plate"]
-    schema["properties"]["plate"] = {"description": told.pop("description"), "anyOf": [told, several]}
+    schema["properties"]["plate"] = {
+        "description": told.pop("description"),
+        "if": {"type": "array"},  # not anyOf: a slip in one of many keys would make an editor mark the whole table
+        "then": several,
+        "else": told,
+    }

@@ -1,6 +1,7 @@
 """The commands examples, new, schema and completion: what helps to write a campaign and to type a command."""
 
 import argparse
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,8 +11,9 @@ from .options import Commands, add_command, add_output, add_overwrite
 from .paths import check_output
 
 _SCHEMA = "warpimpact.schema.json"
+_FIT_SCHEMA = "warpimpact.fit.schema.json"
 _FITS = "fits"
-"""Folder of the examples that warpimpact identify takes; the schema is that of campaigns."""
+"""Folder of the examples that warpimpact identify takes."""
 
 
 def add_examples(commands: Commands) -> None:
@@ -40,8 +42,8 @@ def add_new(commands: Commands) -> None:
         "new",
         _new,
         summary="start a campaign of your own from an example",
-        description="Copy a campaign that comes with warpimpact, and the files that it names. The schema of campaigns "
-        f"is written beside it ({_SCHEMA}), so that an editor can complete and check the keys.",
+        description="Copy a campaign that comes with warpimpact, and the files that it names. Its schema "
+        f"is written beside it ({_SCHEMA}, {_FIT_SCHEMA}), so that an editor can complete and check the keys.",
         example="new slotted_plate -o my.toml",
     )
     parser.add_argument("name", metavar="NAME", help="one of those that warpimpact examples lists")
@@ -61,18 +63,18 @@ def _new(arguments: argparse.Namespace) -> None:
         hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(paths)}"
         raise CampaignError(f'got the unknown example "{name}"; {hint}')
     source, output = paths[name], arguments.output or Path(f"{name}.toml")
-    text = source.read_text(encoding="utf-8")
+    # Commands in the comments name the file by its place in the checkout.
+    text = re.sub(rf"campaigns/(?:{_FITS}/)?{name}\.toml", lambda _: output.name, source.read_text(encoding="utf-8"))
     copies = {source.parent / file: output.parent / file for file in _named(tomllib.loads(text))}
     for file in (output, *copies.values()):
         check_output(file, overwrite=arguments.overwrite)
     for one, copy in copies.items():
         shutil.copyfile(one, copy)
     is_fit = source.parent.name == _FITS
-    output.write_text(text if is_fit else f"#:schema {_SCHEMA}\n{text}", encoding="utf-8")
-    schema = [] if is_fit else [output.parent / _SCHEMA]
-    for one in schema:
-        one.write_text(_schema_text(), encoding="utf-8")
-    for written in (output, *copies.values(), *schema):
+    schema = output.parent / (_FIT_SCHEMA if is_fit else _SCHEMA)
+    output.write_text(f"#:schema {schema.name}\n{text}", encoding="utf-8")
+    schema.write_text(_schema_text(is_fit), encoding="utf-8")
+    for written in (output, *copies.values(), schema):
         print(written)
 
 
@@ -104,25 +106,27 @@ def add_schema(commands: Commands) -> None:
         f"Better TOML, completes and checks a campaign whose first line is: #:schema {_SCHEMA}",
         example=f"schema -o {_SCHEMA}",
     )
+    parser.add_argument("--fit", action="store_true", help="the schema of the fits of warpimpact identify")
     add_output(parser, "SCHEMA.json", "file (default: printed)")
     add_overwrite(parser, "an existing file")
 
 
 def _schema(arguments: argparse.Namespace) -> None:
     if arguments.output is None:
-        print(_schema_text(), end="")
+        print(_schema_text(arguments.fit), end="")
         return
     check_output(arguments.output, overwrite=arguments.overwrite)
-    arguments.output.write_text(_schema_text(), encoding="utf-8")
+    arguments.output.write_text(_schema_text(arguments.fit), encoding="utf-8")
     print(arguments.output)
 
 
-def _schema_text() -> str:
+def _schema_text(is_fit: bool) -> str:
     import json
 
     from warpimpact.campaign.schema import campaign_schema
+    from warpimpact.identification.schema import fit_schema
 
-    return json.dumps(campaign_schema(), indent=1, ensure_ascii=False) + "\n"
+    return json.dumps(fit_schema() if is_fit else campaign_schema(), indent=1, ensure_ascii=False) + "\n"
 
 
 def add_completion(commands: Commands) -> None:
@@ -146,6 +150,10 @@ def _completion(arguments: argparse.Namespace) -> None:
     program = parser()
     for command in _commands(program):
         for action in command._actions:
+            if command.prog.endswith(" new") and action.dest == "name":
+                action.choices = list(_campaigns())
+            elif action.dest == "device":
+                action.choices = ("auto", "cpu", "cuda:0")
             if action.type is Path:
                 vars(action)["complete"] = shtab.FILE
     print(shtab.complete(program, arguments.shell))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import reduce
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -82,6 +83,7 @@ class Arrays:
         sections: of the core behind the rings; None where it does not bend.
         grids: the plate, and the layers behind it.
         materials: of the plate, and of the layers behind it.
+        laminates: for every layer, the first one of those with which it shares the memory of contact.
         onset: κ of the law.
         shots: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         rows: of the trace of each shot; 0 for none.
@@ -97,6 +99,7 @@ class Arrays:
     sections: Sections | None
     grids: list[Grid]
     materials: list[Materials]
+    laminates: list[int]
     onset: float
     shots: dict[str, Array]
     rows: int
@@ -120,7 +123,7 @@ def variant_of(resolution: Resolution, scene: Scene, shots: Shots, materials: li
         rubs=any(one.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, one in enumerate(plates)),
         rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
         rimmed=any(plate.size is not None for plate in plates),
-        deep=degrades and not resolution.nodal and any(map(_is_deep, plates, materials)),
+        deep=degrades and not resolution.nodal and _is_deep(scene, materials),
         bends=scene.record.bending,
         layered=len(plates) > 1,
         burst=degrades and shots.at_a_plate > 1,
@@ -144,7 +147,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
     nodal, around = resolution.nodal, resolution.patches_around
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
     materials = materials_of(scene, shots)
-    variant = variant_of(resolution, scene, shots, materials)
+    variant, laminates = variant_of(resolution, scene, shots, materials), laminates_of(scene, materials)
     conditions = _conditions(scene, resolution, shots, materials)
     arrays = Arrays(
         resolution=resolution,
@@ -158,6 +161,7 @@ def arrays_of(scene: Scene, numerics: Numerics | Fidelity, shots: Shots, *, trac
             for layer, planes in zip(target.layers, planes_of(variant, resolution, scene, materials), strict=True)
         ],
         materials=materials,
+        laminates=laminates,
         onset=scene.interaction.onset,
         shots=conditions,
         rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
@@ -187,16 +191,36 @@ def _grid(plate: Plate, resolution: Resolution, wider: float, planes: Planes) ->
     )
 
 
-def _is_deep(plate: Plate, material: Materials) -> bool:
-    """Whether a layer is thicker than the depth over which it weakens together, in any shot."""
-    return material.weakens and bool((material.thickness > plate.degradation_depth).any())
+def laminates_of(scene: Scene, materials: list[Materials]) -> list[int]:
+    """For every layer, the first one of its laminate: of layers that weaken, touch each other and remember alike. A
+    laminate of one material is the plate of its thickness."""
+    layers, first = scene.target.layers, [0]
+    for k, (before, layer) in enumerate(pairwise(layers), start=1):
+        both = materials[k - 1].weakens and materials[k].weakens and materials[k - 1].by_path == materials[k].by_path
+        reaches = [(one.degradation_length, one.degradation_depth) for one in (before, layer)]
+        touching = scene.target.gaps[k] == 0.0
+        first.append(first[-1] if both and touching and reaches[0] == reaches[1] else k)
+    return first
+
+
+def _depths(scene: Scene, materials: list[Materials]) -> list[float]:
+    """For every layer, the largest thickness of its laminate [m]."""
+    first = laminates_of(scene, materials)
+    rear = {k: material.front + material.thickness for k, material in zip(first, materials, strict=True)}
+    return [float((rear[k] - materials[k].front).max()) for k in first]
+
+
+def _is_deep(scene: Scene, materials: list[Materials]) -> bool:
+    """Whether a laminate is thicker than the depth over which it weakens together, in any shot."""
+    every = zip(scene.target.layers, materials, _depths(scene, materials), strict=True)
+    return any(material.weakens and depth > layer.degradation_depth for layer, material, depth in every)
 
 
 def planes_of(variant: Variant, resolution: Resolution, scene: Scene, materials: list[Materials]) -> list[Planes]:
     """The planes of all layers, about as far apart as a step goes, with one to spare before and behind."""
     planes = []
-    for layer, material in zip(scene.target.layers, materials, strict=True):
-        thickness, depth = float(material.thickness.max()), layer.degradation_depth
+    for layer, material, thickness in zip(scene.target.layers, materials, _depths(scene, materials), strict=True):
+        depth = layer.degradation_depth
         reach = max(FEWEST_PLANES, math.ceil(depth / float(resolution.travel * resolution.passage(thickness))))
         number = math.floor(thickness * reach / depth) + 4 if material.weakens else 4
         planes.append(Planes(number, depth / reach, reach) if variant.deep else Planes())
@@ -212,10 +236,9 @@ def half_taps(length: float, spacing: float) -> Array:
 def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: list[Materials]) -> dict[str, Array]:
     """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
 
-    The layer that needs the shortest step sets the step. The law is that of the plate; the thickness is the depth of
-    the whole target.
+    The layer that needs the shortest step sets the step.
     """
-    core, target, body, plate = scene.core, scene.target, scene.core.mass_properties, materials[0]
+    core, target, body = scene.core, scene.target, scene.core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
     passage = _least(resolution.passage(one.thickness) for one in materials)
     times = (
@@ -225,17 +248,10 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
     gaps = sum(target.gaps)
     return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
-        "thickness": depth,
         "mass": mass,
         "inertia_axial": scale * body.inertia_axial,
         "inertia_transverse": scale * body.inertia_transverse,
-        "a0": plate.a0,
-        "a1": plate.a1,
         "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
-        "friction": plate.friction,
-        "decay_rate": plate.decay_rate,
-        "degradation": plate.degradation,
-        "onset_jump": plate.onset_jump,
         "way": resolution.travel * passage,
         "longest_time": _least(times),
         "longest_step": passage,

@@ -55,7 +55,7 @@ def first_window(arrays: Arrays, shots: Shots) -> int:
     turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
     half = (
         slack * arrays.core.max_radius / math.cos(steepest)
-        + float(arrays.shots["thickness"].max()) * math.tan(steepest)
+        + float((arrays.materials[-1].front + arrays.materials[-1].thickness).max()) * math.tan(steepest)
         + arrays.core.bounding_radius * turned
     )
     return 2 * (math.ceil(half / arrays.grid.spacing) + 2 * arrays.grid.reach + 3)

@@ -38,22 +38,20 @@ class Inputs:
     Attributes:
         stage: the build of the march that the scene needs.
         put: puts values on the device.
+        plates: structs of the plates of all layers.
         count: number of shots.
-        surface, sections, plate, law, shots, pace, target: structs on the device.
+        surface, sections, target, law, shots, pace: structs on the device.
     """
 
     def __init__(self, arrays: Arrays, device: Any) -> None:
         self.stage, self.put = march.build(arrays.variant), Put(device.alias, arrays.variant.real)
         self.surface = surface_of(self.stage.Surface, arrays.core, arrays.rings, arrays.azimuths, self.put)
         self.plates = [plate_of(self.stage.Plate, grid, self.put) for grid in arrays.grids]
-        self.plate = self.plates[0]
-        self._planes = np.array([grid.planes.number for grid in arrays.grids])
         self.target = self._target(arrays)
         self.sections = self._sections(arrays)
         self.shots = self._shots(arrays)
         self.count = len(arrays.shots["hit_y"])
         self.law = self.stage.Law()
-        self.law.by_path, self.law.a2 = arrays.materials[0].by_path, arrays.materials[0].a2
         self.law.onset_share, self.law.onset_limit = arrays.onset, LARGEST_ONSET
         self.pace = self.stage.Pace()
         self.pace.time_step, self.pace.way_along = arrays.resolution.time_step or 0.0, arrays.resolution.way_along
@@ -67,32 +65,23 @@ class Inputs:
         self.shots.longest_way = self.put(ways, wp.float64)
 
     def _target(self, arrays: Arrays) -> Any:
-        """The layers of a target (kernels/layers.py), all but their windows; empty if the plate stands alone."""
-        target, materials = self.stage.Layers(), arrays.materials
-        if not arrays.variant.layered:
-            return target
-        target.count, target.plates = (
-            len(materials),
-            wp.array(self.plates, dtype=self.stage.Plate, device=self.put.device),
-        )
+        """The Target (kernels/target.py)."""
+        target, materials = self.stage.Target(), arrays.materials
+        target.count = len(materials)
+        if arrays.variant.layered:
+            target.plates = wp.array(self.plates, dtype=self.stage.Plate, device=self.put.device)
+        else:
+            target.plates = self.plates[0]
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
+        target.laminate = self.put(np.array(arrays.laminates), wp.int32)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
         target.a2 = self.put(np.array([one.a2 for one in materials]))
         target.standoffs, target.ahead = self.put(arrays.layer_standoffs), arrays.ahead
-        for name, variable in self.stage.Layers.vars.items():
+        for name, variable in self.stage.Target.vars.items():
             if getattr(variable.type, "ndim", 1) == 2:
                 rows = np.broadcast_arrays(*(getattr(one, name) for one in materials))
                 setattr(target, name, self.put(np.stack(rows), variable.type.dtype))
         return target
-
-    def place_windows(self, cells: list[tuple[int, int]]) -> None:
-        """Give every layer that weakens a window of so many nodes, one behind the other."""
-        sizes = np.array(cells)
-        nodes = self._planes * sizes.prod(axis=1)
-        ends = np.cumsum(nodes)
-        self.target.first = self.put(ends - nodes, wp.int32)
-        self.target.cells_y, self.target.cells_z = (self.put(column, wp.int32) for column in sizes.T)
-        self.target.nodes = int(ends[-1])
 
     def _sections(self, arrays: Arrays) -> Any:
         struct = self.stage.Sections()

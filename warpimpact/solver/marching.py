@@ -38,7 +38,17 @@ from warpimpact.solver.bursts import (
 )
 from warpimpact.solver.device import cores, free_memory, halving, load
 from warpimpact.solver.inputs import Inputs
-from warpimpact.solver.layering import Passages, Weakened, deep_cells, material_about, nodes_about, weakened
+from warpimpact.solver.layering import (
+    Passages,
+    Weakened,
+    deep_cells,
+    firsts_of,
+    material_about,
+    nodes_about,
+    nodes_of,
+    share_left,
+    weakened,
+)
 from warpimpact.solver.resolution import Fidelity
 
 Array = NDArray[np.float64]
@@ -135,12 +145,10 @@ class March:
         self._launch(order, outcomes, scratch, 1, before, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells), {}
-        planes = self.arrays.grid.planes.number
-        exposure = np.zeros(planes * math.prod(self.cells))
+        left = np.ones(self.cells)
         if self.variant.degrades and self.arrays.materials[0].weakens:
-            exposure = _host(scratch[0].exposure)[: exposure.size]
-        decayed = np.exp(self.arrays.shots["decay_rate"][-1] * exposure.reshape(planes, *self.cells)).mean(axis=0)
-        return np.asarray(self._material * decayed), self._behind(scratch)
+            left = share_left(self.arrays, 0, scratch[0].exposure.numpy(), self._windows(*self.cells))
+        return np.asarray(self._material * left), self._behind(scratch)
 
     def _behind(self, scratch: tuple[Any, ...]) -> dict[int, Weakened]:
         if not (self.variant.layered and self.variant.degrades):
@@ -171,7 +179,13 @@ class March:
         wp.launch(
             flight.kernel,
             count,
-            inputs=[self.inputs.shots, contact, self.inputs.put(standoffs, wp.float64), self.arrays.ahead],
+            inputs=[
+                self.inputs.shots,
+                self.inputs.target,
+                contact,
+                self.inputs.put(standoffs, wp.float64),
+                self.arrays.ahead,
+            ],
             outputs=[report],
             device=self.device,
         )
@@ -196,20 +210,20 @@ class March:
 
     def _windows(self, cells_y: int, cells_z: int) -> list[tuple[int, int]]:
         """Cells of the windows of all layers, if the plate's has this many."""
-        return [(cells_y, cells_z)] + [
+        own = [(cells_y, cells_z)] + [
             deep_cells(self.arrays, layer, cells_y) for layer in range(1, len(self.inputs.plates))
         ]
+        return [own[first] for first in self.arrays.laminates]
 
-    def _nodes(self, cells_y: int, cells_z: int) -> int:
-        """Nodes of a slot in all its windows."""
-        windows = zip(self._windows(cells_y, cells_z), self.arrays.grids, strict=True)
-        return sum(grid.planes.number * y * z for (y, z), grid in windows)
+    def _nodes(self, cells_y: int, cells_z: int) -> list[int]:
+        """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""
+        return nodes_of(self.arrays, self._windows(cells_y, cells_z))
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings: int = self.inputs.surface.rings * per_ring
-        nodes = self._nodes(cells_y, cells_z)
+        nodes = sum(self._nodes(cells_y, cells_z))
         earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
         return len(self._fields()) * nodes * size + earlier + self._patches() * (7 * size + 2 * 4) + rings
 
@@ -217,7 +231,8 @@ class March:
         """Names of the fields that a slot needs."""
         if self.variant.window and self.device.is_cuda:  # the others are in shared memory
             return ["filtered"] if self._keeps_fields else []
-        return [name for name in self.stage.Fields.vars if name not in ("cells_y", "cells_z") and self._keeps_fields]
+        members, real = self.stage.Fields.vars.items(), self.variant.real
+        return [name for name, member in members if self._keeps_fields and getattr(member.type, "dtype", None) is real]
 
     @property
     def _keeps_fields(self) -> bool:
@@ -232,7 +247,7 @@ class March:
         free = free_memory() if self.device.is_cpu else self.device.free_memory
         wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots) // self.at_a_plate)
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
-        return min(wanted, affordable, (2**31 - 1) // (self.at_a_plate * self._nodes(cells_y, cells_z)))
+        return min(wanted, affordable, (2**31 - 1) // (self.at_a_plate * sum(self._nodes(cells_y, cells_z))))
 
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
@@ -240,10 +255,13 @@ class March:
     def _scratch(self, slots: int, cells_y: int, cells_z: int) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
-        scratch, touches = self.stage.Fields(), self.stage.Touches()
-        scratch.cells_y, scratch.cells_z = cells_y, cells_z
+        fields, touches, put = self.stage.Fields(), self.stage.Touches(), self.inputs.put
+        nodes = self._nodes(cells_y, cells_z)
+        fields.nodes, fields.first = sum(nodes), put(firsts_of(self.arrays, nodes), wp.int32)
+        cells = np.array(self._windows(cells_y, cells_z)).T
+        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in cells)
         for name in self._fields():
-            setattr(scratch, name, empty(slots * self._nodes(cells_y, cells_z)))
+            setattr(fields, name, empty(slots * fields.nodes))
         patches = slots * self._patches()
         for name in ("area", "slope", "shift", "gain", "y", "z", *(["x"] if self.variant.deep else [])):
             setattr(touches, name, empty(patches))
@@ -254,8 +272,8 @@ class March:
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)
-        earlier = earlier_hits(self.stage, self.at_a_plate, slots, self._windows(cells_y, cells_z), self.device)
-        return scratch, touches, self.passages.stack(slots), earlier
+        earlier = earlier_hits(self.stage, self.at_a_plate, slots, nodes, self.device)
+        return fields, touches, self.passages.stack(slots), earlier
 
     def _launch(
         self,
@@ -279,11 +297,10 @@ class March:
                 order,
                 inputs.surface,
                 inputs.sections,
-                inputs.plate,
+                inputs.target,
                 inputs.law,
                 inputs.shots,
                 inputs.pace,
-                inputs.target,
                 *scratch,
             ],
             outputs=[outcomes, self.passages.filled, self.bending, self.history],
@@ -294,8 +311,6 @@ class March:
     def _march_some(self, which: NDArray[np.int64], outcomes: Any, progress: Progress1) -> None:
         """March the shots of the given indices in windows of one size."""
         load(self.stage.kernel, self.device)
-        if self.variant.layered:
-            self.inputs.place_windows(self._windows(*self.cells))
         if self.device.is_cpu:
             launch = partial(self._launch, self.inputs.put(which, wp.int32), outcomes)
             self._on_threads(launch, self._cpu_scratch(), len(which), progress)

@@ -229,8 +229,8 @@ MISTAKES = {
     "two mistakes": (
         'mass = "4 g"\n[plate]\nthickness = "4 mm"',
         'mass = "4 mm"\n[plate]\nthickness = "4 g"',
-        'core.mass: got "4 mm", which is not a mass; give a number in kg or a string such as "4 g" '
-        "(and 1 more problem)",
+        'core.mass: got "4 mm", which is not a mass; give a number in kg or a string such as "4 g"; also '
+        'plate.thickness: got "4 g", which is not a length; give a number in m or a string such as "4 mm"',
     ),
 }
 

@@ -53,6 +53,11 @@ def test_it_takes(schema: dict[str, Any], campaign: dict[str, Any], table: str, 
     assert complaints(schema, campaign | {table: campaign.get(table, stop) | {key: value}}) == []
 
 
+def test_a_slip_in_a_plate_is_found_where_it_is(schema: dict[str, Any], campaign: dict[str, Any]) -> None:
+    wrong = campaign | {"plate": campaign["plate"] | {"thickness": True}}
+    assert complaints(schema, wrong) == ["$.plate.thickness"]
+
+
 @pytest.mark.parametrize(
     ("table", "key", "value"),
     [

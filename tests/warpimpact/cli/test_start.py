@@ -7,10 +7,12 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.identification.reading import read_fit
+from warpimpact.identification.schema import fit_schema
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -48,7 +50,7 @@ def test_a_new_campaign_can_be_read(name: str, capsys: pytest.CaptureFixture[str
 def test_a_new_fit_can_be_read() -> None:
     assert main(["new", "paper_fit"]) == 0
     assert read_fit("paper_fit.toml").observed == 10
-    assert not Path("warpimpact.schema.json").exists()
+    assert [path.name for path in Path().glob("*.json")] == ["warpimpact.fit.schema.json"]
 
 
 def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,14 +76,36 @@ def test_the_schema_is_printed_or_written(capsys: pytest.CaptureFixture[str]) ->
     assert main(["schema", "-o", "it.json"]) == 2
 
 
+def test_a_new_file_names_itself_in_its_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("layered_target", "paper_fit"):
+        assert main(["new", name, "-o", "my.toml", "--overwrite"]) == 0
+        text = Path("my.toml").read_text(encoding="utf-8")
+        assert " my.toml" in text
+        assert "campaigns/" not in text
+    assert main(["examples"]) == 0
+    assert "campaigns/" not in capsys.readouterr().out
+
+
+def test_the_schema_of_fits_takes_the_fits_and_finds_slips() -> None:
+    validator = Draft202012Validator(fit_schema())
+    for path in (CAMPAIGNS / "fits").glob("*.toml"):
+        fit = tomllib.loads(path.read_text(encoding="utf-8"))
+        assert list(validator.iter_errors(fit)) == []
+        for table, slip in (("plate", {"thicknes": 1}), ("sampling", {"set": 1}), ("discrepancy", {"speed": 1})):
+            (error,) = validator.iter_errors(fit | {table: fit.get(table, {}) | slip})
+            assert error.json_path == f"$.{table}"
+
+
 def test_bash_completes_commands_and_options(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", "bash"]) == 0
     script = capsys.readouterr().out + (
         "COMP_WORDS=(warpimpact pl); COMP_CWORD=1; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
         "COMP_WORDS=(warpimpact run --ov); COMP_CWORD=2; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
+        "COMP_WORDS=(warpimpact new slo); COMP_CWORD=2; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
+        "COMP_WORDS=(warpimpact run --device c); COMP_CWORD=3; _shtab_warpimpact; echo ${COMPREPLY[@]}\n"
     )
     done = subprocess.run(["bash"], input=script, capture_output=True, text=True, check=False)
-    assert done.stdout.splitlines() == ["plot plate", "--overwrite"]
+    assert done.stdout.splitlines() == ["plot plate", "--overwrite", "slotted_plate", "cpu cuda:0"]
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,52 @@
+"""The JSON schema of fit files, for editors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from warpimpact.campaign.schema import campaign_schema
+from warpimpact.identification.fit import Sampling
+from warpimpact.identification.reading import DISCREPANCY
+from warpimpact.scene import Record
+
+Schema = dict[str, Any]
+
+
+def fit_schema() -> Schema:
+    """The JSON schema (2020-12) of a fit file. Its tables core, plate, interaction and impact are those of a campaign,
+    of which a prior may give any key."""
+    whole = campaign_schema()
+    for definition in whole["$defs"].values():
+        definition["required"] = [name for name in definition.get("required", []) if name in ("shape", "distribution")]
+    told = whole["properties"]
+    told["plate"] = {"description": told["plate"]["description"], **told["plate"]["else"]}
+    tables = {name: told[name] for name in ("core", "plate", "interaction")}
+    free: Schema = {"type": "object"}
+    shot = {"name": {"type": "string"}, "hit": {}, "impact": told["impact"], "measured": free, **tables}
+    properties = {
+        "title": told["title"],
+        **tables,
+        "record": _table("What is recorded of a shot.", _keys(Record)),
+        "numerics": told["numerics"],
+        "prior": free | {"description": "Distributions of the parameters, in the tables core, plate and interaction."},
+        "discrepancy": _table("Scale of what the model misses.", {kind: {} for kind in DISCREPANCY}),
+        "selection": {"description": "What the measured cores have in common."},
+        "sampling": _table("How much is computed.", _keys(Sampling)),
+        "shot": {"type": "array", "minItems": 1, "items": _table("A measured shot.", shot)},
+    }
+    return {
+        "$schema": whole["$schema"],
+        "$defs": whole["$defs"],
+        "title": "warpimpact fit",
+        **_table("Measured shots, and what is to be found from them.", properties),
+        "required": ["prior", "shot"],
+    }
+
+
+def _table(description: str, properties: Schema) -> Schema:
+    return {"type": "object", "description": description, "properties": properties, "additionalProperties": False}
+
+
+def _keys(model: Any) -> Schema:
+    """Names of the keys of a model; warpimpact checks their values."""
+    return {name: {} for name in model.model_fields}
