@@ -63,7 +63,7 @@ class Grid:
     half_size: tuple[float, float]
     spacing: float
     taps: Array
-    planes: Planes
+    planes: Planes = Planes()
 
     @property
     def reach(self) -> int:
