@@ -141,4 +141,4 @@ def build(variant: Variant) -> SimpleNamespace:
             worst.broken_x = state.position[0] + ahead * pose.axis[0]
         return worst
 
-    return SimpleNamespace(Sections=Sections, Bending=Bending, bent=bent)
+    return SimpleNamespace(**locals())

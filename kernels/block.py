@@ -150,11 +150,4 @@ def build(variant: Variant) -> SimpleNamespace:
                 use.lanes.barrier()
         return load
 
-    return SimpleNamespace(
-        Fields=Fields,
-        Touches=Touches,
-        own_fields=own_fields,
-        open_window=open_window,
-        load_on=load_on,
-        lane=use.lanes.lane,
-    )
+    return SimpleNamespace(**locals())

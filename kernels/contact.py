@@ -334,14 +334,6 @@ def build(variant: Variant) -> SimpleNamespace:
                     use.exposure.settle(plate, fields, window, found.box)
         return load
 
-    return SimpleNamespace(
-        Fields=Fields,
-        Touches=Touches,
-        own_fields=use.exposure.own_fields,
-        open_window=use.exposure.open_window,
-        clear_sums=clear_sums,
-        find_touches=find_touches,
-        meet=meet,
-        sum_patches=sum_patches,
-        load_on=load_on,
-    )
+    own_fields = use.exposure.own_fields
+    open_window = use.exposure.open_window
+    return SimpleNamespace(**locals())

@@ -243,19 +243,4 @@ def build(variant: Variant) -> SimpleNamespace:
         front = behind_face(patch.x, wide, narrow, per_area)
         return ring.area * (front - behind_face(patch.x - thickness, wide, narrow, per_area))
 
-    return SimpleNamespace(
-        Surface=Surface,
-        Pose=Pose,
-        Ring=Ring,
-        Patch=Patch,
-        pose_of=pose_of,
-        ring_at=ring_at,
-        ring_of=ring_of,
-        broadside=broadside,
-        ends_of=ends_of,
-        reach_along_x=reach_along_x,
-        behind_face=behind_face,
-        patch_at=patch_at,
-        closes=closes,
-        immersed_area=immersed_area,
-    )
+    return SimpleNamespace(**locals())

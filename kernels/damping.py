@@ -82,12 +82,4 @@ def build(variant: Variant) -> SimpleNamespace:
         a.slopes = added(a.slopes, b.slopes)
         return a
 
-    return SimpleNamespace(
-        Sums=Sums,
-        Slopes=Slopes,
-        added=added,
-        joined=joined,
-        damping_vv=damping_vv,
-        damping_vw=damping_vw,
-        damping_ww=damping_ww,
-    )
+    return SimpleNamespace(**locals())

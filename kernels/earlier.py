@@ -157,4 +157,4 @@ def build(variant: Variant) -> SimpleNamespace:
         nodes = window.planes * window.nodes
         subtract_from(earlier.exposure, row, fields.exposure, window.first, nodes)
 
-    return SimpleNamespace(Earlier=Earlier, begin=begin, recall=recall, keep=keep)
+    return SimpleNamespace(**locals())

@@ -335,14 +335,4 @@ def build(variant: Variant) -> SimpleNamespace:
         else:
             take_scaled(fields.exposure, fields.gain, start, count, half)
 
-    return SimpleNamespace(
-        Fields=Fields,
-        own_fields=own_fields,
-        open_window=open_window,
-        gather=gather,
-        scatter=scatter,
-        scatter_plain=scatter_plain,
-        clear=clear,
-        spread=spread,
-        settle=settle,
-    )
+    return SimpleNamespace(**locals())

@@ -79,4 +79,4 @@ def build(variant: Variant) -> SimpleNamespace:
         rows = box.y_high - box.y_low + 1
         convert(field, window.first + box.y_low * window.cells_z, rows * window.cells_z, one / units)
 
-    return SimpleNamespace(units=units, scatter=scatter, measure=measure)
+    return SimpleNamespace(**locals())

@@ -140,10 +140,4 @@ def build(variant: Variant) -> SimpleNamespace:
             or found.box.z_low >= window.cells_z
         )
 
-    return SimpleNamespace(
-        Footprint=Footprint,
-        footprint_of=footprint_of,
-        is_clear=is_clear,
-        is_beside=is_beside,
-        clearance_at=clearance_at,
-    )
+    return SimpleNamespace(**locals())

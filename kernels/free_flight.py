@@ -92,4 +92,5 @@ def build(variant: Variant) -> SimpleNamespace:
                 report.yaw[shot, k] = undefined
                 report.total_yaw[shot, k] = undefined
 
-    return SimpleNamespace(kernel=variant.kernel(free_flight), Report=Report)
+    kernel = variant.kernel(free_flight)
+    return SimpleNamespace(**locals())

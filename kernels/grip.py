@@ -56,4 +56,4 @@ def build(variant: Variant) -> SimpleNamespace:
     def normal_along_x(pose: Pose, patch: Patch, face: Face):
         return face.axial * pose.axis[0] + face.outward * patch.outward_x + face.around * patch.around_x
 
-    return SimpleNamespace(Face=Face, grip_of=grip_of, face_of=face_of, normal_along_x=normal_along_x)
+    return SimpleNamespace(**locals())

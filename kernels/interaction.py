@@ -148,15 +148,4 @@ def build(variant: Variant) -> SimpleNamespace:
         """Share of the resistance left after an exposure T [s]: β^(T/Δt_β); or S [m]: β^(S/Δs_β)."""
         return exponential(law.decay_rate * exposure)
 
-    return SimpleNamespace(
-        Law=Law,
-        Contact=Contact,
-        onset_speed=onset_speed,
-        contact_of=contact_of,
-        steady_slope=steady_slope,
-        normal_stress=normal_stress,
-        stress_slope=stress_slope,
-        friction_per_speed=friction_per_speed,
-        exposure_in=exposure_in,
-        remaining=remaining,
-    )
+    return SimpleNamespace(**locals())

@@ -133,16 +133,6 @@ def build(variant: Variant) -> SimpleNamespace:
 
         return place
 
-    return SimpleNamespace(
-        lane=lane,
-        count=count,
-        barrier=barrier,
-        total=total,
-        total_pair=total_pair,
-        total_triple=total_triple,
-        least=least,
-        most=most,
-        any_of=any_of,
-        own_exposure=own("exposure"),
-        own_gain=own("gain"),
-    )
+    own_exposure = own("exposure")
+    own_gain = own("gain")
+    return SimpleNamespace(**locals())

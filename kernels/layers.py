@@ -354,14 +354,4 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
             if stack.open[here] and target.laminate[k] == k:
                 plates.keep(fields, earlier, stack.window[here], slot, shot)
 
-    return SimpleNamespace(
-        Stack=Stack,
-        Reached=Reached,
-        begin=begin,
-        reach=reach,
-        law_at=law_at,
-        load_on=load_on,
-        free_time=free_time,
-        given_up=given_up,
-        conclude=conclude,
-    )
+    return SimpleNamespace(**locals())

@@ -244,22 +244,8 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes.velocity[shot] = state.velocity
         outcomes.angular_momentum[shot] = state.angular_momentum
 
-    return SimpleNamespace(
-        kernel=variant.kernel(march, (LANES, BLOCKS) if variant.window else None),
-        Surface=Surface,
-        Sections=Sections,
-        Bending=Bending,
-        Plate=use.plate_grid.Plate,
-        Fields=Fields,
-        Touches=Touches,
-        Sums=use.damping.Sums,
-        Law=Law,
-        Shots=Shots,
-        Outcomes=Outcomes,
-        Pace=Pace,
-        Target=Target,
-        depth_of=plates.depth_of,
-        Stack=Stack,
-        Passage=Passage,
-        Earlier=Earlier,
-    )
+    kernel = variant.kernel(march, (LANES, BLOCKS) if variant.window else None)
+    Plate = use.plate_grid.Plate
+    Sums = use.damping.Sums
+    depth_of = plates.depth_of
+    return SimpleNamespace(**locals())

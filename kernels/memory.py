@@ -42,4 +42,4 @@ def build(dtype: Any) -> SimpleNamespace:
         """array[first : first + count]"""
         ...
 
-    return SimpleNamespace(read=read, write=write, part_of=part_of)
+    return SimpleNamespace(**locals())

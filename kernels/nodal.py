@@ -144,6 +144,4 @@ def build(variant: Variant) -> SimpleNamespace:
             degrade(surface, fields, window, found, pose, law.degradation)
         return load
 
-    return SimpleNamespace(
-        Fields=Fields, Touches=Touches, own_fields=own_fields, open_window=open_window, load_on=load_on
-    )
+    return SimpleNamespace(**locals())

@@ -148,14 +148,4 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         """Keep what later shots at this plate need."""
         plates.keep(fields, earlier, reached.window, slot, shot)
 
-    return SimpleNamespace(
-        Stack=Stack,
-        Reached=Reached,
-        begin=begin,
-        reach=reach,
-        law_at=law_at,
-        load_on=load_on,
-        free_time=free_time,
-        given_up=given_up,
-        conclude=conclude,
-    )
+    return SimpleNamespace(**locals())

@@ -135,12 +135,4 @@ def build(variant: Variant) -> SimpleNamespace:
                 passage.stopped_in[shot] = layer
                 passage.depth[shot] = depth
 
-    return SimpleNamespace(
-        Passage=Passage,
-        begin=begin,
-        enter=enter,
-        has_left=has_left,
-        leave=leave,
-        fly_on=fly_on,
-        conclude=conclude,
-    )
+    return SimpleNamespace(**locals())

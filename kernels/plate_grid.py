@@ -117,9 +117,9 @@ def build(variant: Variant) -> SimpleNamespace:
         """The window about a hit, from node `first` of its slot on. It is computed in float64, so a hit far from the
         origin loses no accuracy."""
         window = Window()
+        window.first = first
         window.nodes = cells_y * cells_z
         window.planes = plate.planes
-        window.first = first
         window.home = window.first + (cells_y // 2) * cells_z + cells_z // 2
         window.cells_y = cells_y
         window.cells_z = cells_z
@@ -216,17 +216,4 @@ def build(variant: Variant) -> SimpleNamespace:
         """Where a depth behind the front face lies among the planes, in planes; a point outside counts at the face."""
         return (wp.clamp(x, zero, window.thickness) + window.behind) * window.per_plane
 
-    return SimpleNamespace(
-        Plate=Plate,
-        Window=Window,
-        Cell=Cell,
-        Box=Box,
-        window_at=window_at,
-        within=within,
-        tile_at=tile_at,
-        meet=meet,
-        clearance=clearance,
-        on_plate=on_plate,
-        cell_at=cell_at,
-        planes_at=planes_at,
-    )
+    return SimpleNamespace(**locals())

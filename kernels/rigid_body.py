@@ -244,22 +244,4 @@ def build(variant: Variant) -> SimpleNamespace:
         force, moment = (body.mass / dt) * dv, (body.inertia_transverse / dt) * vec3(spin, dw[1], dw[2])
         return share * wp.quat_rotate(state.attitude, force), share * wp.quat_rotate(state.attitude, moment)
 
-    return SimpleNamespace(
-        Body=Body,
-        State=State,
-        Load=Load,
-        Change=Change,
-        axis_of=axis_of,
-        angular_velocity=angular_velocity,
-        angular_momentum=angular_momentum,
-        kinetic_energy=kinetic_energy,
-        turned=turned,
-        axis_at=axis_at,
-        drift=drift,
-        velocity_change=velocity_change,
-        restraint_of=restraint_of,
-        kick=kick,
-        change_between=change_between,
-        swings=swings,
-        mean_load=mean_load,
-    )
+    return SimpleNamespace(**locals())

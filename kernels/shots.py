@@ -139,13 +139,4 @@ def build(variant: Variant) -> SimpleNamespace:
         state.position = (-foremost(surface, pose) / direction[0]) * direction
         return state
 
-    return SimpleNamespace(
-        Shots=Shots,
-        Pace=Pace,
-        own=own,
-        body_of=body_of,
-        pace_of=pace_of,
-        step_of=step_of,
-        line_of_flight=line_of_flight,
-        launch_state=launch_state,
-    )
+    return SimpleNamespace(**locals())

@@ -135,14 +135,4 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
             if window.weakens:
                 use.earlier.keep(earlier, fields, window, slot, shot)
 
-    return SimpleNamespace(
-        Target=Target,
-        own_of=own_of,
-        plate_of=plate_of,
-        law_of=law_of,
-        faces_of=faces_of,
-        depth_of=depth_of,
-        begin=begin,
-        open_window=open_window,
-        keep=keep,
-    )
+    return SimpleNamespace(**locals())

@@ -48,4 +48,4 @@ def build(variant: Variant) -> SimpleNamespace:
         write_vec3(trace, row, force_at, force)
         write_vec3(trace, row, moment_at, moment)
 
-    return SimpleNamespace(record=record)
+    return SimpleNamespace(**locals())

@@ -41,6 +41,16 @@ def code(text: object) -> str:
     return f"`{text}`"
 
 
+class ExclusionReference(FromTheCode):
+    """What cannot be combined, and what needs what."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.scene.exclusions import EXCLUDED, NEEDED
+
+        yield from table(("this", "excludes", "because"), [(code(a), code(b), why) for a, b, why in EXCLUDED])
+        yield from table(("this", "needs", "because"), [(code(a), code(b), why) for a, b, why in NEEDED])
+
+
 # --- Keys of a campaign ---
 
 
@@ -333,6 +343,7 @@ def device_mark(node: ast.FunctionDef | ast.ClassDef) -> str | None:
 def setup(app: Sphinx) -> dict[str, bool]:
     for name, directive in {
         "campaign-reference": CampaignReference,
+        "exclusion-reference": ExclusionReference,
         "command-reference": CommandReference,
         "variable-reference": VariableReference,
         "status-reference": StatusReference,

@@ -21,8 +21,7 @@ from scipy.spatial.transform import Rotation
 from warpimpact import Campaign, Numerics, Shots
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.history import History
-from warpimpact.solver.resolution import Fidelity, resolve
-from warpimpact.solver.rings import rings_of
+from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import trace
 
 LOOK = 30
@@ -48,9 +47,9 @@ class Work:
     bytes: float
 
 
-def work_of(campaign: Campaign, shots: Shots, numerics: Numerics | Fidelity) -> Work:
+def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
     """Work of the law at one resolution, from the histories of the shots on the CPU."""
-    around = resolve(numerics, campaign.scene).patches_around
+    around = prepare(campaign.scene, shots, numerics).resolution.patches_around
     steps, in_slab, in_contact = 0, 0, 0
     for near, acting in contacts(campaign, shots, numerics):
         steps += 1
@@ -63,13 +62,13 @@ def work_of(campaign: Campaign, shots: Shots, numerics: Numerics | Fidelity) -> 
 
 
 def contacts(
-    campaign: Campaign, shots: Shots, numerics: Numerics | Fidelity
+    campaign: Campaign, shots: Shots, numerics: Numerics
 ) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
     """For every step of the shots: the patches that reach into the slab, and those of them that advance, each of shape
     [rings, around]."""
     core, plate = campaign.core, campaign.plate
-    resolution = resolve(numerics, campaign.scene)
-    rings = rings_of(core, resolution.patches_axial, resolution.patches_around, resolution.patch_width)
+    prepared = prepare(campaign.scene, shots, numerics)
+    resolution, rings = prepared.resolution, prepared.rings
     azimuth = (np.arange(resolution.patches_around) + 0.5) * (2.0 * np.pi / resolution.patches_around)
     circle = np.stack([np.zeros_like(azimuth), np.cos(azimuth), np.sin(azimuth)], axis=1)
     area = np.hypot(rings.area_axial, rings.area_radial)

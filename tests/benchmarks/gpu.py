@@ -1,4 +1,4 @@
-"""warpimpact on a CUDA device: hits per second of both layouts at every fidelity, ratio to the floor, comparison with
+"""warpimpact on a CUDA device: hits per second of both layouts on some levels, ratio to the floor, comparison with
 the CPU, and ten million hits into a file.
 
     python tests/benchmarks/gpu.py              # writes results/gpu.json and .png beside it, within ten minutes
@@ -31,15 +31,15 @@ from warpimpact.scene import Numerics, Record, Scene, Shots
 from warpimpact.solver.device import DeviceError, find_device
 from warpimpact.solver.simulate import simulate
 
-FIDELITIES = ("draft", "standard", "reference")
-LAYOUTS = {"draft": ("simple", "block"), "standard": ("simple", "block"), "reference": ("simple",)}
-"""Layouts that are measured; windows of the reference do not fit a block."""
+LEVELS = (0, 2, 6)
+LAYOUTS = {0: ("simple", "block"), 2: ("simple", "block"), 6: ("simple",)}
+"""Layouts that are measured; windows of level 6 do not fit a block."""
 END_TO_END = 10_000_000
 """Number of hits that are computed into a file."""
 AIM = {"standard [hits/s]": 1e6, "end to end [s]": 30.0}
 SMALLEST, GROWTH = 1024, 4
 LONGEST = 4.0
-"""The number of hits of a fidelity grows until a run takes this long [s]."""
+"""The number of hits of a level grows until a run takes this long [s]."""
 DISTINCT = 2**16
 """Number of different hits in a run; larger runs repeat them."""
 SAME_HITS, FLOOR_HITS = 512, 16
@@ -96,25 +96,26 @@ def clock_of(device: Any) -> float:
 
 def measure(campaign: Campaign, device: str, peak: float) -> dict[str, Any]:
     """All figures of a device with a peak of `peak` operations per second; each is printed when it is known."""
-    values: dict[str, Any] = {"fidelities": {}, "tolerance": TOLERANCE, "aim": AIM, "same": True}
-    for name in FIDELITIES:
-        work = work_of(campaign, shots_of(campaign, FLOOR_HITS), Numerics(fidelity=name))
+    values: dict[str, Any] = {"levels": {}, "tolerance": TOLERANCE, "aim": AIM, "same": True}
+    for name in LEVELS:
+        work = work_of(campaign, shots_of(campaign, FLOOR_HITS), Numerics(level=name))
         floor = peak / work.operations
-        print(f"{name}: the floor allows {floor:.3g} hits/s; {work.steps:.3g} steps, {work.operations:.3g} operations")
+        print(f"level {name}: the floor allows {floor:.3g} hits/s")
+        print(f"  {work.steps:.3g} steps, {work.operations:.3g} operations")
         found = {layout: of_layout(campaign, name, layout, device, floor) for layout in LAYOUTS[name]}
-        values["fidelities"][name] = {"floor_hits_per_second": floor, "work": asdict(work), "layouts": found}
+        values["levels"][name] = {"floor_hits_per_second": floor, "work": asdict(work), "layouts": found}
         values["same"] &= all(one["same"] for one in found.values())
-    values["end_to_end"] = {layout: end_to_end(campaign, layout, device) for layout in LAYOUTS["standard"]}
+    values["end_to_end"] = {layout: end_to_end(campaign, layout, device) for layout in LAYOUTS[2]}
     return values
 
 
-def of_layout(campaign: Campaign, fidelity: str, layout: str, device: str, floor: float) -> dict[str, Any]:
+def of_layout(campaign: Campaign, level: int, layout: str, device: str, floor: float) -> dict[str, Any]:
     """Speed of one layout, and its difference from the CPU's simple layout."""
-    numerics = Numerics(fidelity=fidelity, layout=layout)
+    numerics = Numerics(level=level, layout=layout)
     rates, differences = growth(campaign, numerics, device), difference(campaign, numerics, device)
     same = all((np.array(differences[key]) <= TOLERANCE[key]).all() for key in TOLERANCE)
     best = max(rates.values())
-    print(f"{fidelity}, {layout}: {best:.4g} hits/s; the floor allows {floor / best:.3g} times as many")
+    print(f"level {level}, {layout}: {best:.4g} hits/s; the floor allows {floor / best:.3g} times as many")
     print(f"  against the CPU on {SAME_HITS} hits: {_told(differences)}: {'same' if same else 'NOT THE SAME'}")
     return {"hits_per_second": rates, "above_floor": floor / best, "difference": differences, "same": same}
 
@@ -140,7 +141,7 @@ def growth(campaign: Campaign, numerics: Numerics, device: str) -> dict[int, flo
         some = copied(shots, -(-count // DISTINCT))[:count]
         taken = min(seconds(lambda some=some: _simulate(campaign, some, numerics, device)) for _ in range(2))
         rates[count] = count / taken
-        print(f"  {numerics.fidelity}, {numerics.layout}: {count} hits at {rates[count]:.4g} hits/s", flush=True)
+        print(f"  level {numerics.level}, {numerics.layout}: {count} hits at {rates[count]:.4g} hits/s", flush=True)
         count *= GROWTH
     return rates
 
@@ -169,12 +170,12 @@ def draw(values: dict[str, Any]) -> Figure:
     """Hits per second against hits, with the floors."""
     figure = Figure(figsize=(7.5, 5), layout="constrained")
     axes = figure.subplots()
-    for name, colour in zip(FIDELITIES, ("#009E73", "#0072B2", "#D55E00"), strict=True):
-        found = values["fidelities"][name]
+    for name, colour in zip(LEVELS, ("#009E73", "#0072B2", "#D55E00"), strict=True):
+        found = values["levels"][name]
         for layout, measured in found["layouts"].items():
             rates = measured["hits_per_second"]
             style = "o-" if layout == "block" else "s--"
-            axes.plot(list(rates), list(rates.values()), style, color=colour, label=f"{name}, {layout}")
+            axes.plot(list(rates), list(rates.values()), style, color=colour, label=f"level {name}, {layout}")
         axes.axhline(found["floor_hits_per_second"], color=colour, linestyle=":")
     axes.set(xscale="log", yscale="log", xlabel="hits", ylabel="hits per second")
     axes.grid(color="0.9")

@@ -32,12 +32,13 @@ IMPORTS = [sys.executable, "-c", "import warp, numpy, netCDF4, xarray; warp.init
 SIMULATE = """
 import sys, time
 from warpimpact import Campaign, simulate
-from warpimpact.runs.compute import promise_of
+from warpimpact.runs.compute import HitMap
+from warpimpact.solver.worker import Worker
 campaign = Campaign.from_toml(sys.argv[1], count=int(sys.argv[2]))
-fidelity, shots = promise_of(campaign, "cpu").fidelity, campaign.sampler().shots(0, int(sys.argv[2]))
-simulate(campaign.scene, shots[:64], numerics=fidelity, device="cpu")
+numerics, shots = HitMap().pilot(campaign, Worker("cpu")).numerics, campaign.sampler().shots(0, int(sys.argv[2]))
+simulate(campaign.scene, shots[:64], numerics=numerics, device="cpu")
 begin = time.perf_counter(), time.process_time()
-simulate(campaign.scene, shots, numerics=fidelity, device="cpu")
+simulate(campaign.scene, shots, numerics=numerics, device="cpu")
 print(time.perf_counter() - begin[0], time.process_time() - begin[1])
 """
 """Prints the elapsed and the processor time of the shots of a campaign at the level of its promise [s]."""

@@ -29,14 +29,15 @@ from floor import measured_peak, work_of
 from random_scenes import FINE, Answer, extrapolated, off, p90, stepped
 
 from warpimpact import Campaign, Numerics, Record, Scene, Shots
-from warpimpact.solver.promise import PROMISES, keep
-from warpimpact.solver.resolution import FIDELITIES, LADDER, Fidelity
-from warpimpact.solver.simulate import simulate
+from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.resolution import Level
+from warpimpact.solver.simulate import pilot_of, simulate
+from warpimpact.solver.worker import Worker
 
 SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
 """Campaigns by the name of their scene; the first one is that of the literal scheme, too."""
-LEVELS = 6
-"""Levels of LADDER, from the coarsest on."""
+LEVELS, STANDARD = 6, 2
+"""Levels of LADDER, from the coarsest on, and the first one at which standard is looked for."""
 STATED = (1.0, 1.0)
 """90 % errors that standard promises: m/s, and degrees of tilt at the last stand-off."""
 SLACK = 1.15
@@ -44,8 +45,9 @@ SLACK = 1.15
 SAME = (0.01, 0.01)
 """Allowed 90 % difference between the literal schemes of warpimpact in double precision and of NumPy: m/s and
 degrees."""
-COARSEST = Fidelity(8, 12, 0.7, 1.0)
-"""The fidelity to compare with programs of the literal scheme. It is still far more accurate than they are."""
+COARSEST = {"patches_axial": 8, "patches_around": 12, "travel": 1.0}
+"""The setting, with 0.7 cells per degradation length, to compare with programs of the literal scheme. It is still far
+more accurate than they are."""
 LITERAL_HITS, FLOOR_HITS = 128, 8
 TIMED = 0.15
 """Processor time of one timed run [s]."""
@@ -114,8 +116,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "literal_difference": apart,
     }
     store("peers", values)
-    standard = LADDER.index(FIDELITIES["standard"])
-    wrong = [bout.name for bout in bouts if excess(bout.ours(standard).error, STATED) > SLACK]
+    wrong = [bout.name for bout in bouts if excess(bout.ours(STANDARD).error, STATED) > SLACK]
     if any(np.array(apart) > SAME):
         wrong.append("the literal scheme")
     if wrong:
@@ -134,12 +135,12 @@ def fight(name: str, file: str, hits: int, peak: float) -> Bout:
     if name == next(iter(SCENES)):
         contenders += _literal(campaign, shots, truth)
     measure(contenders, shots)
-    pilot = shots_of(campaign, PROMISES["standard"].pilot)
-    taken = LADDER.index(keep(_scene(campaign), Numerics(), pilot, device="cpu").fidelity)
+    pilot = shots_of(campaign, pilot_size(Numerics().asked))
+    taken = pilot_of(_scene(campaign), pilot, Numerics(), Worker("cpu")).numerics.level
+    assert taken is not None
     bout = Bout(name, contenders, taken, _error(coarse, truth), {})
-    standard = FIDELITIES["standard"]
-    work = work_of(campaign, shots[:FLOOR_HITS], standard)
-    above = bout.ours(LADDER.index(standard)).cost * peak / work.operations
+    work = work_of(campaign, shots[:FLOOR_HITS], Numerics(level=STANDARD))
+    above = bout.ours(STANDARD).cost * peak / work.operations
     return bout._replace(floor=asdict(work) | {"above_floor": above})
 
 
@@ -152,7 +153,7 @@ def _scene(campaign: Campaign) -> Scene:
     return Scene(core=campaign.core, target=campaign.plate, interaction=campaign.interaction, record=record)
 
 
-def _march(campaign: Campaign, numerics: Numerics | Fidelity) -> Callable[[Shots], Answer]:
+def _march(campaign: Campaign, numerics: Numerics) -> Callable[[Shots], Answer]:
     scene = _scene(campaign)
 
     def march(shots: Shots) -> Answer:
@@ -162,9 +163,11 @@ def _march(campaign: Campaign, numerics: Numerics | Fidelity) -> Callable[[Shots
     return march
 
 
-def _converged(campaign: Campaign, shots: Shots, level: Fidelity) -> Answer:
+def _converged(campaign: Campaign, shots: Shots, level: Level) -> Answer:
     """A fine level, without its step's error of second order."""
-    return extrapolated(*(_march(campaign, stepped(level, k * level.travel))(shots) for k in (2.0, 1.0)))
+    return extrapolated(
+        *(_march(campaign, stepped(level, k * level.travel, campaign.plate))(shots) for k in (2.0, 1.0))
+    )
 
 
 def _error(answer: Answer, truth: Answer) -> Errors:
@@ -174,13 +177,11 @@ def _error(answer: Answer, truth: Answer) -> Errors:
 
 
 def _name(level: int) -> str:
-    fidelity = LADDER[level]
-    named = [name for name, one in FIDELITIES.items() if one == fidelity]
-    return f"level {level}{''.join(f', {name}' for name in named)}"
+    return f"level {level}, standard" if level == STANDARD else f"level {level}"
 
 
 def _warpimpact(campaign: Campaign) -> list[Contender]:
-    return [Contender("warpimpact", _name(k), _march(campaign, LADDER[k])) for k in range(LEVELS)]
+    return [Contender("warpimpact", _name(k), _march(campaign, Numerics(level=k))) for k in range(LEVELS)]
 
 
 def _numba(campaign: Campaign) -> list[Contender]:
@@ -206,8 +207,9 @@ def _literal(campaign: Campaign, shots: Shots, truth: Answer) -> list[Contender]
 
         return Contender("NumPy", setting, march)
 
+    coarsest = Numerics(**COARSEST, grid_spacing=campaign.plate.degradation_length / 0.7)
     found = [
-        Contender("warpimpact", "coarsest", _march(campaign, COARSEST)),
+        Contender("warpimpact", "coarsest", _march(campaign, coarsest)),
         one("literal, points at once", 1),
         one("literal, points and hits at once", numpy_peer.BATCH),
     ]
@@ -267,7 +269,7 @@ def ratios(bout: Bout) -> list[dict[str, Any]]:
     plain, and at the level that a pilot takes."""
     peers = [one for one in bout.contenders if one.program == "Numba"]
     found = []
-    for what, level in (("standard", LADDER.index(FIDELITIES["standard"])), ("standard by its pilot", bout.taken)):
+    for what, level in (("standard", STANDARD), ("standard by its pilot", bout.taken)):
         ours = bout.ours(level)
         for accuracy, errors in (("reached", ours.error), ("promised", STATED)):
             cost, enclosed = cost_at(peers, errors)

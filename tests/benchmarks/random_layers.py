@@ -24,6 +24,7 @@ from random_scenes import Case, _pattern, draw, p90
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import (
+    PRESETS,
     Burst,
     BurstSampler,
     Hits,
@@ -38,9 +39,10 @@ from warpimpact.scene import (
     Target,
     make_shots,
 )
-from warpimpact.solver.promise import PROMISES, changes, keep
-from warpimpact.solver.resolution import LADDER, Fidelity
-from warpimpact.solver.simulate import simulate
+from warpimpact.solver.changes import changes
+from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.simulate import pilot_of, simulate
+from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 
@@ -106,8 +108,8 @@ def _layer(rng: np.random.Generator, calibre: float, work: float) -> Layer:
     )
 
 
-def computed(case: Layered, shots: Shots, fidelity: Fidelity) -> Outcomes:
-    return simulate(case.scene, shots, numerics=fidelity, device="cpu", threads=1)
+def computed(case: Layered, shots: Shots, numerics: Numerics) -> Outcomes:
+    return simulate(case.scene, shots, numerics=numerics, device="cpu", threads=1)
 
 
 def errors(found: Outcomes, truth: Outcomes) -> list[float]:
@@ -121,7 +123,7 @@ def errors(found: Outcomes, truth: Outcomes) -> list[float]:
 def measured(case: Layered, hits: int) -> dict[str, Any]:
     """What the promises come to on a scene."""
     shots = case.shots(hits)
-    truth, before = (computed(case, shots, LADDER[level]) for level in (ANSWER, ANSWER - 1))
+    truth, before = (computed(case, shots, Numerics(level=level)) for level in (ANSWER, ANSWER - 1))
     row: dict[str, Any] = {
         "scene": case.name,
         "statuses": np.bincount(truth.status, minlength=4)[:4].tolist(),
@@ -129,13 +131,14 @@ def measured(case: Layered, hits: int) -> dict[str, Any]:
     }
     for name in NAMES:
         begin = time.process_time()
-        promise = keep(case.scene, Numerics(fidelity=name), case.shots(PROMISES[name].pilot, seed=77), device="cpu")
+        pilot = case.shots(pilot_size(PRESETS[name]), seed=77)
+        promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
         row[name] = {
             "pilot": time.process_time() - begin,
-            "level": LADDER.index(promise.fidelity),
+            "level": promise.numerics.level,
             "kept": promise.kept,
             "told": [promise.residual_velocity_error, math.degrees(promise.tilt_error), 1e3 * promise.depth_error],
-            "found": errors(computed(case, shots, promise.fidelity), truth),
+            "found": errors(computed(case, shots, promise.numerics), truth),
         }
     return row
 
@@ -153,7 +156,7 @@ def untrue(row: dict[str, Any], name: str) -> list[str]:
 
 def broken(row: dict[str, Any], name: str) -> bool:
     """Whether a promise that is said to be kept is not."""
-    allowed = PROMISES[name].accuracy
+    allowed = PRESETS[name]
     limits = [allowed.residual_velocity, math.degrees(allowed.tilt), math.inf]
     return row[name]["kept"] and bool(beyond(row[name]["found"], limits, row["uncertain"]))
 

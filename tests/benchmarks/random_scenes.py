@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.scene import (
+    PRESETS,
     CirclePattern,
     ConeCore,
     Core,
@@ -46,16 +47,17 @@ from warpimpact.scene import (
     TrianglePattern,
     make_shots,
 )
-from warpimpact.solver.promise import PROMISES, keep
-from warpimpact.solver.resolution import FIDELITIES, LADDER, Fidelity
-from warpimpact.solver.simulate import simulate
+from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.resolution import Level
+from warpimpact.solver.simulate import pilot_of, simulate
+from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 
 STEEL = 7850.0
 STANDOFF = 0.13
 """Where tilt is compared [m]."""
-FINE = (Fidelity(96, 96, 8.0, 0.05), Fidelity(136, 136, 11.0, 0.035))
+FINE = (Level(96, 96, 8.0, 0.05), Level(136, 136, 11.0, 0.035))
 """Levels behind the answer; each is extrapolated from its step and twice its step, of second order."""
 LONG = 0.1
 """Processor time [s] from which on a run is timed as it is, once."""
@@ -168,7 +170,7 @@ class Bench:
         for folder in (self.folder, self.converged_folder):
             folder.mkdir(parents=True, exist_ok=True)
 
-    def run(self, case: Case, setting: Fidelity | Numerics, folder: Path | None = None) -> tuple[Answer, float]:
+    def run(self, case: Case, setting: Numerics, folder: Path | None = None) -> tuple[Answer, float]:
         """The answer of a setting and its cost, processor time of one core per hit [s]."""
         text = f"{setting!r} {self.hits}"
         path = (folder or self.folder) / f"{case.key}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.npz"
@@ -184,16 +186,21 @@ class Bench:
         coarse, fine = (self._extrapolated(case, level) for level in FINE)
         return fine, coarse
 
-    def _extrapolated(self, case: Case, level: Fidelity) -> Answer:
+    def _extrapolated(self, case: Case, level: Level) -> Answer:
         """Without the step's error of second order, from runs with twice the step and once."""
-        steps = (stepped(level, factor * level.travel) for factor in (2.0, 1.0))
+        steps = (stepped(level, factor * level.travel, case.scene.target.layers[0]) for factor in (2.0, 1.0))
         double, single = (self.run(case, setting, self.converged_folder)[0] for setting in steps)
         return extrapolated(double, single)
 
 
-def stepped(level: Fidelity, travel: float) -> Fidelity:
-    """The same patches and grid with another step."""
-    return Fidelity(level.patches_axial, level.patches_around, level.cells_per_length, travel, level.double)
+def stepped(level: Level, travel: float, plate: Plate) -> Numerics:
+    """The patches and the grid of a level with a step of their own."""
+    return Numerics(
+        patches_axial=level.patches_axial,
+        patches_around=level.patches_around,
+        grid_spacing=plate.degradation_length / level.cells_per_length,
+        travel=travel,
+    )
 
 
 def extrapolated(double: Answer, single: Answer) -> Answer:
@@ -204,7 +211,7 @@ def extrapolated(double: Answer, single: Answer) -> Answer:
     )
 
 
-def _computed(case: Case, setting: Fidelity | Numerics, hits: int) -> dict[str, Any]:
+def _computed(case: Case, setting: Numerics, hits: int) -> dict[str, Any]:
     def run(shots: Shots) -> Any:
         return simulate(case.scene, shots, numerics=setting, device="cpu", threads=1)
 
@@ -271,15 +278,18 @@ class Row:
 
 def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
     """The promise of a name, found by a pilot of other hits."""
-    promise = keep(case.scene, Numerics(fidelity=name), case.shots(PROMISES[name].pilot, seed=77), device="cpu")
-    answer, cost = bench.run(case, promise.fidelity)
+    pilot = case.shots(pilot_size(PRESETS[name]), seed=77)
+    promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
+    answer, cost = bench.run(case, promise.numerics)
     velocity, tilt = off(answer, truth)
-    allowed = PROMISES[name].accuracy
+    allowed = PRESETS[name]
     within = (velocity <= allowed.residual_velocity) & (tilt <= math.degrees(allowed.tilt))
     told = (promise.residual_velocity_error, math.degrees(promise.tilt_error))
     found = (p90(velocity), p90(tilt))
-    level = LADDER.index(promise.fidelity)
-    return Row(level, promise.kept, told, found, float(within.mean()), *aggregates(answer, truth), cost)
+    assert promise.numerics.level is not None
+    return Row(
+        promise.numerics.level, promise.kept, told, found, float(within.mean()), *aggregates(answer, truth), cost
+    )
 
 
 def aggregates(answer: Answer, truth: Answer) -> tuple[float, float, float]:
@@ -306,14 +316,14 @@ def measured(bench: Bench, case: Case) -> dict[str, Any]:
         "scene": case.name,
         "uncertain": [p90(errors) for errors in off(before, truth)],
         "perforated": float(np.mean(truth.status == Status.PERFORATED)),
-        "plain_standard_cost": bench.run(case, FIDELITIES["standard"])[1],
+        "plain_standard_cost": bench.run(case, Numerics(level=2))[1],
         **{name: asdict(row) for name, row in rows.items()},
     }
 
 
 def held(row: dict[str, Any], name: str, uncertain: Sequence[float]) -> bool:
     """Whether the errors found are within the promise, up to what the answer itself is uncertain by."""
-    allowed = PROMISES[name].accuracy
+    allowed = PRESETS[name]
     limits = (allowed.residual_velocity, math.degrees(allowed.tilt))
     return all(e <= limit + u for e, limit, u in zip(row["error"], limits, uncertain, strict=True))
 
@@ -348,7 +358,7 @@ def drawn(scenes: Sequence[dict[str, Any]]) -> Figure:
             error = [max(scene[name]["error"][place], 1e-3) for scene in scenes]
             kept = np.array([scene[name]["kept"] for scene in scenes])
             axis.scatter(cost, error, s=14, color=colour, alpha=np.where(kept, 0.9, 0.25), label=name)
-            allowed = PROMISES[name].accuracy
+            allowed = PRESETS[name]
             axis.axhline((allowed.residual_velocity, math.degrees(allowed.tilt))[place], color=colour, lw=0.8)
         axis.set(xscale="log", yscale="log", xlabel="processor time per hit [ms]", ylabel=f"error of {label}, 90 %")
     axes[0].legend(title="pale: promise not kept")

@@ -19,9 +19,8 @@ from bench import CHECKOUT, machine
 from numpy.typing import NDArray
 
 from warpimpact import Campaign, make_shots
-from warpimpact.scene import Hits, Shots
+from warpimpact.scene import Hits, Numerics, Shots
 from warpimpact.scene.symmetry import symmetries_used
-from warpimpact.solver.resolution import FIDELITIES
 from warpimpact.solver.simulate import simulate
 from warpimpact.statistics.intervals import _student, estimate_of
 from warpimpact.statistics.worst_tenth import worst_tenth
@@ -57,7 +56,7 @@ QUESTIONS: dict[str, tuple[Callable[[Array], Array], float, bool]] = {
 
 
 class Hitting:
-    """Outcomes of the shots of one campaign at draft and at standard."""
+    """Outcomes of the shots of one campaign on the first levels of draft and of standard."""
 
     def __init__(self, campaign: Campaign, count: int, seed: int, *, sampling: str, irreducible: bool = False) -> None:
         hits = Hits(
@@ -70,14 +69,14 @@ class Hitting:
         self.images = len(symmetries_used(campaign.impact, hits, campaign.plate))
         shots = make_shots(campaign.impact, hits, campaign.plate)[:: self.images]
         self.count = len(shots)
-        self.standard, self.cost_standard = self._answers(campaign, shots, "standard")
-        self.draft, self.cost_draft = self._answers(campaign, shots, "draft")
+        self.standard, self.cost_standard = self._answers(campaign, shots, 2)
+        self.draft, self.cost_draft = self._answers(campaign, shots, 0)
 
     @staticmethod
-    def _answers(campaign: Campaign, shots: Shots, name: str) -> tuple[Array, float]:
+    def _answers(campaign: Campaign, shots: Shots, level: int) -> tuple[Array, float]:
         """Residual velocity [m/s] and last tilt [degree], shape [2, hits], and processor time per hit [s]."""
         begin = time.process_time()
-        outcomes = simulate(campaign.scene, shots, numerics=FIDELITIES[name], device="cpu", threads=1)
+        outcomes = simulate(campaign.scene, shots, numerics=Numerics(level=level), device="cpu", threads=1)
         cost = (time.process_time() - begin) / len(shots)
         return np.array([outcomes.residual_velocity, np.degrees(outcomes.tilt[:, -1])]), cost
 

@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 from bench import CHECKOUT, copied, cores, machine, shots_of, store
 
-from warpimpact import Campaign, Scene, Shots
-from warpimpact.solver.resolution import FIDELITIES, Fidelity
+from warpimpact import Campaign, Numerics, Scene, Shots
 from warpimpact.solver.simulate import simulate
 
 SCENES = {"slotted plate": "slotted_plate", "round holes": "round_holes", "ogive with a shank": "ogive_core"}
@@ -28,6 +27,7 @@ TIMED = 0.4
 """Processor time of one timed run [s]."""
 ROUNDS = 5
 """Runs of each contender, in turn with the others."""
+LEVELS = (0, 2, 6)
 FEWEST = 64
 """Hits of a timed run at least; the scenes are drawn over the unit cell."""
 
@@ -36,7 +36,7 @@ Work = Callable[[Shots], Any]
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Measure, print, store."""
-    parser = argparse.ArgumentParser(description="hits per second of the fidelities; cost of layers and bursts")
+    parser = argparse.ArgumentParser(description="hits per second of levels; cost of layers and bursts")
     parser.add_argument("--hits", type=int, default=1024, help="Sobol hits over the unit cell (default: 1024)")
     hits = parser.parse_args(argv).hits
     values: dict[str, Any] = {"machine": machine(), "hits": hits, "rounds": ROUNDS, "scenes": {}}
@@ -50,11 +50,11 @@ def main(argv: Sequence[str] | None = None) -> None:
 
 
 def rates(campaign: Campaign, hits: int) -> dict[str, dict[str, float]]:
-    """Hits per second of every fidelity: of one core, and on all cores."""
+    """Hits per second of some levels: of one core, and on all cores."""
     scene, shots = _scene(campaign), shots_of(campaign, hits)
     found: dict[str, dict[str, float]] = {}
-    for name, fidelity in FIDELITIES.items():
-        alone, together = _march(scene, fidelity, 1), _march(scene, fidelity, None)
+    for level in LEVELS:
+        alone, together = (_march(scene, Numerics(level=level), threads) for threads in (1, None))
         alone(shots[:FEWEST])  # builds what is to be built
         begin = time.process_time()
         alone(shots[:FEWEST])
@@ -65,7 +65,7 @@ def rates(campaign: Campaign, hits: int) -> dict[str, dict[str, float]]:
         for _ in range(ROUNDS):
             one.append(_seconds(alone, some, time.process_time) / len(some))
             wall.append(_seconds(together, many, time.perf_counter) / len(many))
-        found[name] = {"one_core": 1.0 / float(np.median(one)), "all_cores": 1.0 / float(np.median(wall))}
+        found[f"level {level}"] = {"one_core": 1.0 / float(np.median(one)), "all_cores": 1.0 / float(np.median(wall))}
     return found
 
 
@@ -90,7 +90,7 @@ def bursts(campaign: Campaign, count: int) -> dict[str, float]:
     )
 
 
-_STANDARD = FIDELITIES["standard"]
+_STANDARD = Numerics(level=2)
 
 
 def _compared(works: Mapping[str, tuple[Work, Shots]]) -> dict[str, float]:
@@ -115,8 +115,8 @@ def _scene(campaign: Campaign) -> Scene:
     return campaign.scene.model_copy(update={"record": record})
 
 
-def _march(scene: Scene, fidelity: Fidelity, threads: int | None) -> Work:
-    return lambda shots: simulate(scene, shots, numerics=fidelity, device="cpu", threads=threads)
+def _march(scene: Scene, numerics: Numerics, threads: int | None) -> Work:
+    return lambda shots: simulate(scene, shots, numerics=numerics, device="cpu", threads=threads)
 
 
 def _seconds(work: Work, shots: Shots, clock: Callable[[], float]) -> float:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from warpimpact.scene import Core
 from warpimpact.solver import inputs
-from warpimpact.solver.arrays import Grid, half_taps
+from warpimpact.solver.prepare import Grid, half_taps
 from warpimpact.solver.rings import azimuths_of, rings_of
 from warpimpact.solver.tile import Tile
 

@@ -122,7 +122,7 @@ def computed(plates: list[tuple[str, float, float]], *, linear: float, quadratic
     )
     plate = Plate(thickness=float(thickness.max()), resistance=TYPICAL[kind], density=DENSITY[kind])
     scene = Scene(core=CORE, target=plate, interaction=Interaction(linear=linear, quadratic=quadratic))
-    limits = limit_velocity(scene, shots, numerics=Numerics(fidelity="standard"), tolerance=0.5, device="cpu")
+    limits = limit_velocity(scene, shots, numerics=Numerics(level=2), tolerance=0.5, device="cpu")
     assert limits.converged.all()
     return (limits.value / np.sqrt(TYPICAL[kind])).reshape(len(plates), len(friction))
 

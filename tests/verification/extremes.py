@@ -38,6 +38,7 @@ from warpimpact.scene.core import MassProperties
 from warpimpact.solver.device import find_device
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import March
+from warpimpact.solver.prepare import prepare
 
 from .scenes import shots_at
 
@@ -136,8 +137,8 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
 def found(extreme: Extreme) -> Found:
     """Compute the shots of a scene with their histories, at draft, on one thread of the CPU."""
     scene, shots, precision = extreme
-    numerics = Numerics(fidelity="draft", precision=precision)
-    march = March(scene, numerics, shots, find_device("cpu"), threads=1, traced=True)
+    numerics = Numerics(level=0, precision=precision)
+    march = March(prepare(scene, shots, numerics, traced=True), find_device("cpu"), threads=1)
     contact = march.march()
     report, traces = Outcomes.collected(scene, shots, march.report(contact)), march.traces(contact)
     statuses = [Status(int(code)) for code in report.status]

@@ -69,6 +69,10 @@ def shots_at(
     return Shots(*(np.array(column, dtype=float) for column in columns))
 
 
+REFERENCE: dict[str, Any] = {"level": 7, "patches_axial": 64, "patches_around": 56, "travel": 0.05}
+"""Numerics that are far finer than those of most runs."""
+
+
 def scattered_hits(count: int, seed: int = 0) -> Array:
     """Hit points over the unit cell of the slotted plate [m], shape (2, count): none on a line of symmetry."""
     return np.random.default_rng(seed).random((2, count)) * 16e-3
@@ -86,7 +90,7 @@ def simulate(
 ) -> simulation.Outcomes:
     """`warpimpact.simulate` with scene and numerics as arguments."""
     scene = Scene(core=core, target=plate, interaction=interaction, record=Record(standoffs=standoffs))
-    return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
+    return simulation.simulate(scene, shots, numerics=Numerics(**{"level": 2} | numerics), device=device)
 
 
 @dataclass(frozen=True)
@@ -131,7 +135,7 @@ def histories(
 ) -> list[History]:
     """`warpimpact.solver.simulate.trace` with named columns."""
     scene = Scene(core=core, target=plate, interaction=interaction)
-    traced = simulation.trace(scene, shots, numerics=Numerics(**numerics))
+    traced = simulation.trace(scene, shots, numerics=Numerics(**{"level": 2} | numerics))
     return [_history(core, rows.astype(float)) for rows in traced]
 
 

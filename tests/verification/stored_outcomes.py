@@ -21,7 +21,7 @@ from warpimpact.kernels import variant
 STRICT = "-ffp-contract=off -fno-slp-vectorize"
 """Compiler flags of strict arithmetic."""
 STORED = Path(__file__).parent / "stored" / "outcomes.json"
-STANDARD = {"fidelity": "standard", "patches_axial": 23}  # fixed: no pilot chooses
+STANDARD = {"level": 2}  # fixed: no pilot chooses
 SLOTS = {"shape": "slot", "length": 12e-3, "width": 4e-3, "spacing": [8e-3, 16e-3], "staggered": True}
 CIRCLES = {"shape": "circle", "diameter": 9e-3, "spacing": [12.5e-3, 21.65e-3], "staggered": True}
 PAPER_CORE = {"shape": "polynomial", "coefficients": [3e-4, 0.24, -5.29], "length": 27.86e-3, "mass": 4e-3}
@@ -41,8 +41,8 @@ BASE: dict[str, Any] = {
 }
 CAMPAIGNS: dict[str, dict[str, Any]] = {
     "slots": {},
-    "slots, draft": {"numerics": {"fidelity": "draft", "patches_axial": 14}},
-    "slots, double": {"numerics": {"fidelity": "draft", "patches_axial": 14, "precision": "double"}},
+    "slots, draft": {"numerics": {"level": 0}},
+    "slots, double": {"numerics": {"level": 0, "precision": "double"}},
     "slots, nodal": {"numerics": {"scheme": "nodal", "grid_spacing": 5e-5}, "hits": ONE_NET | {"count": 6}},
     "slots, with bending and the nose": {"output": {"bending": True, "standoff_point": "nose"}},
     "slots, irreducible": {"hits": ONE_NET | {"count": 32, "irreducible": True}},

@@ -8,19 +8,22 @@ import pytest
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Core, Layer, Numerics, Plate, Record, Scene, Shots, Target
-from warpimpact.solver import arrays
+from warpimpact.solver import prepare
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.bending import Sections, sections_of
 from warpimpact.solver.rings import Rings
 
-from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate
+from .scenes import PAPER_CORE, REFERENCE, paper_plate, scattered_hits, shots_at, solid_plate
 
 COUNT = 32
 
 
+PRECISE: dict[str, Any] = {"level": 2, "precision": "double"}
+
+
 def bent(target: Plate | Target, shots: Shots, device: str = "cpu", **numerics: Any) -> Outcomes:
     scene = Scene(core=PAPER_CORE, target=target, record=Record(bending=True))
-    return simulation.simulate(scene, shots, numerics=Numerics(precision="double", **numerics), device=device)
+    return simulation.simulate(scene, shots, numerics=Numerics(**PRECISE | numerics), device=device)
 
 
 def slanted_shots() -> Shots:
@@ -43,8 +46,8 @@ def test_no_moment_is_left_behind_the_base(monkeypatch: pytest.MonkeyPatch) -> N
         stress[-1] = 1.0  # [1/m³]: its "stress" is its moment
         return replace(sections, stress=stress)
 
-    monkeypatch.setattr(arrays, "sections_of", last_alone)
-    outcomes = bent(paper_plate(), slanted_shots(), fidelity="draft")
+    monkeypatch.setattr(prepare, "sections_of", last_alone)
+    outcomes = bent(paper_plate(), slanted_shots(), level=0)
     assert outcomes.largest_bending_moment.min() > 1.0
     assert (outcomes.bending_stress < 1e-10 * outcomes.largest_bending_moment).all()
 
@@ -65,7 +68,7 @@ def test_mirror_images_bend_alike(device: str) -> None:
 
 
 def test_asking_for_it_changes_nothing_else(device: str) -> None:
-    numerics = Numerics(precision="double")
+    numerics = Numerics(level=2, precision="double")
     scene = Scene(core=PAPER_CORE, target=paper_plate())
     plain = simulation.simulate(scene, slanted_shots(), numerics=numerics, device=device)
     asked = bent(paper_plate(), slanted_shots(), device)
@@ -76,7 +79,7 @@ def test_asking_for_it_changes_nothing_else(device: str) -> None:
 def test_bending_of_a_core_settles_as_the_numerics_get_finer() -> None:
     # Measured: medians of 2.45 and 2.53 GPa at standard and reference, 37.4 and 39.3 N m.
     shots = shots_at(*scattered_hits(64))
-    coarse, fine = (bent(paper_plate(), shots, fidelity=fidelity) for fidelity in ("standard", "reference"))
+    coarse, fine = (bent(paper_plate(), shots, **numerics) for numerics in ({}, REFERENCE))
     for name in ("largest_bending_moment", "bending_stress"):
         assert np.median(getattr(coarse, name)) == pytest.approx(np.median(getattr(fine, name)), rel=0.06)
 
@@ -104,10 +107,12 @@ def test_parts_without_a_gap_bend_a_core_as_the_whole_does(shares: tuple[float, 
 
 def test_a_core_without_the_mass_of_its_slices_is_refused() -> None:
     core = PAPER_CORE.model_copy(update={"inertia_axial": 2e-8})
-    with pytest.raises(ValueError, match=r"got bending = true beside core.inertia_axial, but a bending moment needs"):
+    with pytest.raises(
+        ValueError, match=r"output.bending = true cannot be combined with core.inertia_axial: it needs the mass"
+    ):
         Scene(core=core, target=paper_plate(), record=Record(bending=True))
 
 
 def test_the_literal_scheme_has_no_bending_moment() -> None:
-    with pytest.raises(ValueError, match=r'got bending = true beside numerics.scheme = "nodal"'):
+    with pytest.raises(ValueError, match=r'output.bending = true cannot be combined with numerics.scheme = "nodal"'):
         bent(paper_plate(), shots_at(), scheme="nodal")

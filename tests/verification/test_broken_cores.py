@@ -120,7 +120,7 @@ def test_effectiveness_tells_of_broken_cores() -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (("bending = true", "bending = false"), "got core.strength without output.bending = true"),
+        (("bending = true", "bending = false"), "core.strength needs output.bending = true"),
         (('"2 GPa"', '"2 mm"'), "which is not a stress"),
         (("shape = 8", "shape = 0"), "greater than 0"),
         (("strength = ", 'strength = "-1 GPa" # '), "greater than 0"),

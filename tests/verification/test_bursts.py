@@ -15,6 +15,7 @@ from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Shots, Targe
 from warpimpact.solver import blocks, marching
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.marching import March
+from warpimpact.solver.prepare import prepare
 
 from . import references
 from .scenes import PAPER_CORE, STANDOFFS, paper_plate, scattered_hits, shots_at, solid_plate
@@ -57,7 +58,7 @@ def scene_of(plate: Plate, behind: tuple[Layer, ...] = ()) -> Scene:
 def simulate(
     plate: Plate, shots: Shots, behind: tuple[Layer, ...] = (), device: str = "cpu", **numerics: Any
 ) -> Outcomes:
-    numerics = {"fidelity": "draft"} | numerics
+    numerics = {"level": 0} | numerics
     return simulation.simulate(scene_of(plate, behind), shots, numerics=Numerics(**numerics), device=device)
 
 
@@ -118,7 +119,7 @@ def test_shots_at_one_place_pay_a_geometric_series(thickness: float, device: str
     first = resistance * pi * references.PAPER_LARGEST_RADIUS**2 * unit / -log(beta) * (1.0 - left)
     for length in (0.2e-3, 0.1e-3):
         plate = solid_plate(thickness=thickness, resistance=resistance, degradation_length=length, **law)
-        work = simulate(plate, burst(shots_at(np.zeros(COUNT)), COUNT), device=device, fidelity="standard").energy_loss
+        work = simulate(plate, burst(shots_at(np.zeros(COUNT)), COUNT), device=device, level=2).energy_loss
         off.append([after / before / left - 1.0 for before, after in pairwise(work)])
     assert work[0] == pytest.approx(first, rel=4e-3)
     np.testing.assert_allclose(off[1], 0.0, atol=0.025)
@@ -165,7 +166,8 @@ def test_any_split_into_whole_bursts(behind: Any, samples: int, device: str) -> 
 @pytest.mark.parametrize("slots", [1, 5, SAMPLES])
 def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
     shots = near_bursts()
-    march = March(scene_of(paper_plate(), behind), Numerics(fidelity="draft"), shots, wp.get_device("cpu"))
+    prepared = prepare(scene_of(paper_plate(), behind), shots, Numerics(level=0))
+    march = March(prepared, wp.get_device("cpu"))
     outcomes = march._empty(march.stage.Outcomes, (len(shots),))
     order = march.inputs.put(marching.in_turns(np.arange(len(shots)), COUNT, slots), wp.int32)
     scratch = march._scratch(slots, *march.cells)
@@ -199,7 +201,7 @@ def test_every_shot_of_a_failed_burst_behind_the_failure_fails() -> None:
 @TARGETS
 @pytest.mark.parametrize("order", [0, 2])
 def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
-    shots, numerics = near_bursts(), Numerics(fidelity="draft")
+    shots, numerics = near_bursts(), Numerics(level=0)
     at = 5 * COUNT + order
     again = simulation.replay(scene_of(solid_plate(), behind), shots[5 * COUNT : at + 1], numerics=numerics)
     for name, values in vars(simulate(solid_plate(), shots, behind)).items():
@@ -211,8 +213,8 @@ def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
 
 
 def test_the_literal_scheme_takes_no_burst() -> None:
-    with pytest.raises(ValueError, match='must be "consistent"'):
-        simulate(paper_plate(), near_bursts(), fidelity="standard", scheme="nodal")
+    with pytest.raises(ValueError, match="the nodal scheme does not know earlier hits"):
+        simulate(paper_plate(), near_bursts(), level=2, scheme="nodal")
 
 
 def test_bursts_must_be_whole() -> None:

@@ -38,7 +38,7 @@ NUMERICS = pytest.mark.parametrize(
 
 
 def outcomes_of(shots: Shots, device: str, numerics: dict[str, Any]) -> Outcomes:
-    return simulate(paper_plate(), shots, fidelity="draft", device=device, **numerics)
+    return simulate(paper_plate(), shots, level=0, device=device, **numerics)
 
 
 def assert_identical(got: Outcomes, expected: Outcomes) -> None:

@@ -21,7 +21,7 @@ def behind_layers(target: Target, shots: Shots, point: str = "centre_of_mass", *
     record = Record(standoffs=(NEAR, FAR), layer_standoffs=(NEAR, FAR), standoff_point=point)
     scene = Scene(core=PAPER_CORE, target=target, record=record)
     device = numerics.pop("device", "cpu")
-    return simulation.simulate(scene, shots, numerics=Numerics(**numerics), device=device)
+    return simulation.simulate(scene, shots, numerics=Numerics(**{"level": 2} | numerics), device=device)
 
 
 def alone(plate: Any, shots: Shots, point: str, device: str) -> Any:

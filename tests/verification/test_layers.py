@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from warpimpact.kernels.status import LayerStatus, Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, NoPattern, Plate, Target
-from warpimpact.solver import arrays
+from warpimpact.solver import prepare
 
 from . import references
 from .scenes import PAPER_CORE, SLOTS, histories, paper_plate, scattered_hits, shots_at, simulate, solid_plate
@@ -71,7 +71,7 @@ def test_work_of_a_normal_hit_is_that_of_all_layers(gap: float, device: str) -> 
     behind = [layer(front, thickness=3e-3, resistance=3e9, gap=gap), layer(front, thickness=1e-3, gap=gap)]
     work = pi * RADIUS**2 * (2e-3 * 2e9 + 3e-3 * 3e9 + 1e-3 * 2e9)
     expected = np.sqrt(825.0**2 - 2.0 * work / references.PAPER_MASS)
-    outcomes = layered(front, *behind, shots=shots_at([0.0, 0.3e-3], [0.0, 0.1e-3]), device=device, fidelity="standard")
+    outcomes = layered(front, *behind, shots=shots_at([0.0, 0.3e-3], [0.0, 0.1e-3]), device=device, level=2)
     assert (outcomes.status == Status.PERFORATED).all()
     assert (outcomes.layer_status == LayerStatus.PERFORATED).all()
     assert outcomes.residual_velocity == pytest.approx(expected, abs=0.4)  # κ takes some; measured: 0.1
@@ -173,7 +173,7 @@ def test_a_straight_core_in_a_hole_touches_the_plate_at_every_step(device: str) 
 def test_speed_behind_a_layer_is_that_of_the_instant_when_the_core_leaves_it(device: str) -> None:
     # The base slows the core down by 10 to 20 m/s per µs while its end is still in the plate.
     base = layer(solid_plate(thickness=8e-3, resistance=3e9), gap=15e-3)
-    scene: dict[str, Any] = {"shots": shots_at(Y, Z, **TURNED), "device": device, "fidelity": "standard"}
+    scene: dict[str, Any] = {"shots": shots_at(Y, Z, **TURNED), "device": device, "level": 2}
     coarse, fine = (layered(paper_plate(), base, time_step=step, **scene) for step in (1.2e-6, 0.3e-6))
     assert coarse.layer_residual_velocity[:, 0] == pytest.approx(fine.layer_residual_velocity[:, 0], abs=1.0)
 
@@ -263,7 +263,7 @@ def test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there(devi
     # What is left of its tumbling pushes it out. It would cross the gap, and rest behind the plate, after 2 to 20 ms.
     base = layer(solid_plate(degradation=1.0, resistance=5e9), thickness=3e-3, gap=0.1)
     shots = shots_at([2.276e-3, 5.628e-3], [4.13e-3, 6.856e-3])
-    outcomes = layered(paper_plate(), base, shots=shots, device=device, fidelity="standard")
+    outcomes = layered(paper_plate(), base, shots=shots, device=device, level=2)
     assert (outcomes.status == Status.ARRESTED).all()
     assert (outcomes.stopped_in == 1).all()
     assert (outcomes.exit_position[:, 0] > 0.1).all()
@@ -272,12 +272,12 @@ def test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there(devi
 
 def test_a_core_that_slides_between_layers_stays_there(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Through a wide hole, off the base at a small angle, and along the rear face of the plate, beside any hole.
-    monkeypatch.setattr(arrays, "STEP_ALLOWANCE", 3)
+    monkeypatch.setattr(prepare, "STEP_ALLOWANCE", 3)
     hole = CirclePattern(diameter=0.3, spacing=(1.0, 1.0))
     front = paper_plate(thickness=10e-3, degradation=1.0, shear_coefficient=0.0, pattern=hole, degradation_length=5e-3)
     base = Layer(thickness=40e-3, resistance=2e9, gap=0.2)
     shots = shots_at([-0.1, 0.05], [0.0, 2e-3], obliquity=75.0)
-    outcomes = layered(front, base, shots=shots, device=device, fidelity="draft")
+    outcomes = layered(front, base, shots=shots, device=device, level=0)
     assert (outcomes.status == Status.ARRESTED).all()
     assert (outcomes.stopped_in == -1).all()
     assert (outcomes.layer_status == [LayerStatus.MISSED, LayerStatus.RICOCHETED]).all()
@@ -289,7 +289,7 @@ def test_a_layer_tells_how_the_computation_failed_in_it(device: str) -> None:
     thin = PAPER_CORE.model_copy(update={"inertia_axial": 1e-7 * CORE.inertia_axial})
     hard = solid_plate(thickness=4e-3, resistance=1e11)
     shots = shots_at([0.0], [0.0], velocity=20.0, obliquity=28.6, pitch=57.3, spin=1e5)
-    got = layered(hard, layer(hard, gap=50e-3), shots=shots, core=thin, fidelity="draft", device=device)
+    got = layered(hard, layer(hard, gap=50e-3), shots=shots, core=thin, level=0, device=device)
     assert (got.status == Status.GAINED_ENERGY).all()
     assert got.layer_status.tolist() == [[LayerStatus.GAINED_ENERGY, LayerStatus.NOT_REACHED]]
 

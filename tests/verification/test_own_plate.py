@@ -70,7 +70,7 @@ def without(shots: Shots) -> Shots:
 
 @pytest.mark.parametrize(("scheme", "every"), [("consistent", 3), ("nodal", 11)])
 def test_a_shot_depends_on_its_own_numbers_alone(scheme: str, every: int, device: str) -> None:
-    numerics = {"scheme": scheme} | ({"fidelity": "draft"} if scheme == "consistent" else {"grid_spacing": 5e-5})
+    numerics = {"scheme": scheme} | ({"level": 0} if scheme == "consistent" else {"grid_spacing": 5e-5})
     together = simulated(PAPER_CORE, paper_plate(**FAR), SHOTS, device, **numerics)
     assert np.ptp(together.residual_velocity) > 100.0
     for shot in range(0, COUNT, every):
@@ -88,7 +88,7 @@ def test_a_shot_depends_on_its_own_numbers_alone(scheme: str, every: int, device
 
 @pytest.mark.parametrize("double", [False, True], ids=["single", "double"])
 def test_a_shot_is_the_same_in_any_company(double: bool, device: str) -> None:
-    numerics = {"fidelity": "draft", "precision": "double" if double else "single"}
+    numerics = {"level": 0, "precision": "double" if double else "single"}
     together = simulated(PAPER_CORE, paper_plate(), SHOTS, device, **numerics)
     backwards = simulated(PAPER_CORE, paper_plate(), SHOTS[np.arange(COUNT)[::-1]], device, **numerics)
     for name, values in vars(together).items():
@@ -118,7 +118,7 @@ def test_a_given_moment_of_inertia_scales_with_the_mass() -> None:
 
 
 def test_history_and_plate_of_a_replay_are_those_of_the_shot() -> None:
-    numerics = Numerics(fidelity="draft", precision="double")
+    numerics = Numerics(level=0, precision="double")
     core, plate = scene_of(5)
     shown = [
         simulation.replay(Scene(core=c, target=p, interaction=INTERACTION), s, numerics=numerics)

@@ -1,6 +1,7 @@
 """Velocity-dependent stress on a pointed core: Poncelet's closed forms, arrest included (docs/model.md §6.4)."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.scene import ConeCore, Core, Interaction, OgiveCore, Plate
 
 from . import references
-from .scenes import History, histories, shots_at, simulate, solid_plate
+from .scenes import REFERENCE, History, histories, shots_at, simulate, solid_plate
 
 VELOCITY, RESISTANCE, DENSITY = 825.0, 1.2e9, 7850.0
 ONSET = 0.005
@@ -48,9 +49,9 @@ def lasting_plate(thickness: float, shear_coefficient: float, resistance: float 
 # 0.2 m/s (standard) and 0.055 m/s (reference) at most, of the 150 to 210 m/s that the plate takes.
 @CASES
 @SHEAR
-@pytest.mark.parametrize(("fidelity", "tolerance"), [("standard", 0.4), ("reference", 0.07)])
+@pytest.mark.parametrize(("numerics", "tolerance"), [({}, 0.4), (REFERENCE, 0.07)], ids=["level 2", "reference"])
 def test_residual_velocity_behind_a_plate_thinner_than_the_depth_of_rest(
-    case: Case, shear_coefficient: float, fidelity: str, tolerance: float, device: str
+    case: Case, shear_coefficient: float, numerics: dict[str, Any], tolerance: float, device: str
 ) -> None:
     # m v dv/dX = −(F0 + F2 v²), F0 = ∫ a0 2πr (r' + η) ds, F2 = ∫ a2 2πr (r' + η) r'²/(1 + r'²) ds
     expected = case.reference(shear_coefficient).residual_velocity(12e-3)
@@ -59,7 +60,7 @@ def test_residual_velocity_behind_a_plate_thinner_than_the_depth_of_rest(
         shots_at(0.3e-3, 0.1e-3),
         core=case.core,
         interaction=PONCELET,
-        fidelity=fidelity,
+        **numerics,
         device=device,
     )
     assert outcomes.status[0] == Status.PERFORATED

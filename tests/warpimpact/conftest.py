@@ -146,6 +146,12 @@ def _assert_same_bits(one: Path, other: Path) -> None:
                 np.testing.assert_array_equal(variable[...], b[group][name][...], err_msg=name)
 
 
+@pytest.fixture
+def unrendered(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are laid out, and no picture is written."""
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, *_, **__: figure.draw_without_rendering())
+
+
 @pytest.fixture(scope="module")
 def small_shards() -> Iterator[None]:
     """Shards as in small_shards.py."""

@@ -24,7 +24,7 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.base import base_thickness, has_base, solid_note, solid_plate
-from warpimpact.analysis.effectiveness import ANGLE, Evidence, Measure, depth_note, effect_names, gather
+from warpimpact.analysis.effectiveness import ANGLE, EffectMeasure, Evidence, depth_note, effect_names, gather
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.questions import check_same_question, other_shots
 from warpimpact.analysis.summary import breaks_promise, sampling_note
@@ -56,7 +56,7 @@ class Contestant:
     hits: int
     areal_density: float
     open_area: float
-    measures: tuple[Measure, ...]
+    measures: tuple[EffectMeasure, ...]
     solid: str = ""
 
 
@@ -169,7 +169,7 @@ def compare(
     common = set.intersection(*(set(effect_names(dataset)) for dataset in datasets))
     asked: dict[str, Any] = {"angle": angle, "standoff": standoff, "only": common}
     each = confidence_of_each(confidence, len(pairs))
-    measures: list[list[Measure]] = [[] for _ in datasets]
+    measures: list[list[EffectMeasure]] = [[] for _ in datasets]
     differences = []
     for evidences in zip(*(gather(dataset, **asked) for dataset in datasets), strict=True):
         for told, evidence in zip(measures, evidences, strict=True):
@@ -211,7 +211,7 @@ def _differ_in_weight(datasets: Sequence[xarray.Dataset]) -> bool:
     return datasets[0].attrs.get(attr.LIMIT) != "thickness" and max(densities) > _SAME_WEIGHT * min(densities)
 
 
-def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[Measure]]) -> bool:
+def _depths_are_bounds(datasets: Sequence[xarray.Dataset], measures: Sequence[Sequence[EffectMeasure]]) -> bool:
     """Whether depths cannot be ranked: cores pierce a base and count with its thickness, and the thicknesses differ."""
     thicknesses = [float(np.mean(base_thickness(dataset))) for dataset in datasets]
     return max(thicknesses) > _SAME_WEIGHT * min(thicknesses) and any(map(depth_note, measures))

@@ -13,7 +13,7 @@ from warpimpact.analysis.survival import survival_text
 
 if TYPE_CHECKING:
     from warpimpact.analysis.comparison import Comparison, Difference
-    from warpimpact.analysis.effectiveness import Measure
+    from warpimpact.analysis.effectiveness import EffectMeasure
 
 
 class Ranking(NamedTuple):
@@ -84,7 +84,7 @@ def hits_used(comparison: Comparison) -> list[str]:
     return lines
 
 
-def _compared(comparison: Comparison) -> list[Measure]:
+def _compared(comparison: Comparison) -> list[EffectMeasure]:
     return [measure for measure in comparison.plates[0].measures if measure.hit is None]
 
 
@@ -130,7 +130,7 @@ def rankings(comparison: Comparison) -> list[Ranking]:
     return [_ranking(comparison, measure) for measure in _compared(comparison)]
 
 
-def _ranking(comparison: Comparison, measure: Measure) -> Ranking:
+def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
     place = comparison.plates[0].measures.index(measure)
     ranks, better = comparison.ranks(measure.name), "higher" if measure.higher_is_better else "lower"
     by_ratio = measure.name in (comparison.at_equal_weight or ())
@@ -168,7 +168,7 @@ def weighed(comparison: Comparison, measure: str) -> str:
     return "; ranked by the ratio to the solid plate" if by_ratio else "; ranked without regard to weight"
 
 
-def _in_words(pair: Difference, measure: Measure, what: str) -> str:
+def _in_words(pair: Difference, measure: EffectMeasure, what: str) -> str:
     """Such as "a better than b by 0.1 (0.05 to 0.15)"; `what` follows the difference."""
     if math.isnan(pair.low):
         told = f"difference{what} {number(pair.value)}"

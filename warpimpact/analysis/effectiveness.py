@@ -37,7 +37,7 @@ ANGLE = Radians(math.radians(30.0))
 
 
 @dataclass(frozen=True)
-class Measure:
+class EffectMeasure:
     """One number of how well a plate protects; NaN where something does not exist.
 
     Attributes:
@@ -77,7 +77,7 @@ class Evidence:
         solid: the same of the first shots at the solid plate; None where there is none.
     """
 
-    measure: Measure
+    measure: EffectMeasure
     kind: str
     numbers: Array | None
     solid: Array | None
@@ -105,7 +105,7 @@ _WORST_POINT = _Statistic("_worst_point", ", worst point", " The worst of the hi
 
 def effectiveness(
     dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
-) -> list[Measure]:
+) -> list[EffectMeasure]:
     """How well the plate of a result protects.
 
     Args:
@@ -187,8 +187,8 @@ def _without_interval(value: float) -> Estimate:
 
 def _measure(
     effect: Effect, statistic: _Statistic, estimate: Estimate, against: Ratio, hit: int | None = None
-) -> Measure:
-    return Measure(
+) -> EffectMeasure:
+    return EffectMeasure(
         name=effect.name + statistic.name,
         label=effect.label + statistic.label,
         value=estimate.value,
@@ -237,7 +237,7 @@ def effectiveness_text(
     return "\n".join(rows)
 
 
-def depth_note(measures: Sequence[Measure]) -> str:
+def depth_note(measures: Sequence[EffectMeasure]) -> str:
     """What to know of the depths in a base that some cores pierce; empty if none does."""
     share = {measure.name: measure.value for measure in measures}.get("base_pierced_share", 0.0)
     if not share > 0.0:
@@ -257,7 +257,7 @@ def plate_text(dataset: xarray.Dataset) -> str:
     return f", {told[attr.AREAL_DENSITY]:.4g} kg/m², {told[attr.OPEN_AREA]:.1%} open"
 
 
-def _second(measure: Measure) -> str:
+def _second(measure: EffectMeasure) -> str:
     return (
         f"at hit {measure.hit}"
         if measure.hit is not None
@@ -265,6 +265,6 @@ def _second(measure: Measure) -> str:
     )
 
 
-def _against_text(measure: Measure) -> str:
+def _against_text(measure: EffectMeasure) -> str:
     interval = "" if math.isnan(measure.ratio_low) else f"  {interval_text(measure.ratio_low, measure.ratio_high)}"
     return f"{number_text(measure.solid):>12}   {number_text(measure.ratio)}{interval}"

@@ -18,7 +18,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
 from warpimpact.scene.display import STORED
-from warpimpact.solver.promise import PROMISES, errors_text
+from warpimpact.solver.pilot import accuracy_text, errors_text, hits_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
 if TYPE_CHECKING:
@@ -70,22 +70,23 @@ def promise_text(dataset: Result) -> str | None:
     if attr.NUMERICS_GIVEN not in told or attr.LIMIT in told:
         return None
     given = json.loads(told[attr.NUMERICS_GIVEN])
-    if attr.PROMISE_KEPT not in told:
-        fixed = ("time_step", "patches_axial", "patches_around", "grid_spacing")
+    if attr.RESIDUAL_VELOCITY_ERROR not in told:
+        fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
-    accuracy = PROMISES[given["fidelity"]].accuracy
-    stated = f"{accuracy.residual_velocity:g} m/s and {math.degrees(accuracy.tilt):g} deg for 90 % of the hits"
-    velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR_P90], told[attr.TILT_ERROR_P90]
-    found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR_P90, math.nan))}"
+    asked = json.loads(told[attr.ACCURACY])
+    stated = accuracy_text(asked.get("residual_velocity", math.inf), asked.get("tilt", math.inf), asked["share"])
+    velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
+    found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR, math.nan))}"
+    name = "the campaign" if given.get("accuracy") else given["fidelity"]
     if told[attr.PROMISE_KEPT]:
-        return f"{given['fidelity']} keeps its promise ({stated}); {found}"
-    return f"{given['fidelity']} does not keep its promise ({stated}) at the level that it may use; {found}"
+        return f"{name} keeps its promise ({stated}); {found}"
+    return f"{name} does not keep its promise ({stated}) at the level that it may use; {found}"
 
 
 def breaks_promise(dataset: Result) -> bool:
     """Whether the numerics of a result are less exact than its fidelity promises."""
-    return any(dataset.attrs.get(name) == 0 for name in (attr.PROMISE_KEPT, attr.LIMIT_PROMISE_KEPT))
+    return bool(dataset.attrs.get(attr.PROMISE_KEPT) == 0)
 
 
 def summary(dataset: Result) -> Summary:
@@ -196,10 +197,11 @@ def summary_text(dataset: Result) -> str:
 
 def numerics_note(dataset: Result, velocity: Spread) -> str:
     """That an interval is narrower than what the numerics may be off by; empty where it is not."""
-    error, (low, high) = dataset.attrs.get(attr.RESIDUAL_VELOCITY_ERROR_P90, 0.0), velocity.interval
+    error, (low, high) = dataset.attrs.get(attr.RESIDUAL_VELOCITY_ERROR, 0.0), velocity.interval
     if not 0.5 * (high - low) < error:
         return ""
-    return f"Intervals are by the hits alone; the numerics may be off by more: {error:.2g} m/s for 90 % of the hits."
+    hits = hits_text(json.loads(dataset.attrs[attr.ACCURACY])["share"])
+    return f"Intervals are by the hits alone; the numerics may be off by more: {error:.2g} m/s for {hits}."
 
 
 def stop_lines(dataset: Result) -> list[str]:

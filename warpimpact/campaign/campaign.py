@@ -5,7 +5,6 @@ Long because everything that two tables of a file must agree on is checked here.
 
 import json
 import math
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -32,17 +31,16 @@ from ..scene import (
     Target,
     symmetries_used,
 )
+from ..scene import exclusions as asked
 from ..scene.distributions import EDGE
+from ..scene.exclusions import check_together
 from ..scene.files import InputFile
 from ..scene.model import Model
 from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range
-from ..scene.symmetry import check_layers, check_scatter
+from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
-from ..solver.bending import check_bending
-from ..solver.blocks import check_layout
-from ..solver.resolution import ONE_PLATE
 from .plausible import warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
@@ -216,8 +214,8 @@ class Campaign(Model):
         drawn.check(self.plate, self.interaction)
         scattered = [name for name, layer in self.scatter.given if not layer]
         given = [name for name in scattered if ("plate", name) in drawn.values or name == "degradation"]
-        if given:
-            raise ValueError(f"got a distribution of plate.{given[0]} beside a posterior, which gives it")
+        found = bool(given) and f"a distribution of plate.{given[0]}"
+        check_together({asked.POSTERIOR: True, asked.SCATTER_OF_MATERIAL: found})
         return self
 
     @model_validator(mode="before")
@@ -232,34 +230,52 @@ class Campaign(Model):
     def _stop_computes_no_image(self) -> Self:
         """An answer costs least from the irreducible part of the cell (tests/benchmarks/NOTES.md)."""
         hits = self.hits
-        asked = "irreducible" in hits.model_fields_set or hits.area != "cell"
-        if self.stop is not None and self.burst is None and not asked:
-            part = hits.model_copy(update={"irreducible": hits.sampling in ("sobol", "random")})
-            with suppress(ValueError):  # of what has no symmetry every hit is computed
-                check_scatter(part, self.scatter)
-                check_layers(part, self.layer)
-                object.__setattr__(self, "hits", part)
+        chosen = "irreducible" in hits.model_fields_set or hits.area != "cell"
+        if self.stop is None or self.burst is not None or chosen or any(unsymmetric(self.scatter, self.layer).values()):
+            return self  # of what has no symmetry every hit is computed
+        part = hits.model_copy(update={"irreducible": hits.sampling in ("sobol", "random")})
+        object.__setattr__(self, "hits", part)
+        return self
+
+    @model_validator(mode="after")
+    def _goes_together(self) -> Self:
+        """All that scene/exclusions.py has rows for."""
+        stop, hits, numerics = self.stop, self.hits, self.numerics
+        variable = "" if stop is None else stop.measure.variable
+        told = stop is not None and f'stop.quantity = "{stop.quantity}"'
+        check_together(
+            unsymmetric(self.scatter, self.layer)
+            | {
+                asked.STOP: stop is not None,
+                asked.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
+                asked.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
+                asked.STOP_BENDING: variable in BENDING_VARIABLES and told,
+                asked.STOP_BROKEN: variable in BROKEN_VARIABLES and told,
+                asked.IMAGES: hits.irreducible,
+                asked.LISTED_STRENGTH: "strength" in (hits.listed or {}),
+                asked.BURST: self.burst is not None,
+                asked.POSTERIOR: self.posterior is not None,
+                asked.LAYERS: bool(self.layer),
+                asked.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
+                asked.BENDING: self.output.bending,
+                asked.STRENGTH: self.core.strength is not None or "strength" in (hits.listed or {}),
+                asked.NODAL: numerics.scheme == "nodal",
+                asked.BLOCK: numerics.layout == "block",
+                asked.DOUBLE: numerics.precision == "double",
+            }
+        )
+        self.output.check_bending(self.core)
         return self
 
     @model_validator(mode="after")
     def _stop_fits(self) -> Self:
         if self.stop is None:
             return self
-        if self.hits.sampling not in ("sobol", "random"):
-            raise ValueError(
-                f'got stop beside hits.sampling = "{self.hits.sampling}", but an interval needs "sobol" or "random"'
-            )
         if self.hits.count != self.stop.max_count:
             raise ValueError(
                 f"got hits.count = {self.hits.count} beside stop.max_count = {self.stop.max_count}, "
                 "which takes its place"
             )
-        if self.replicates == 1 and self.hits.sampling == "sobol":
-            raise ValueError("got hits.replicates = 1 beside stop, but an interval of a sobol sampling needs some")
-        if self.stop.measure.variable in BENDING_VARIABLES and not self.output.bending:
-            raise ValueError(f'got stop.quantity = "{self.stop.quantity}", but that needs output.bending = true')
-        if self.stop.measure.variable in BROKEN_VARIABLES and self.core.strength is None:
-            raise ValueError(f'got stop.quantity = "{self.stop.quantity}", but that needs core.strength')
         at = self.stop.measure.standoff
         if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
             standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)
@@ -281,46 +297,6 @@ class Campaign(Model):
             raise ValueError(
                 f"got hits up to {farthest:.6g} m from the origin, but they are exact up to {allowed:.4g} m; a pattern "
                 "repeats, so take hits near the origin"
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _images_share_their_shot(self) -> Self:
-        check_scatter(self.hits, self.scatter)
-        check_layers(self.hits, self.layer)
-        return self
-
-    @model_validator(mode="after")
-    def _scheme_knows_layers(self) -> Self:
-        if self.layer and self.numerics.scheme == "nodal":
-            raise ValueError(f'got numerics.scheme = "nodal" beside {len(self.layer)} [[layer]], but {ONE_PLATE}')
-        return self
-
-    @model_validator(mode="after")
-    def _plate_takes_a_burst(self) -> Self:
-        if self.burst is not None and self.hits.irreducible:
-            raise ValueError("got hits.irreducible = true beside burst, but the hits of a burst have no images")
-        if self.burst is not None and self.numerics.scheme == "nodal":
-            raise ValueError('got numerics.scheme = "nodal" beside burst, but it must be "consistent"')
-        if self.burst is not None and self.posterior is not None:
-            raise ValueError("got a posterior beside burst, but the shots of a burst share one plate, not their draws")
-        return self
-
-    @model_validator(mode="after")
-    def _core_has_a_bending_moment(self) -> Self:
-        self.output.check_bending(self.core)
-        check_bending(self.output, self.numerics)
-        return self
-
-    @model_validator(mode="after")
-    def _layout_computes_the_scene(self) -> Self:
-        if self.numerics.layout == "block":
-            check_layout(
-                nodal=self.numerics.scheme == "nodal",
-                double=self.numerics.precision == "double",
-                bends=self.output.bending,
-                layered=bool(self.layer),
-                burst=self.burst is not None,
             )
         return self
 
@@ -354,10 +330,6 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _standoffs_clear_of_plate(self) -> Self:
-        if self.output.layer_standoffs and not self.layer:
-            raise ValueError(
-                "got output.layer_standoffs without [[layer]], but behind a plate alone output.standoffs count"
-            )
         self.output.check_standoffs(self.core, self.target)
         return self
 

@@ -21,7 +21,7 @@ from .identify import add_identify
 from .limit import add_limit
 from .mistakes import bug_report, implausible_told, told
 from .plain import Plain, say
-from .progress import told as progress_told
+from .progress import verbosity
 from .replay import add_replay
 from .run import add_run
 from .show import add_inspect, add_plate, add_plot
@@ -72,7 +72,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     arguments = parser().parse_args(argv)
     try:
-        loud = progress_told(verbose=arguments.verbose, quiet=arguments.quiet)
+        loud = verbosity(verbose=arguments.verbose, quiet=arguments.quiet)
         with terminated_as_interrupted(), redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:
             code: int | None = arguments.command(arguments)
             sys.stdout.flush()

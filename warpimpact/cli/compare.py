@@ -10,7 +10,7 @@ from typing import Any
 from .mistakes import memory_told
 from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite
 from .paths import check_picture, named
-from .progress import show_standing, warn
+from .progress import show_run, warn
 from .run import failure_code
 
 
@@ -120,7 +120,7 @@ def _plates_run(arguments: argparse.Namespace, folder: Path) -> dict[str, Path]:
     paths = {name: folder / f"{name}.nc" for name in campaigns}
     for name, campaign in campaigns.items():
         print(f"plate {name}", file=sys.stderr)
-        with memory_told(arguments.files[0]), show_standing() as progress:
+        with memory_told(arguments.files[0]), show_run() as progress:
             run_to_file(
                 campaign,
                 paths[name],

@@ -2,9 +2,6 @@
 
 import argparse
 import math
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,10 +10,10 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .mistakes import memory_told
 from .options import Commands, add_command, add_device, add_output, add_overwrite
 from .paths import check_place
-from .progress import is_quiet, warn
+from .progress import Step, show_progress, warn
 
 if TYPE_CHECKING:
-    from warpimpact.identification.identify import Standing
+    from warpimpact.identification.identify import FitProgress
 
 
 def add_identify(commands: Commands) -> None:
@@ -54,14 +51,14 @@ def _identify(arguments: argparse.Namespace) -> int:
     check_place(output)
     for sentence in fit.warnings:
         warn(sentence)
-    with memory_told(arguments.fit), terminated_as_interrupted(), _show() as progress:
+    with memory_told(arguments.fit), terminated_as_interrupted(), show_progress("set") as show:
         identify_to_file(
             fit,
             output,
             device=arguments.device,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
-            progress=progress,
+            progress=lambda now: show(Step(now.done, now.total, now.resumed, _running(now))),
         )
     tree = files.read(output)
     print(posterior_text(tree))
@@ -71,39 +68,10 @@ def _identify(arguments: argparse.Namespace) -> int:
     return 0
 
 
-@contextmanager
-def _show() -> "Iterator[Callable[[Standing], None]]":
-    """Show the progress of a fit: a bar on a terminal, a line per tenth of the sets in a log."""
-    if is_quiet():
-        yield lambda standing: None
-        return
-    if not sys.stderr.isatty():
-        shown = -1
-
-        def log(standing: "Standing") -> None:
-            nonlocal shown
-            if (tenths := 10 * standing.done // standing.total) > shown:
-                shown = tenths
-                print(f"{standing.done} of {standing.total} sets; {_running(standing)}", file=sys.stderr, flush=True)
-
-        yield log
-        return
-    from tqdm import tqdm
-
-    with tqdm(unit="set", dynamic_ncols=True) as bar:
-
-        def show(standing: "Standing") -> None:
-            bar.total = standing.total
-            bar.set_postfix_str(_running(standing), refresh=False)
-            bar.update(max(0, standing.done - bar.n))
-
-        yield show
-
-
-def _running(standing: "Standing") -> str:
-    parts = [f"smallest misfit {standing.misfit:.3g}"] if math.isfinite(standing.misfit) else []
-    if math.isfinite(standing.effective):
-        parts.append(f"effective sample size {standing.effective:.0f}, Pareto k {standing.pareto_k:.2f}")
-    if standing.resumed:
-        parts.append(f"{standing.resumed} from before")
+def _running(now: "FitProgress") -> str:
+    parts = [f"smallest misfit {now.misfit:.3g}"] if math.isfinite(now.misfit) else []
+    if math.isfinite(now.effective):
+        parts.append(f"effective sample size {now.effective:.0f}, Pareto k {now.pareto_k:.2f}")
+    if now.resumed:
+        parts.append(f"{now.resumed} from before")
     return ", ".join(parts) or "drawn from the prior"

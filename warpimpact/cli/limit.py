@@ -17,7 +17,7 @@ from .options import (
     at_least,
 )
 from .paths import check_picture, check_place
-from .progress import show_standing, warn
+from .progress import show_run, warn
 from .run import failure_code
 
 
@@ -69,7 +69,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.runs.cluster import cluster_team
     from warpimpact.runs.run import run_to_file
     from warpimpact.runs.team import local_team
-    from warpimpact.studies.limit import LimitMap, told_of
+    from warpimpact.studies.limit import LimitMap, warning_of
     from warpimpact.studies.limit_text import limits_text
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
@@ -77,16 +77,20 @@ def _limit(arguments: argparse.Namespace) -> int:
     picture = output.with_suffix(".png")
     check_place(output)
     check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
-    job = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
-    if told := told_of(campaign, arguments.quantity):
-        warn(told)
+    computation = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
+    if sentence := warning_of(campaign, arguments.quantity):
+        warn(sentence)
     if arguments.scheduler or arguments.workers:
         team = cluster_team(
-            campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device, job=job
+            campaign,
+            address=arguments.scheduler,
+            workers=arguments.workers,
+            device=arguments.device,
+            computation=computation,
         )
     else:
-        team = local_team(campaign, arguments.device, job)
-    with memory_told(arguments.campaign), show_standing() as progress:
+        team = local_team(campaign, arguments.device, computation)
+    with memory_told(arguments.campaign), show_run() as progress:
         run_to_file(
             campaign,
             output,

@@ -4,26 +4,30 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from .plain import Plain, say
 
 if TYPE_CHECKING:
     from warpimpact.results.measures import Measure
-    from warpimpact.runs.progress import Standing
+    from warpimpact.runs.progress import RunProgress
     from warpimpact.statistics.intervals import Estimate
 
 _SILENCE, _LONGEST_SILENCE = 5.0, 60.0
 """Longest times between two lines of a log [s]: in the first minute, and of a run that takes hours. Between these it is
 a twelfth of the time so far."""
+_SHORT_PILOT = 2.0
+"""Seconds for which a pilot works without a word."""
+_BAR = "{l_bar}{bar:20}{r_bar}"
+"""Of a terminal: a bar of one width, as estimates beside it would leave it one character."""
 
 
 _quiet = False
 
 
 @contextmanager
-def told(*, verbose: int, quiet: bool) -> Iterator[None]:
-    """What a command tells beside its output and its warnings.
+def verbosity(*, verbose: int, quiet: bool) -> Iterator[None]:
+    """What a command writes beside its output and its warnings.
 
     Args:
         verbose: 1 shows the log of the package from INFO on, 2 from DEBUG on.
@@ -48,106 +52,134 @@ def told(*, verbose: int, quiet: bool) -> Iterator[None]:
         logger.setLevel(before)
 
 
-def is_quiet() -> bool:
-    """Whether no progress is shown."""
-    return _quiet
-
-
 def warn(sentence: str) -> None:
     """Say on the terminal or in the log what a person should know, though the command goes on."""
     say(f"warning: {sentence}")
 
 
+class Step(NamedTuple):
+    """How far a computation is.
+
+    Attributes:
+        done, total: of what is counted.
+        resumed: how many of those an earlier computation had done, which tell nothing of the rate.
+        text: what else there is to say.
+        before: what is under way before the first one is computed; its time does not count in the rate.
+    """
+
+    done: int
+    total: int
+    resumed: int = 0
+    text: str = ""
+    before: str = ""
+
+
 @contextmanager
-def show_standing() -> "Iterator[Callable[[Standing], None]]":
-    """Show the progress of a run, with its running estimates."""
+def show_progress(unit: str = "hit") -> Iterator[Callable[[Step], None]]:
+    """Show how far a computation is, or several one after another.
+
+    Args:
+        unit: what is counted.
+    """
     if _quiet:
-        yield lambda standing: None
+        yield lambda step: None
         return
     if not sys.stderr.isatty():
-        yield _log_standing()
+        yield _Log(unit).show
         return
     from tqdm import tqdm
 
-    with tqdm(unit="hit", dynamic_ncols=True) as bar:
+    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR) as bar:
 
-        def show(standing: "Standing") -> None:
-            if bar.total is None:
-                bar.total, bar.initial, bar.n = standing.total, standing.resumed, standing.resumed
-            bar.set_postfix_str(_running(standing), refresh=False)
-            bar.update(max(0, standing.done - bar.n))
+        def show(step: Step) -> None:
+            if step.before or bar.total is None or _another(step, int(bar.n), int(bar.total)):
+                bar.reset(step.total)
+                bar.initial = bar.n = step.resumed
+            bar.set_postfix_str(step.before or step.text, refresh=bool(step.before))
+            bar.update(max(0, step.done - bar.n))
 
         yield show
 
 
-def _log_standing() -> "Callable[[Standing], None]":
-    """A line at the start, after every tenth of the hits, and every few seconds."""
-    shown, last, begin = -1, 0.0, time.monotonic()
+def _another(step: Step, done: int, total: int) -> bool:
+    """Whether a step belongs to another computation than the one that was at `done` of `total`."""
+    return total > 0 and (step.total != total or step.done < done == total)
 
-    def show(standing: "Standing") -> None:
-        nonlocal shown, last
-        tenths, elapsed = 10 * standing.done // standing.total, time.monotonic() - begin
-        silence = min(_LONGEST_SILENCE, max(_SILENCE, elapsed / 12.0))
-        if tenths == shown and elapsed - last < silence:
-            return
-        shown, last = tenths, elapsed
-        line = f"{standing.done} of {standing.total} hits"
-        if (fresh := standing.done - standing.resumed) > 0 and elapsed > 0.0:
-            left = (standing.total - standing.done) * elapsed / fresh
-            line += f", {fresh / elapsed:.4g} hits/s, {left:.0f} s left; {_running(standing)}"
+
+class _Log:
+    """A line at the start, after every tenth, and every few seconds."""
+
+    def __init__(self, unit: str) -> None:
+        self._unit = unit
+        self._begin = self._last = time.monotonic()
+        self._tenths, self._before = -1, ""
+        self._step = Step(0, 0)
+
+    def show(self, step: Step) -> None:
+        """Take in how far the computation is."""
+        now, last = time.monotonic(), self._step
+        if _another(step, last.done, last.total) or bool(step.before) != bool(last.before):  # the clock starts again
+            self._begin, self._last, self._tenths, self._before = now, now, -1, ""
+        self._step = step
+        elapsed = now - self._begin
+        silent = now - self._last < min(_LONGEST_SILENCE, max(_SILENCE, elapsed / 12.0))
+        if step.before:
+            if elapsed < _SHORT_PILOT or (silent and step.before == self._before):
+                return
+            self._before, line = step.before, f"{step.before}, for {elapsed:.0f} s so far"
+        else:
+            tenths = 10 * step.done // step.total
+            if silent and tenths == self._tenths:
+                return
+            self._tenths, line = tenths, self._line(step, elapsed)
+        self._last = now
         print(line, file=sys.stderr, flush=True)
 
-    return show
+    def _line(self, step: Step, elapsed: float) -> str:
+        line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - step.resumed
+        if fresh <= 0 or elapsed <= 0.0:
+            return line
+        left = (step.total - step.done) * elapsed / fresh
+        return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s, {left:.0f} s left; {step.text}".removesuffix("; ")
 
 
-def _running(standing: "Standing") -> str:
-    """Running estimates and failed shots as one short line."""
-    from warpimpact.analysis.numbers import interval_text, plus_minus
-
-    def told(measure: "Measure", estimate: "Estimate") -> str:
-        if measure.is_binary:  # not in the middle of its interval
-            return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, '{:.4g}'.format)})"
-        return plus_minus(estimate.times(measure.display.factor), ".5g", ".2g") + measure.display.suffix
-
-    parts = [
-        f"{measure.text} {told(measure, estimate)}"
-        for measure, estimate in standing.estimates.items()
-        if estimate.count > 1
-    ]
-    if standing.promise is not None:
-        parts.append(standing.promise.phrase)
-    return ", ".join([*parts, f"{standing.failed} failed"])
+@contextmanager
+def show_run() -> "Iterator[Callable[[RunProgress], None]]":
+    """Show the progress of a run, with its running estimates."""
+    if _quiet:
+        yield lambda run: None
+        return
+    with show_progress() as show:
+        yield lambda run: show(Step(run.done, run.total, run.resumed, _running(run), _pilot(run)))
 
 
 @contextmanager
 def show_count() -> Iterator[Callable[[int, int], None]]:
     """Show how many of the hits are done."""
-    if _quiet:
-        yield lambda done, total: None
-        return
-    if not sys.stderr.isatty():
-        yield _log_count()
-        return
-    from tqdm import tqdm
-
-    with tqdm(unit="hit") as bar:
-
-        def show(done: int, total: int) -> None:
-            bar.total = total
-            bar.update(done - bar.n)
-
-        yield show
+    with show_progress() as show:
+        yield lambda done, total: show(Step(done, total))
 
 
-def _log_count() -> Callable[[int, int], None]:
-    """A line after every tenth of the hits."""
-    shown = 0
+def _pilot(run: "RunProgress") -> str:
+    if not run.piloting:
+        return ""
+    return "a pilot looks for the resolution" + ("" if run.trying is None else f", level {run.trying}")
 
-    def show(done: int, total: int) -> None:
-        nonlocal shown
-        tenths = 10 * done // total
-        if tenths > shown:
-            shown = tenths
-            print(f"{done} of {total} hits", file=sys.stderr, flush=True)
 
-    return show
+def _running(run: "RunProgress") -> str:
+    """Running estimates and failed shots as one short line."""
+    from warpimpact.analysis.numbers import interval_text, plus_minus
+
+    def text_of(measure: "Measure", estimate: "Estimate") -> str:
+        if measure.is_binary:  # not in the middle of its interval
+            return f"{estimate.value:.4g} ({interval_text(estimate.low, estimate.high, '{:.4g}'.format)})"
+        return plus_minus(estimate.times(measure.display.factor), ".5g", ".2g") + measure.display.suffix
+
+    parts = [
+        f"{measure.text} {text_of(measure, estimate)}"
+        for measure, estimate in run.estimates.items()
+        if estimate.count > 1
+    ]
+    if run.found is not None:
+        parts.append(run.found.phrase)
+    return ", ".join([*parts, f"{run.failed} failed"])

@@ -19,7 +19,7 @@ from .options import (
 )
 from .paths import check_place, check_suffix
 from .plain import say
-from .progress import show_standing, warn
+from .progress import show_run, warn
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -60,7 +60,7 @@ def _run(arguments: argparse.Namespace) -> int:
     team = None
     if arguments.scheduler or arguments.workers:
         team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
-    with memory_told(arguments.campaign), show_standing() as progress:
+    with memory_told(arguments.campaign), show_run() as progress:
         run_to_file(
             campaign,
             output,

@@ -8,7 +8,7 @@ from typing import Any
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite
 from .paths import check_picture, check_place, check_suffix
-from .progress import show_standing, warn
+from .progress import show_run, warn
 
 
 def add_sweep(commands: Commands) -> None:
@@ -42,7 +42,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
     check_suffix(output, "a sweep", ".nc")
     check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
 
-    with memory_told(arguments.campaign), show_standing() as follow:
+    with memory_told(arguments.campaign), show_run() as follow:
 
         def named(name: str) -> Any:
             print(f"point {name}", file=sys.stderr)

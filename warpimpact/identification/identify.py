@@ -17,7 +17,7 @@ from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.identification.store import Store
 from warpimpact.results import posterior as files
 from warpimpact.results.files import OutputError
-from warpimpact.runs.compute import made_by
+from warpimpact.runs.describe import made_by
 from warpimpact.runs.run import Interrupted
 from warpimpact.runs.shards import claimed
 from warpimpact.statistics.importance import LARGEST_K, Sampler
@@ -35,7 +35,7 @@ FARTHEST = 5.0
 
 
 @dataclass(frozen=True)
-class Standing:
+class FitProgress:
     """How far a fit is.
 
     Attributes:
@@ -53,7 +53,7 @@ class Standing:
     misfit: float
 
 
-Follow = Callable[[Standing], None]
+Follow = Callable[[FitProgress], None]
 
 
 def identify_to_file(
@@ -91,7 +91,7 @@ def identify_to_file(
 
 def sample(fit: Fit, *, device: str = "auto", store: Store | None = None, progress: Follow | None = None) -> Sampled:
     """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn."""
-    plan, follow = fit.sampling, progress or (lambda standing: None)
+    plan, follow = fit.sampling, progress or (lambda now: None)
     sampler = Sampler(len(fit.parameters), shared(fit), plan.seed)
     work = _Work(fit, device, store, follow)
     for count in rounds(plan):
@@ -171,7 +171,7 @@ class _Work:
         self._say()
 
     def _say(self) -> None:
-        self._follow(Standing(self.done, self._total, self._resumed, self._effective, self._pareto_k, self._misfit))
+        self._follow(FitProgress(self.done, self._total, self._resumed, self._effective, self._pareto_k, self._misfit))
 
 
 def _check_reach(fit: Fit, scores: list[Score]) -> None:

@@ -25,11 +25,11 @@ from warpimpact.identification.parameters import (
 )
 from warpimpact.results.measures import Measure, place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
+from warpimpact.scene import exclusions as asked
 from warpimpact.scene.distributions import Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
-from warpimpact.solver.bending import check_bending
 from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
 
@@ -73,7 +73,7 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     parameters = read_priors(prior, tables, name)
     tables = with_medians(tables, prior, parameters)
     record = _model(Record, data.get("record", {}), f"{name}: record")
-    numerics = _model(Numerics, {"fidelity": "draft"} | _table(data, "numerics", name), f"{name}: numerics")
+    numerics = _model(Numerics, {"level": 0} | _table(data, "numerics", name), f"{name}: numerics")
     shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
     selection = tuple(_condition(one, record, f"{name}: selection") for one in _selection(data, name))
     if any(one.variable == "bending_stress" for one in selection):
@@ -238,7 +238,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
         where = f"{name}: shot[{place}]"
         try:
             scene = fit.scene_of(shot)
-            check_bending(fit.record, fit.numerics)
+            asked.check_together({asked.BENDING: fit.record.bending, asked.NODAL: fit.numerics.scheme == "nodal"})
         except ValueError as error:
             told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
             raise FitError(f"{where}: {told}") from None

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison import Comparison, Difference
-    from warpimpact.analysis.effectiveness import Measure
+    from warpimpact.analysis.effectiveness import EffectMeasure
 
 # Colours of Okabe and Ito: they differ in every kind of colour blindness. Markers differ for a print in grey.
 _STYLES = {  # by the ending of a measure's name; the last number is the distance from the line of its plate
@@ -58,15 +58,15 @@ def comparison_figure(comparison: Comparison) -> Figure:
     return figure
 
 
-def _effect(measure: Measure) -> str:
+def _effect(measure: EffectMeasure) -> str:
     return measure.name.partition("_worst_")[0]
 
 
-def _statistic(measure: Measure) -> str:
+def _statistic(measure: EffectMeasure) -> str:
     return measure.name.partition("_worst_")[2]
 
 
-def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Measure]) -> None:
+def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[EffectMeasure]) -> None:
     """Measures of one effect, one line per plate."""
     plates = comparison.plates
     for line, plate in enumerate(plates):
@@ -87,7 +87,7 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[Measure]
     axes.set_title(_title(measures[0]), fontsize="medium", loc="left")
 
 
-def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Measure]) -> None:
+def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[EffectMeasure]) -> None:
     """Differences of one effect, one line per pair of plates."""
     names = {measure.name: measure for measure in measures}
     lines: dict[tuple[str, str], int] = {}
@@ -112,7 +112,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Mea
 def _draw_interval(
     axes: Axes,
     line: float,
-    number: Measure | Difference,
+    number: EffectMeasure | Difference,
     style: tuple[str, str],
     *,
     label: str | None = None,
@@ -147,6 +147,6 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
     axes.tick_params(axis="y", length=0.0)
 
 
-def _title(measure: Measure) -> str:
+def _title(measure: EffectMeasure) -> str:
     better = "higher" if measure.higher_is_better else "lower"
     return f"{measure.label.removesuffix(', mean')}{SHOWN_UNITS[measure.units]}; {better} is better"

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.solver.resolution import FIDELITIES
 from warpimpact.studies.accuracy import QUOTED
 
 if TYPE_CHECKING:
@@ -62,8 +61,8 @@ def _draw(axes: Axes, quoted: xarray.Dataset, quantity: v.Variable) -> None:
     axes.scatter(
         *points(quoted.isel(setting=literal)), s=48, color=_VERMILION, marker="X", zorder=4, label="literal scheme"
     )
-    named = quoted.isel(setting=np.isin(quoted[v.SETTING].values, list(FIDELITIES)))
-    axes.scatter(*points(named), s=110, facecolors="none", edgecolors="black", zorder=5, label="fidelities")
+    named = quoted.isel(setting=np.char.startswith(quoted[v.SETTING].values.astype(str), "level "))
+    axes.scatter(*points(named), s=110, facecolors="none", edgecolors="black", zorder=5, label="levels of the ladder")
     axes.margins(x=0.22, y=0.15)
     if floor > 0.0:
         bottom = min(axes.get_ylim()[0], _BELOW_FLOOR * floor)

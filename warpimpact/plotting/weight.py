@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison import Comparison, Contestant
-    from warpimpact.analysis.effectiveness import Measure
+    from warpimpact.analysis.effectiveness import EffectMeasure
 
 # Colours of Okabe and Ito, as in the figure of a comparison.
 _STYLES = {
@@ -98,14 +98,14 @@ def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
     _furnish(axes, _by_name(comparison.plates[0])[name], "areal density that the target needs [kg/m²]")
 
 
-def _by_name(plate: Contestant) -> dict[str, Measure]:
+def _by_name(plate: Contestant) -> dict[str, EffectMeasure]:
     return {measure.name: measure for measure in plate.measures}
 
 
 def _draw_point(
     axes: Axes,
     density: float,
-    measure: Measure,
+    measure: EffectMeasure,
     style: tuple[str, str, str],
     across: tuple[float, float] | None = None,
 ) -> None:
@@ -134,7 +134,7 @@ def _name(axes: Axes, name: str, place: tuple[float, float], middle: float) -> N
     axes.annotate(name, place, xytext=(side, 6), textcoords="offset points", ha=ha, fontsize="small")
 
 
-def _furnish(axes: Axes, measure: Measure, label: str) -> None:
+def _furnish(axes: Axes, measure: EffectMeasure, label: str) -> None:
     better = "higher" if measure.higher_is_better else "lower"
     axes.set(xlabel=label, ylabel=f"{measure.label.removesuffix(', mean')}{SHOWN_UNITS[measure.units]}")
     axes.set_title(f"{better} is better", fontsize="medium", loc="left")

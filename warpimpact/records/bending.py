@@ -8,11 +8,7 @@ from warpimpact.records.group import Columns, Group, Returned
 from warpimpact.records.variable import HITS, Variable
 
 LARGEST_BENDING_MOMENT = Variable(
-    "largest_bending_moment",
-    HITS,
-    "N m",
-    "largest bending moment in the rigid core",
-    shown_by=("inspect", "plot"),
+    "largest_bending_moment", HITS, "N m", "largest bending moment in the rigid core", shown_by=("inspect", "plot")
 )
 BENDING_SECTION = Variable("bending_section", HITS, "m", "distance of its section from the nose")
 BENDING_STRESS = Variable(

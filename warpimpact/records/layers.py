@@ -5,20 +5,19 @@ A core leaves a layer at the instant when its last point passes the rear face; N
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpimpact.kernels.status import LayerStatus
-from warpimpact.records.group import Columns, Group, Returned, doubles
+from warpimpact.records.group import Columns, Group, Returned
 from warpimpact.records.variable import BEHIND_LAYER, HITS, IN_LAYER, Variable
 
 if TYPE_CHECKING:
     from warpimpact.scene import Scene, Shots
 
-LAYER_STATUS = Variable(
-    "layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus, field="status"
-)
+LAYER_STATUS = Variable("layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus)
 LAYER_RESIDUAL_VELOCITY = Variable(
     "layer_residual_velocity",
     IN_LAYER,
@@ -27,42 +26,25 @@ LAYER_RESIDUAL_VELOCITY = Variable(
     field="velocity",
 )
 LAYER_TILT = Variable(
-    "layer_tilt",
-    IN_LAYER,
-    "degree",
-    "angle between core axis and line of fire when its last point leaves the layer",
-    field="tilt",
+    "layer_tilt", IN_LAYER, "degree", "angle between core axis and line of fire when its last point leaves the layer"
 )
 LAYER_TIME = Variable(
-    "layer_time",
-    IN_LAYER,
-    "s",
-    "time when the last point of the core leaves the layer, since the first touch",
-    field="time",
+    "layer_time", IN_LAYER, "s", "time when the last point of the core leaves the layer, since the first touch"
 )
 STOPPED_IN = Variable("stopped_in", HITS, "1", "deepest layer that the core rests in; -1 where it does not rest in one")
 DEPTH = Variable("depth", HITS, "m", "how far behind the front face of that layer any point of the core came")
 
 LAYER_DEFLECTION = Variable(
-    "layer_deflection",
-    IN_LAYER,
-    "degree",
-    "angle between velocity and line of fire behind the layer",
-    field="deflection",
+    "layer_deflection", IN_LAYER, "degree", "angle between velocity and line of fire behind the layer"
 )
 LAYER_STANDOFF_TILT = Variable(
-    "layer_standoff_tilt",
-    BEHIND_LAYER,
-    "degree",
-    "angle between core axis and line of fire behind the layer",
-    field="standoff_tilt",
+    "layer_standoff_tilt", BEHIND_LAYER, "degree", "angle between core axis and line of fire behind the layer"
 )
 LAYER_STANDOFF_PITCH = Variable(
     "layer_standoff_pitch",
     BEHIND_LAYER,
     "degree",
     "pitch of the core behind the layer, projected into the x-z plane",
-    field="standoff_pitch",
     mirror="along_z",
 )
 LAYER_STANDOFF_YAW = Variable(
@@ -70,7 +52,6 @@ LAYER_STANDOFF_YAW = Variable(
     BEHIND_LAYER,
     "degree",
     "yaw of the core behind the layer, projected into the x-y plane",
-    field="standoff_yaw",
     mirror="along_y",
 )
 
@@ -88,17 +69,20 @@ def _layered(scene: Scene, shots: Shots) -> bool:
     return len(scene.target.layers) > 1
 
 
+def _column(returned: Returned, one: Variable) -> NDArray[Any]:
+    return np.asarray(getattr(returned.passage, one.field.removeprefix("layer_")).numpy())
+
+
 def _left(returned: Returned) -> Columns:
-    passage = returned.passage
-    codes = {one: getattr(passage, one.field).numpy().astype(np.int8) for one in _CODES}
-    return codes | {one: doubles(getattr(passage, one.field)) for one in LAYER_VARIABLES if one not in _CODES}
+    return {one: _column(returned, one).astype(np.int8 if one in _CODES else np.float64) for one in LAYER_VARIABLES}
 
 
 def _behind(returned: Returned) -> Columns:
     """No value where free flight ends at the next layer: a stand-off and the size of the core are more than the gap."""
-    deflection, *attitude = LAYER_STANDOFF_VARIABLES
-    columns = {one: np.where(returned.free, doubles(getattr(returned.passage, one.field)), np.nan) for one in attitude}
-    return {deflection: doubles(getattr(returned.passage, deflection.field))} | columns
+    columns = {one: _column(returned, one).astype(np.float64) for one in LAYER_STANDOFF_VARIABLES}
+    deflection = columns.pop(LAYER_DEFLECTION)
+    at_standoffs = {one: np.where(returned.free, values, np.nan) for one, values in columns.items()}
+    return {LAYER_DEFLECTION: deflection} | at_standoffs
 
 
 LAYER_VARIABLES = Group(

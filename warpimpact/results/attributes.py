@@ -34,11 +34,13 @@ TIME_STEP = "time_step"
 PRECISION = "precision"
 NUMERICS_GIVEN = "numerics_given"
 RESOLUTION = "resolution"
-"""JSON of the level of resolution that the promise of a named fidelity took; likewise only of one:"""
+"""JSON of the numerics that a pilot found; likewise only with a pilot:"""
 PROMISE_KEPT = "promise_kept"
-RESIDUAL_VELOCITY_ERROR_P90 = "residual_velocity_error_p90"
-TILT_ERROR_P90 = "tilt_error_p90"
-DEPTH_ERROR_P90 = "depth_error_p90"
+ACCURACY = "accuracy"
+"""JSON of what was asked for: errors in SI, and the share of the hits that is to stay within them. What was found:"""
+RESIDUAL_VELOCITY_ERROR = "residual_velocity_error"
+TILT_ERROR = "tilt_error"
+DEPTH_ERROR = "depth_error"
 """Only where some shots of the pilot stop in a layer."""
 FINGERPRINT = "fingerprint"
 COMPUTE_TIME = "compute_time"
@@ -103,10 +105,8 @@ SOLID_LIMIT_DENSITY, SOLID_LIMIT_HIGHEST = "solid_limit_density", "solid_limit_h
 """Mass per volume of the solid plate that replaces the whole target, and the largest value tried."""
 LIMIT_TOLERANCE = "limit_tolerance"
 LIMIT_HIGHEST = "limit_highest"
-LIMIT_RESOLUTION = "limit_resolution"
-LIMIT_PROMISE_KEPT = "limit_promise_kept"
-LIMIT_ERROR_P90 = "limit_error_p90"
-LIMIT_ERROR_SHOWN = "limit_error"
+LIMIT_ERROR = "limit_error"
+"""Of a limit velocity [m/s] or of a limit thickness [m]."""
 
 # A replayed hit
 HIT = "hit"
@@ -117,9 +117,9 @@ _SI = "SI; a text says its unit"
 UNITS = {
     COMPUTE_TIME: "s",
     HITS_PER_SECOND: "s-1",
-    RESIDUAL_VELOCITY_ERROR_P90: "m s-1",
-    TILT_ERROR_P90: "degree",
-    DEPTH_ERROR_P90: "m",
+    RESIDUAL_VELOCITY_ERROR: "m s-1",
+    TILT_ERROR: "degree",
+    DEPTH_ERROR: "m",
     GRID_SPACING: "m",
     TIME_STEP: "s",
     OPEN_AREA: "1",

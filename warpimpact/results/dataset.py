@@ -7,7 +7,7 @@ and opens with plain ``xarray.open_dataset``.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,9 +83,9 @@ def to_table(
     values |= vars(outcomes) | faces(scene.target)
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
-    columns = described((name for name in v.hit_variables() if name in values), values)
+    variables = (name for name in v.hit_variables() if name in values)
     return Table.of(
-        columns if double else columns | _in_single(columns, v.computed_variables()),
+        described(variables, values, () if double else v.computed_variables()),
         described((name for name in along if name in coordinates), coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
@@ -105,17 +105,7 @@ def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, 
         double: as in `to_dataset`.
     """
     values: dict[str, Any] = {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
-    columns = described(v.SOLID_VARIABLES, values)
-    return columns if double else columns | _in_single(columns, v.SOLID_VARIABLES)
-
-
-def _in_single(columns: Mapping[str, tuple[Any, ...]], names: Iterable[str]) -> dict[str, tuple[Any, ...]]:
-    """Those of some variables that hold numbers, in single precision."""
-    return {
-        name: (dims, values.astype(np.float32), told)
-        for name, (dims, values, told) in columns.items()
-        if name in set(names) and values.dtype.kind == "f"
-    }
+    return described(v.SOLID_VARIABLES, values, () if double else v.SOLID_VARIABLES)
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:
@@ -229,15 +219,22 @@ def history_dataset(
     )
 
 
-def described(variables: Iterable[v.Variable], values: Mapping[str, Any]) -> dict[str, tuple[Any, ...]]:
-    """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them."""
-    return {str(one): (one.dims, _in_units(one, values[one]), one.attributes) for one in variables}
+def described(
+    variables: Iterable[v.Variable], values: Mapping[str, Any], single: Collection[str] = ()
+) -> dict[str, tuple[Any, ...]]:
+    """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them.
+
+    Args:
+        single: those whose numbers are stored in single precision.
+    """
+    return {str(one): (one.dims, _stored(one, values[one], one in single), one.attributes) for one in variables}
 
 
-def _in_units(variable: v.Variable, values: Any) -> Any:
+def _stored(variable: v.Variable, values: Any, single: bool) -> Any:
     if getattr(values, "dtype", None) == np.bool_:
         return values.astype(np.int8)  # netCDF has no truth values
-    return np.degrees(values) if variable.units == "degree" else values
+    shown = np.degrees(values) if variable.units == "degree" else values
+    return shown.astype(np.float32) if single and shown.dtype.kind == "f" else shown
 
 
 def status_codes(dataset: Result) -> dict[str, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -65,6 +66,24 @@ def _write(
         written.setncatts(attributes)
         written.set_auto_maskandscale(False)
         written[:] = values.astype(object) if kind is str else values
+
+
+def open_to_append(file: Path) -> Any:
+    """A file that `write_table` wrote in chunks, for `append`; of the megabytes that it may keep of every variable, two
+    chunks will do."""
+    target = netCDF4.Dataset(file, "a")
+    target.set_auto_maskandscale(False)
+    for variable in target.variables.values():
+        if variable.chunking() != "contiguous":
+            variable.set_var_chunk_cache(size=2 * math.prod(variable.chunking()) * variable.dtype.itemsize)
+    return target
+
+
+def append(table: Table, target: Any, first: int) -> None:
+    """Write what a Table has along "hit" behind the first so many hits of an open file."""
+    for name, column in table.variables.items():
+        if v.HIT in column.dims and name in target.variables:
+            target[name][first : first + column.shape[0]] = column.values
 
 
 @contextmanager

@@ -1,8 +1,5 @@
 """The variables of the Datasets by their names: those that are recorded of a shot, which records/ declares, and those
-that stand beside them, with their dimensions, units and meanings.
-
-Long because it is one table: each variable stands here once.
-"""
+that stand beside them, with their dimensions, units and meanings."""
 
 from __future__ import annotations
 
@@ -105,8 +102,8 @@ OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit c
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
 GROUPS = {"plate": OUTLINE_VARIABLES, "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES)}
-"""What is not along "hit" stands in groups of the file. In memory these are coordinates, which no choice of hits
-spreads over the hits."""
+"""What is not along "hit" stands in groups of the file. In memory the solid plate's are coordinates, which no choice of
+hits spreads over the hits; outlines.py says what becomes of the outlines."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""

@@ -12,10 +12,12 @@ from typing import Any, NamedTuple
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import HitMap, made_by
+from warpimpact.runs.describe import made_by
+from warpimpact.runs.task import Computation, Task
 from warpimpact.runs.team import HIT_MAP, ClusterError, Team, awaited, task_size
-from warpimpact.scene import Shots
 from warpimpact.solver.device import DeviceError, cores
+from warpimpact.solver.pilot import Found
+from warpimpact.solver.worker import Worker
 
 LONELY = 120.0
 """Seconds for which a scheduler may be without workers."""
@@ -43,7 +45,7 @@ def cluster_team(
     address: str | None = None,
     workers: int | None = None,
     device: str = "auto",
-    job: HitMap = HIT_MAP,
+    computation: Computation = HIT_MAP,
 ) -> Iterator[Team]:
     """The workers of a Dask cluster; what one that dies was computing goes to another.
 
@@ -51,7 +53,7 @@ def cluster_team(
         address: of a scheduler.
         workers: processes to start on this machine, where there is no address.
         device: that every worker computes on.
-        job: what to compute of every hit.
+        computation: of every hit.
 
     Raises:
         ClusterError: dask is not installed, the scheduler cannot be reached, is lost or has no worker for LONELY
@@ -89,12 +91,13 @@ def cluster_team(
             campaign = awaited(asked(executor.submit, _looked_at, campaign), _LISTEN_EVERY, reached.threads)
             how = _How(device, threads, kind)
             yield Team(
-                job=job,
-                pilot=lambda: asked(executor.submit, job.promise_of, campaign, device),
-                submit=lambda *shots: asked(executor.submit, _compute_alike, job, campaign, *shots, how),
+                computation=computation,
+                pilot=lambda: asked(executor.submit, _pilot, computation, campaign, how),
+                trying=lambda: None,
+                submit=lambda task: asked(executor.submit, _compute_alike, computation, campaign, task, how),
                 width=lambda: 2 * max(1, reached.threads()),
                 task=lambda rate: task_size(kind),
-                made_by=kind | dict(job.content),
+                made_by=kind | dict(computation.content),
                 underway=lambda: 0,
             )
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
@@ -152,22 +155,20 @@ def _ignoring_interrupts(plugin: Any) -> Any:
     return type("Ignoring", (plugin,), {"setup": setup})()
 
 
-def _compute_alike(
-    job: HitMap,
-    campaign: Campaign,
-    promise: Any,
-    shots: Shots,
-    solid: Shots | None,
-    how: _How,
-) -> Table:
-    """Compute shots on a worker that gives the same bits as the others."""
+def _pilot(computation: Computation, campaign: Campaign, how: _How) -> Found | None:
+    """What the pilot finds, on a worker."""
+    return computation.pilot(campaign, Worker(how.device), lambda level: None)
+
+
+def _compute_alike(computation: Computation, campaign: Campaign, task: Task, how: _How) -> Table:
+    """Compute a task on a worker that gives the same bits as the others."""
     own, kind = made_by(how.device), how.kind
     if own != kind:
         name = next(name for name in kind if own[name] != kind[name])
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    return job.compute(campaign, shots, promise=promise, solid=solid, device=how.device, threads=how.threads)
+    return computation.compute(campaign, task, Worker(how.device, how.threads))
 
 
 def _looked_at(campaign: Campaign) -> Campaign:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from warpimpact.results.measures import Measure
+from warpimpact.solver.pilot import Found
 from warpimpact.statistics.intervals import Estimate
 
 
 @dataclass(frozen=True)
-class Standing:
+class RunProgress:
     """How far a run is.
 
     Attributes:
@@ -20,7 +20,9 @@ class Standing:
         resumed: shots that an earlier run had done.
         failed: shots whose computation failed.
         estimates: running estimates of the main quantities, over the shots from the first on without a gap.
-        promise: the finding of the pilot; None if the campaign fixes the resolution.
+        piloting: whether a pilot is at work still; no shot is done then.
+        trying: the level that it computes; None where that is not known.
+        found: what it found; None if the campaign fixes the resolution.
     """
 
     done: int
@@ -29,7 +31,9 @@ class Standing:
     resumed: int
     failed: int
     estimates: dict[Measure, Estimate]
-    promise: Any = None
+    piloting: bool = False
+    trying: int | None = None
+    found: Found | None = None
 
 
-Follow = Callable[[Standing], None]
+Follow = Callable[[RunProgress], None]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -15,11 +14,10 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
 from warpimpact.results.files import ResultError
 from warpimpact.results.layers import values_of
-from warpimpact.runs.compute import is_double, promise_in
+from warpimpact.runs.describe import is_double
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver import simulate
-from warpimpact.solver.limit import with_thickness, with_velocity
-from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.limit import short_steps, with_thickness, with_velocity
 from warpimpact.solver.unfold import image_of
 
 ROUNDING = {v.RESIDUAL_VELOCITY: 0.1, v.DEFLECTION: 0.5, v.TILT: 0.5}
@@ -103,12 +101,11 @@ def _at_their_limit(scene: Scene, shots: Shots, result: xarray.Dataset, place: i
     return with_thickness(layer, shots, np.full(len(shots), stored))
 
 
-def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics | Fidelity:
+def _numerics(campaign: Campaign, result: xarray.Dataset) -> Numerics:
     """What the hits were computed with."""
-    if attr.LIMIT_RESOLUTION in result.attrs:
-        return Fidelity(**json.loads(result.attrs[attr.LIMIT_RESOLUTION]))
-    promise = promise_in(result)
-    return campaign.numerics if promise is None else promise.fidelity
+    found = attr.RESOLUTION in result.attrs
+    numerics = Numerics.model_validate_json(result.attrs[attr.RESOLUTION]) if found else campaign.numerics
+    return short_steps(numerics) if attr.LIMIT in result.attrs else numerics
 
 
 def _campaign(result: xarray.Dataset, folder: Path) -> Campaign:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
-from warpimpact.runs.progress import Follow, Standing
-from warpimpact.runs.shards import Parts, claimed, extent, manifest
+from warpimpact.runs.progress import Follow, RunProgress
+from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manifest
+from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
+from warpimpact.solver.pilot import Found
 from warpimpact.statistics.stopping import looks
 
 if TYPE_CHECKING:
@@ -44,7 +46,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
-        progress: called with the standing several times a second.
+        progress: called several times a second.
 
     Returns:
         The Dataset of results/dataset.py, one entry per hit.
@@ -54,9 +56,9 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
     """
     total = len(campaign.sampler())
     with local_team(campaign, device) as team:
-        held = _Held(extent(total, campaign.at_a_plate))
-        end = _fill(campaign, held, team, progress or (lambda standing: None))
-    table = joined(held.load(index) for index in range(end.shards))
+        shards = Shards(extent(total, campaign.at_a_plate))
+        end = _fill(campaign, shards, team, progress or (lambda now: None))
+    table = joined(shards.load(index) for index in range(end.shards))
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
 
 
@@ -89,11 +91,11 @@ def run_to_file(
     """
     with claimed(output), team or local_team(campaign, device) as members:
         content, total = manifest(campaign, members.made_by), len(campaign.sampler())
-        parts = Parts(output, content, total, tell, grows=campaign.stop is None)
+        parts = ShardsOnDisk(output, content, total, tell, grows=campaign.stop is None)
         if not parts.begin(resume=resume, overwrite=overwrite):
             return
         try:
-            end = _fill(campaign, parts, members, progress or (lambda standing: None))
+            end = _fill(campaign, parts, members, progress or (lambda now: None))
             parts.finish(end.shards, lambda first: _attributes(first, end))
         except KeyboardInterrupt:
             raise Interrupted(f"interrupted; {_kept(parts)}") from None
@@ -104,40 +106,13 @@ def run_to_file(
             raise
 
 
-def _kept(parts: Parts) -> str:
+def _kept(parts: ShardsOnDisk) -> str:
     """What a run that breaks off leaves behind; the folder is emptied if that is nothing."""
     kept = parts.kept()
     if not kept:
         parts.discard()
         return "nothing is saved"
     return f"{kept} of {parts.count} shards are saved in {parts.folder}; continue with --resume"
-
-
-class _Store(Protocol):
-    """Where shards go: a folder, or memory."""
-
-    extent: int
-
-    @property
-    def saved(self) -> Mapping[int, object]: ...
-
-    def save(self, index: int, table: Table) -> None: ...
-
-    def load(self, index: int) -> Table: ...
-
-
-class _Held:
-    """Shards in memory."""
-
-    def __init__(self, size: int) -> None:
-        self.extent = size
-        self.saved: dict[int, Table] = {}
-
-    def save(self, index: int, table: Table) -> None:
-        self.saved[index] = table
-
-    def load(self, index: int) -> Table:
-        return self.saved[index]
 
 
 @dataclass(frozen=True)
@@ -151,44 +126,45 @@ class _End:
     stop: dict[str, Any]
 
 
-def _fill(campaign: Campaign, store: _Store, team: Team, follow: Follow) -> _End:
-    """Compute the shards that the store lacks, until all are there or the stop rule is met."""
-    sampler = campaign.sampler()
-    watch = _Watch(campaign, len(sampler), store, team.job.measures)
-    for index in sorted(store.saved):
-        watch.add(index, store.load(index))
+def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _End:
+    """Compute the shards that are not there, until all are or the stop rule is met."""
+    sampler, computation = campaign.sampler(), team.computation
+    watch = _Watch(campaign, len(sampler), shards, computation.measures)
+    there = sorted(shards.there())
+    for index in there:
+        watch.add(index, shards.load(index))
     watch.resumed = watch.done
-    if store.saved:
-        watch.promise = team.job.promise_in(store.load(min(store.saved)))
+    if there:
+        watch.found = computation.found_in(shards.load(there[0]))
     else:
 
         def tick() -> None:
             team.width()  # tells of a cluster that has lost its workers
-            follow(watch.standing(0))
+            follow(replace(watch.progress(0), piloting=True, trying=team.trying()))
 
-        watch.promise = awaited(team.pilot(), _REPORT_EVERY, tick)
-    tasks = _tasks(store, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
+        watch.found = awaited(team.pilot(), _REPORT_EVERY, tick)
+    tasks = _tasks(shards, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
     waiting: dict[Future[Table], range] = {}
     try:
         while watch.end is None:
             width = team.width()
             while len(waiting) < width and (task := next(tasks, None)) is not None:
-                shots = sampler.shots(task.start * store.extent, len(task) * store.extent)
-                first = shots[: store.extent] if task.start == 0 else None
-                solid = None if first is None else _solid_shots(campaign, first, team.job.most_solid)
-                waiting[team.submit(watch.promise, shots, solid)] = task
+                shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
+                first = shots[: shards.extent] if task.start == 0 else None
+                solid = None if first is None else _solid_shots(campaign, first, computation.most_solid)
+                waiting[team.submit(Task(shots, solid, watch.found))] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
             stop_if_asked()
             for future in finished:
                 task = waiting.pop(future)
-                for index, shard in _split(future.result(), task, store.extent):
-                    store.save(index, shard)
+                for index, shard in _split(future.result(), task, shards.extent):
+                    shards.save(index, shard)
                     watch.add(index, shard)
-            follow(watch.standing(team.underway()))
+            follow(watch.progress(team.underway()))
     finally:
         for future in waiting:
             future.cancel()
-    follow(watch.standing(0))
+    follow(watch.progress(0))
     return watch.end
 
 
@@ -206,12 +182,12 @@ def _solid_shots(campaign: Campaign, shots: Shots, most: int) -> Shots | None:
     return shots[: max(1, most // campaign.at_a_plate) * campaign.at_a_plate]
 
 
-def _tasks(store: _Store, total: int, shots: Callable[[], int]) -> Iterator[range]:
-    """Ranges of shards that the store lacks, each of about as many shots as are asked for when it begins."""
-    saved, shards, first = frozenset(store.saved), -(-total // store.extent), 0
-    while first < shards:
-        most, stop = max(1, shots() // store.extent), first
-        while stop < min(first + most, shards) and stop not in saved:
+def _tasks(shards: Shards, total: int, shots: Callable[[], int]) -> Iterator[range]:
+    """Ranges of shards that are not there, each of about as many shots as are asked for when it begins."""
+    there, count, first = frozenset(shards.there()), -(-total // shards.extent), 0
+    while first < count:
+        most, stop = max(1, shots() // shards.extent), first
+        while stop < min(first + most, count) and stop not in there:
             stop += 1
         if stop > first:
             yield range(first, stop)
@@ -237,8 +213,8 @@ class _Watch:
     same shots however it was computed.
     """
 
-    def __init__(self, campaign: Campaign, total: int, store: _Store, measures: Sequence[str] = ()) -> None:
-        self._total, self._shards, self._load = total, -(-total // store.extent), store.load
+    def __init__(self, campaign: Campaign, total: int, shards: Shards, measures: Sequence[str] = ()) -> None:
+        self._total, self._shards, self._load = total, -(-total // shards.extent), shards.load
         self._rule = campaign.stop
         last = campaign.output.standoffs[-1]
         measures = measures or ("mean(residual_velocity)", f"mean(tilt@{last * 1e3:.10g}mm)")
@@ -253,10 +229,10 @@ class _Watch:
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
         self.end: _End | None = None
-        self.promise: Any = None
+        self.found: Found | None = None
 
     def add(self, index: int, shard: Table) -> None:
-        """Take in a shard that the store has; one that comes before its turn is loaded when that is."""
+        """Take in a shard that is there; one that comes before its turn is loaded when that is."""
         self.done += shard.sizes["hit"]
         self.failed += int(failed(shard).sum())
         self._early.add(index)
@@ -302,12 +278,12 @@ class _Watch:
             attr.CONFIDENCE: rule.confidence,
         }
 
-    def standing(self, underway: int) -> Standing:
+    def progress(self, underway: int) -> RunProgress:
         """How far the run is, with shots of unfinished shards."""
         tallies = [*self._tallies, self._stop] if self._rule is not None else self._tallies
         estimates = {tally.measure: tally.estimate() for tally in tallies if tally.measure.kind != "quantile"}
         done = self.done if self.done == self._total else min(self.done + underway, self._total - 1)
-        return Standing(done, self._total, self.done, self.resumed, self.failed, estimates, self.promise)
+        return RunProgress(done, self._total, self.done, self.resumed, self.failed, estimates, found=self.found)
 
 
 def _attributes(table: Table, end: _End) -> dict[str, Any]:

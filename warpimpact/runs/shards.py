@@ -20,7 +20,7 @@ import re
 import shutil
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.results.growing import Growing
+from warpimpact.results.incremental import IncrementalFile
 from warpimpact.results.netcdf import attribute, read_table
 from warpimpact.results.table import Table
 
@@ -125,8 +125,28 @@ def claimed(output: Path) -> Iterator[None]:
             lock.release()
 
 
-class Parts:
-    """The shards of one run on the disk, in a folder that is `claimed`.
+class Shards:
+    """The shards of one run, each the results of `extent` shots."""
+
+    def __init__(self, extent: int) -> None:
+        self.extent = extent
+        self._held: dict[int, Table] = {}
+
+    def there(self) -> Collection[int]:
+        """Numbers of the shards that are there."""
+        return self._held.keys()
+
+    def save(self, index: int, table: Table) -> None:
+        """Take in a shard."""
+        self._held[index] = table
+
+    def load(self, index: int) -> Table:
+        """A shard that is there."""
+        return self._held[index]
+
+
+class ShardsOnDisk(Shards):
+    """The shards of one run on the disk, in a folder that is `claimed`. Those that came last are held in memory.
 
     Args:
         grows: whether the result file grows beside the shards as they come, so that no more than its end is left to do
@@ -135,7 +155,7 @@ class Parts:
     Attributes:
         output: the result file.
         folder: where the shards are.
-        saved: the shards that are there, by their numbers.
+        saved: the shards on the disk, by their numbers.
     """
 
     def __init__(
@@ -147,15 +167,14 @@ class Parts:
         *,
         grows: bool = False,
     ) -> None:
+        super().__init__(content["extent"])
         self.output, self.content, self.total, self._tell = output, content, total, tell
         self.folder = folder_of(output)
-        self.extent: int = content["extent"]
         self.saved: dict[int, Path] = {}
         self._fingerprint = fingerprint(content)
-        self._held: dict[int, Table] = {}
         self._written = time.monotonic()
         self._grows, self._grown = grows, 0
-        self._growing: Growing | None = None
+        self._growing: IncrementalFile | None = None
 
     @property
     def count(self) -> int:
@@ -284,13 +303,17 @@ class Parts:
         seal = hashlib.sha256(f"{self._fingerprint} {index} {bits}".encode()).hexdigest()[:16]
         return self.folder / f"{self._stem(index)}_{seal}.nc"
 
+    def there(self) -> Collection[int]:
+        """Numbers of the shards that are there."""
+        return self._held.keys() | self.saved.keys()
+
     def save(self, index: int, table: Table) -> None:
         """Take in a shard. It is on the disk after HELD seconds at most, if the run goes on.
 
         Raises:
             OutputError: what was held cannot be written.
         """
-        self._held[index] = table
+        super().save(index, table)
         if self._grows:
             try:
                 self._grow()
@@ -335,14 +358,14 @@ class Parts:
         Raises:
             OutputError: it is gone or damaged meanwhile.
         """
-        return self._held[index] if index in self._held else read_table(self._path(index))
+        return super().load(index) if index in self._held else read_table(self._path(index))
 
     def _grow(self, count: int | None = None) -> None:
         """Add the shards to the result file that are there and follow those in it, or the first `count` shards."""
         if self._growing is None:
             hits = min(self.total, (self.count if count is None else count) * self.extent)
-            self._growing = Growing(self.output, self.folder / _GROWING, hits)
-        there = self._held.keys() | self.saved.keys()
+            self._growing = IncrementalFile(self.output, self.folder / _GROWING, hits)
+        there = self.there()
         while self._grown in there if count is None else self._grown < count:
             self._growing.add(self.load(self._grown))
             self._grown += 1

@@ -8,15 +8,18 @@ from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, TypeVar
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import HitMap, made_by
-from warpimpact.scene import Shots
+from warpimpact.runs.compute import HitMap
+from warpimpact.runs.describe import made_by
+from warpimpact.runs.task import Computation, Task
 from warpimpact.solver.device import DeviceError, find_device
+from warpimpact.solver.pilot import Found
+from warpimpact.solver.worker import Cancel, Worker
 
 CUDA_SHOTS = 2**17
 """Shots per task on a GPU, which fewer would not fill."""
@@ -38,26 +41,30 @@ class Team:
     """Computes shots in the background.
 
     Attributes:
-        job: what is computed of every hit.
-        pilot: finds the promise of the campaign in the background, None if it fixes the resolution itself.
-        submit: hands over the promise, shots, and those of them that the solid reference takes, too; their Table
-            comes in the future.
+        computation: of every hit.
+        pilot: begins the pilot of the campaign.
+        trying: the level that it computes; None where that is not known.
+        submit: hands over a task; its Table comes in the future.
         width: tells how many tasks to keep under way: as many as compute, and as many that wait.
         task: shots per task, for a rate of shots per second; 0 where that is not known yet.
-        made_by: versions, kind of device and the job's content, which decide the bits.
+        made_by: versions, kind of device and the computation's content, which decide the bits.
         underway: how many shots of unfinished tasks are done.
     """
 
-    job: HitMap
-    pilot: Callable[[], Future[Any]]
-    submit: Callable[[Any, Shots, Shots | None], Future[Table]]
+    computation: Computation
+    pilot: Callable[[], Future[Found | None]]
+    trying: Callable[[], int | None]
+    submit: Callable[[Task], Future[Table]]
     width: Callable[[], int]
     task: Callable[[float], int]
     made_by: dict[str, str]
     underway: Callable[[], int]
 
 
-def awaited(future: Future[Any], every: float, tick: Callable[[], object]) -> Any:
+Result = TypeVar("Result")
+
+
+def awaited(future: Future[Result], every: float, tick: Callable[[], object]) -> Result:
     """The result of a future. Meanwhile `tick` is called every so many seconds, and a signal that came stops it all."""
     while not wait([future], timeout=every).done:
         stop_if_asked()
@@ -66,60 +73,53 @@ def awaited(future: Future[Any], every: float, tick: Callable[[], object]) -> An
 
 
 @contextmanager
-def local_team(campaign: Campaign, device: str, job: HitMap = HIT_MAP) -> Iterator[Team]:
+def local_team(campaign: Campaign, device: str, computation: Computation = HIT_MAP) -> Iterator[Team]:
     """The devices of this machine, each computing one task at a time.
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), or names with commas between them.
-        job: what to compute of every hit.
+        computation: of every hit.
 
     Raises:
         DeviceError: a device is absent, or they are of different kinds, which compute different bits.
     """
     devices = _devices(device)
-    idle, done, stopping = SimpleQueue[str](), dict[int, int](), threading.Event()
-    begun = list[Future[Any]]()
+    idle, done, stop = SimpleQueue[Worker](), dict[int, int](), Cancel()
+    tried, begun = list[int](), list[Future[Any]]()
     for chosen in devices:
-        idle.put(str(chosen))
+        idle.put(Worker(str(chosen), cancel=stop))
 
     def progress(finished: int, total: int) -> None:
-        if stopping.is_set():
-            raise InterruptedError
         done[threading.get_ident()] = finished
 
-    def work(promise: Any, shots: Shots, solid: Shots | None) -> Table:
-        name = idle.get()
+    def work(task: Task) -> Table:
+        worker = idle.get()
         try:
-            return job.compute(
-                campaign,
-                shots,
-                promise=promise,
-                solid=solid,
-                device=name,
-                progress=progress,
-            )
+            return computation.compute(campaign, task, worker, progress)
         finally:
             done[threading.get_ident()] = 0
-            idle.put(name)
+            idle.put(worker)
 
-    def begin(task: Callable[..., Any], *arguments: Any) -> Future[Any]:
+    def begin(function: Callable[..., Result], *arguments: Any) -> Future[Result]:
         begun[:] = [future for future in begun if not future.done()]
-        begun.append(pool.submit(task, *arguments))
-        return begun[-1]
+        future = pool.submit(function, *arguments)
+        begun.append(future)
+        return future
 
     pool, kind = ThreadPoolExecutor(len(devices)), made_by(str(devices[0]))
     try:
         yield Team(
-            job=job,
-            pilot=lambda: begin(job.promise_of, campaign, str(devices[0]), progress),
-            submit=lambda *shots: begin(work, *shots),
+            computation=computation,
+            pilot=lambda: begin(computation.pilot, campaign, Worker(str(devices[0]), cancel=stop), tried.append),
+            trying=lambda: tried[-1] if tried else None,
+            submit=lambda task: begin(work, task),
             width=lambda: 2 * len(devices),
             task=lambda rate: task_size(kind) or min(CPU_SHOTS, int(CPU_SECONDS * rate)),
-            made_by=kind | dict(job.content),
+            made_by=kind | dict(computation.content),
             underway=lambda: sum(done.copy().values()),
         )
     finally:
-        stopping.set()
+        stop.cancel()
         pool.shutdown(wait=False, cancel_futures=True)
         wait([future for future in begun if not future.cancelled()], timeout=_PATIENCE)
 

@@ -7,7 +7,7 @@ imports no other room: neither a kernel nor a Dataset.
 from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction
-from .numerics import Accuracy, Numerics
+from .numerics import PRESETS, Accuracy, Numerics
 from .patterns import (
     AnyPattern,
     CirclePattern,
@@ -34,6 +34,7 @@ from .units import Radians
 __all__ = [
     "IDENTITY",
     "OF_THE_SCENE",
+    "PRESETS",
     "Accuracy",
     "AnyCore",
     "AnyPattern",

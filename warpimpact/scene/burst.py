@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from .distributions import EDGE, AnyDistribution, Distribution
+from .exclusions import BURST, IMAGES, check_together
 from .model import Array
 from .plate import Plate
 from .quantities import DRAWN, QUANTITIES, Quantity, drawn_column
@@ -130,8 +131,7 @@ class BurstSampler(Sampler):
         scatter: Scatter | None = None,
         replicates: int = 1,
     ) -> None:
-        if hits.irreducible:
-            raise ValueError("got hits.irreducible = true beside burst, but the hits of a burst have no images")
+        check_together({BURST: True, IMAGES: hits.irreducible})
         super().__init__(impact, hits, plate, scatter, replicates)
         self._burst = burst
 

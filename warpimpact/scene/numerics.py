@@ -1,5 +1,6 @@
 """Resolution and scheme with which a shot is computed."""
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
@@ -22,26 +23,49 @@ class Accuracy(_AsGiven):
     Attributes:
         residual_velocity: of the residual velocity [m/s].
         tilt: of the tilt at the largest stand-off [rad].
+        limit: of a limit velocity, as a share of the median limit; of a limit thickness twice that.
+        share: of the hits, from 0.5 to 0.99.
     """
 
-    residual_velocity: PositiveSpeed = float("inf")
-    tilt: PositiveAngle = float("inf")
+    residual_velocity: PositiveSpeed = math.inf
+    tilt: PositiveAngle = math.inf
+    limit: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=0.99)] = 0.9
 
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
-        if not self.model_fields_set:
-            raise ValueError("got neither residual_velocity nor tilt, but at least one of them must be given")
+        if self.model_fields_set.isdisjoint(("residual_velocity", "tilt", "limit")):
+            raise ValueError("got none of residual_velocity, tilt and limit, but at least one of them must be given")
         return self
+
+    @property
+    def strictness(self) -> float:
+        """How many times as strict as draft it is, in residual velocity or in tilt, whichever is more."""
+        draft = PRESETS["draft"]
+        return max(draft.residual_velocity / self.residual_velocity, draft.tilt / self.tilt)
+
+
+PRESETS = {
+    "draft": Accuracy(residual_velocity=5.0, tilt="5 deg", limit=0.02),
+    "standard": Accuracy(residual_velocity=1.0, tilt="1 deg", limit=0.006),
+    "reference": Accuracy(residual_velocity=0.2, tilt="0.2 deg", limit=0.0015),
+}
+"""What a fidelity stands for."""
 
 
 class Numerics(_AsGiven):
-    """A fidelity, and single settings that override it. A setting that is None follows from fidelity and scheme.
+    """What resolution to compute with: an accuracy, for which a pilot finds it, or a level and single settings.
 
     Attributes:
-        fidelity: "draft", "standard" or "reference". A campaign chooses the resolution so that 90 % of its hits are
-            within 5 m/s and 5°, 1 m/s and 1°, or 0.2 m/s and 0.2°. A single setting ends that promise.
+        fidelity: the name of an accuracy: 90 % of the hits are within 5 m/s and 5° ("draft"), 1 m/s and 1°
+            ("standard"), or 0.2 m/s and 0.2° ("reference").
+        accuracy: the same in numbers, in place of a name.
+        level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot chooses, and nothing is
+            promised. A single setting below does that, too; the others are then those of the level, or of the coarsest
+            one at which the accuracy would be looked for.
         scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
         time_step: length of a step [s].
+        travel: way per time step at impact velocity, as a share of the thickness of the plate, in place of time_step.
         patches_axial, patches_around: surface patches per length of the core and around it. The consistent scheme takes
             shorter patches behind the widest station. With a multiple of 4 around the core, mirrored shots have exactly
             mirrored outcomes.
@@ -53,8 +77,11 @@ class Numerics(_AsGiven):
     """
 
     fidelity: Literal["draft", "standard", "reference"] = "standard"
+    accuracy: Accuracy | None = None
+    level: Annotated[int, Field(strict=True, ge=0, le=9)] | None = None
     scheme: Literal["consistent", "nodal"] = "consistent"
     time_step: PositiveTime | None = None
+    travel: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
     patches_axial: Annotated[int, Field(strict=True, ge=4, le=4096)] | None = None
     patches_around: Annotated[int, Field(strict=True, ge=8, le=4096, multiple_of=4)] | None = None
     grid_spacing: PositiveLength | None = None
@@ -62,8 +89,25 @@ class Numerics(_AsGiven):
     layout: Literal["simple", "block"] = "simple"
 
     @property
+    def asked(self) -> Accuracy:
+        """The accuracy that is asked for, if no setting fixes the resolution."""
+        return self.accuracy or PRESETS[self.fidelity]
+
+    @property
     def explicit(self) -> str | None:
-        """The first setting that fixes the resolution, so that nothing is promised; None if the fidelity chooses it."""
-        fixed = ("time_step", "patches_axial", "patches_around", "grid_spacing")
+        """The first setting that fixes the resolution, so that nothing is promised; None if a pilot is to find it."""
+        fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
         given = [name for name in fixed if getattr(self, name) is not None]
         return "scheme" if self.scheme == "nodal" else next(iter(given), None)
+
+    @model_validator(mode="after")
+    def _is_asked_for_once(self) -> Self:
+        other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
+        if "fidelity" in self.model_fields_set and other is not None:
+            raise ValueError(f"got fidelity beside {other}, but one of them sets the resolution")
+        if self.accuracy is not None and self.explicit is not None:
+            raise ValueError(f"got {self.explicit} beside accuracy, but one of them sets the resolution")
+        if self.travel is not None and (self.time_step is not None or self.scheme == "nodal"):
+            other = "time_step" if self.time_step is not None else 'scheme = "nodal", which takes a time_step'
+            raise ValueError(f"got travel beside {other}")
+        return self

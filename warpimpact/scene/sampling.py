@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .distributions import EDGE
+from .exclusions import IMAGES, check_together
 from .model import Array
 from .plate import Plate
 from .quantities import drawn_column, drawn_columns
 from .scatter import Scatter
 from .shots import Hits, Impact, Shots
 from .sobol import Sobol
-from .symmetry import check_scatter, irreducible_part, symmetries_used
+from .symmetry import irreducible_part, symmetries_used, unsymmetric
 
 _HIT_COLUMNS = 2
 """Columns of uniform numbers for y and z of the hit; those of the quantities follow."""
@@ -40,7 +41,7 @@ class Sampler:
     def __init__(
         self, impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None = None, replicates: int = 1
     ) -> None:
-        check_scatter(hits, scatter or Scatter())
+        check_together({IMAGES: hits.irreducible} | unsymmetric(scatter or Scatter()))
         self._impact, self._cell, self._group = impact, hits.covered(plate), symmetries_used(impact, hits, plate)
         (low_y, high_y), (low_z, high_z) = irreducible_part(self._group)
         self._extent = self._cell[0] * (high_y - low_y), self._cell[1] * (high_z - low_z)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from .core import AnyCore, Core
+from .exclusions import BENDING, MASS_PROPERTIES, STRENGTH, check_together
 from .interaction import Interaction
 from .model import Model
 from .plate import Plate
@@ -46,16 +47,9 @@ class Record(Model):
             ValueError: names what the core overrides.
         """
         overridden = ("centre_of_mass", "inertia_axial", "inertia_transverse")
-        given = [name for name in overridden if getattr(core, name) is not None]
-        if core.strength is not None and not self.bending:
-            raise ValueError(
-                f"got core.strength without {self._name}.bending = true, but a core breaks by its bending stress"
-            )
-        if self.bending and given:
-            raise ValueError(
-                f"got bending = true beside core.{given[0]}, but a bending moment needs the mass of every slice, which "
-                "follows from the shape alone"
-            )
+        given = [f"core.{name}" for name in overridden if getattr(core, name) is not None]
+        strength = core.strength is not None
+        check_together({BENDING: self.bending, STRENGTH: strength, MASS_PROPERTIES: bool(given) and given[0]})
 
     def ahead(self, core: Core) -> float:
         """How far ahead of the centre of mass the point is that passes the stand-offs [m]."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from .exclusions import SIZE, WHOLE_PLATE, check_together
 from .files import Column, InputFile, read_columns
 from .model import Array, Model
 from .plate import Plate
@@ -145,8 +146,8 @@ class Hits(Model):
         """
         if self.area == "cell":
             return plate.sampled_cell
-        if plate.size is None:
-            raise ValueError('got hits.area = "plate" without plate.size, but only a finite plate can be covered')
+        check_together({WHOLE_PLATE: True, SIZE: plate.size is not None})
+        assert plate.size is not None  # checked
         return plate.size
 
     def total(self, period: tuple[float, float]) -> int:

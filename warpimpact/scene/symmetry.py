@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 
+from .exclusions import HOLED_LAYERS, TURNED
 from .model import Array
 from .plate import Plate
 from .scatter import Scatter
@@ -68,32 +69,14 @@ def symmetries_used(impact: Impact, hits: Hits, plate: Plate) -> tuple[Symmetry,
     return symmetries(plate, impact) if hits.irreducible else (IDENTITY,)
 
 
-def check_scatter(hits: Hits, scatter: Scatter) -> None:
-    """Refuse scatter that removes the symmetry of `hits.irreducible`.
-
-    Raises:
-        ValueError: names the quantity that scatters.
-    """
+def unsymmetric(scatter: Scatter, layers: Sequence[Layer] = ()) -> dict[str, str | bool]:
+    """What may remove a symmetry of the plate, as `check_together` takes it."""
     turned = [name for name in ("obliquity", "azimuth", "pitch", "yaw", "spin") if getattr(scatter, name) is not None]
-    if hits.irreducible and turned:
-        raise ValueError(
-            f"got hits.irreducible = true beside a distribution of impact.{turned[0]}, but a symmetry must hold for "
-            "every shot; of the impact quantities only velocity may scatter with it"
-        )
-
-
-def check_layers(hits: Hits, layers: Sequence[Layer]) -> None:
-    """Refuse layers that may not have the symmetry of `hits.irreducible`.
-
-    Raises:
-        ValueError: names the layer.
-    """
-    for k, layer in enumerate(layers):
-        if hits.irreducible and (layer.open_area > 0.0 or layer.size is not None):
-            raise ValueError(
-                f"got hits.irreducible = true beside layer[{k}] with a pattern or a rim, but only layers that are "
-                "solid and unbounded leave the symmetry of the plate"
-            )
+    holed = [k for k, layer in enumerate(layers) if layer.open_area > 0.0 or layer.size is not None]
+    return {
+        TURNED: bool(turned) and f"a distribution of impact.{turned[0]}",
+        HOLED_LAYERS: bool(holed) and f"layer[{holed[0]}] with a pattern or a rim",
+    }
 
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:

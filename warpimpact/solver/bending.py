@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpimpact.scene import Core, Numerics, Record
+from warpimpact.scene import Core
 
 if TYPE_CHECKING:
-    from warpimpact.solver.resolution import Fidelity
     from warpimpact.solver.rings import Array, Rings
 
 THINNEST = 0.5
@@ -28,16 +27,6 @@ class Sections:
     first: Array
     second: Array
     rotary: Array
-
-
-def check_bending(record: Record, numerics: Numerics | Fidelity) -> None:
-    """Refuse numerics that cannot compute the bending moment that is to be recorded.
-
-    Raises:
-        ValueError: names the scheme.
-    """
-    if record.bending and isinstance(numerics, Numerics) and numerics.scheme == "nodal":
-        raise ValueError('got bending = true beside numerics.scheme = "nodal", but it must be "consistent"')
 
 
 def sections_of(core: Core, rings: Rings) -> Sections:

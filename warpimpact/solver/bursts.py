@@ -10,20 +10,8 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.scene import Numerics, Shots
-from warpimpact.solver.resolution import Fidelity
 
 Numbers = NDArray[np.int64]
-
-
-def check_bursts(shots: Shots, numerics: Numerics | Fidelity) -> None:
-    """Refuse numerics that do not know earlier hits.
-
-    Raises:
-        ValueError: names the scheme.
-    """
-    if shots.at_a_plate > 1 and isinstance(numerics, Numerics) and numerics.scheme == "nodal":
-        raise ValueError('got several shots at one plate beside numerics.scheme = "nodal", but it must be "consistent"')
 
 
 def earlier_hits(stage: Any, count: int, slots: int, nodes: list[int], device: Any) -> Any:

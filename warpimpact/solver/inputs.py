@@ -11,7 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels import march
-from warpimpact.solver.arrays import LARGEST_ONSET, Arrays, Grid
+from warpimpact.solver.prepare import LARGEST_ONSET, Grid, Prepared
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core
@@ -43,14 +43,14 @@ class Inputs:
         surface, sections, target, law, shots, pace: structs on the device.
     """
 
-    def __init__(self, arrays: Arrays, device: Any) -> None:
+    def __init__(self, arrays: Prepared, device: Any) -> None:
         self.stage, self.put = march.build(arrays.variant), Put(device.alias, arrays.variant.real)
         self.surface = surface_of(self.stage.Surface, arrays.core, arrays.rings, arrays.azimuths, self.put)
         self.plates = [plate_of(self.stage.Plate, grid, self.put) for grid in arrays.grids]
         self.target = self._target(arrays)
         self.sections = self._sections(arrays)
         self.shots = self._shots(arrays)
-        self.count = len(arrays.shots["hit_y"])
+        self.count = len(arrays.conditions["hit_y"])
         self.law = self.stage.Law()
         self.law.onset_share, self.law.onset_limit = arrays.onset, LARGEST_ONSET
         self.pace = self.stage.Pace()
@@ -64,7 +64,7 @@ class Inputs:
         ways[-1] = way
         self.shots.longest_way = self.put(ways, wp.float64)
 
-    def _target(self, arrays: Arrays) -> Any:
+    def _target(self, arrays: Prepared) -> Any:
         """The Target (kernels/target.py)."""
         target, materials = self.stage.Target(), arrays.materials
         target.count = len(materials)
@@ -83,17 +83,17 @@ class Inputs:
                 setattr(target, name, self.put(np.stack(rows), variable.type.dtype))
         return target
 
-    def _sections(self, arrays: Arrays) -> Any:
+    def _sections(self, arrays: Prepared) -> Any:
         struct = self.stage.Sections()
         if arrays.sections is not None:
             for name in self.stage.Sections.vars:
                 setattr(struct, name, self.put(getattr(arrays.sections, name)))
         return struct
 
-    def _shots(self, arrays: Arrays) -> Any:
+    def _shots(self, arrays: Prepared) -> Any:
         shots = self.stage.Shots()
         for name, variable in self.stage.Shots.vars.items():
-            setattr(shots, name, self.put(arrays.shots[name], variable.type.dtype))
+            setattr(shots, name, self.put(arrays.conditions[name], variable.type.dtype))
         return shots
 
 

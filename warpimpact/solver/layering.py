@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
     from warpimpact.scene import Plate
-    from warpimpact.solver.arrays import Arrays
+    from warpimpact.solver.prepare import Prepared
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,7 @@ DEEP = 0.6
 the core's surface from its centre of mass: the core arrives turned."""
 
 
-def deep_cells(arrays: Arrays, layer: int, cells: int) -> tuple[int, int]:
+def deep_cells(arrays: Prepared, layer: int, cells: int) -> tuple[int, int]:
     """Cells of the window of a layer behind the plate, if the plate's has so many; 0 if the layer keeps no field."""
     if not arrays.materials[layer].weakens:
         return 0, 0
@@ -34,7 +34,7 @@ def deep_cells(arrays: Arrays, layer: int, cells: int) -> tuple[int, int]:
     return count, count
 
 
-def nodes_of(arrays: Arrays, cells: Sequence[tuple[int, int]]) -> list[int]:
+def nodes_of(arrays: Prepared, cells: Sequence[tuple[int, int]]) -> list[int]:
     """Nodes in the windows of all layers, if they have so many cells; 0 for those that share the field of another."""
     return [
         grid.planes.number * y * z if first == layer else 0
@@ -42,7 +42,7 @@ def nodes_of(arrays: Arrays, cells: Sequence[tuple[int, int]]) -> list[int]:
     ]
 
 
-def firsts_of(arrays: Arrays, nodes: Sequence[int]) -> NDArray[np.int64]:
+def firsts_of(arrays: Prepared, nodes: Sequence[int]) -> NDArray[np.int64]:
     """The first node of every layer's field among those of its slot, if the layers have so many of their own."""
     before = np.cumsum([0, *nodes[:-1]])
     return np.asarray(before[arrays.laminates])
@@ -64,7 +64,7 @@ class Weakened(NamedTuple):
 
 
 def weakened(
-    arrays: Arrays, plates: Sequence[Plate], hit: tuple[float, float], scratch: tuple[Any, ...], cells: Sequence[Any]
+    arrays: Prepared, plates: Sequence[Plate], hit: tuple[float, float], scratch: tuple[Any, ...], cells: Sequence[Any]
 ) -> dict[int, Weakened]:
     """The layers behind the plate that weaken and that the last shot reached, after a march of one slot.
 
@@ -87,7 +87,7 @@ def weakened(
     return found
 
 
-def share_left(arrays: Arrays, layer: int, exposure: NDArray[Any], cells: Sequence[tuple[int, int]]) -> Array:
+def share_left(arrays: Prepared, layer: int, exposure: NDArray[Any], cells: Sequence[tuple[int, int]]) -> Array:
     """Share of the resistance that is left of a layer in its window, the mean through its thickness, of the last shot.
 
     Args:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,11 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit_search import Search
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.resolution import FIDELITIES, Fidelity, computed_as
-from warpimpact.solver.simulate import simulate
+from warpimpact.solver.pilot import LimitErrors, limits_pilot_size, pilot_limits
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.resolution import LADDER, at_level
+from warpimpact.solver.simulate import computed, spread
+from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 
@@ -61,11 +63,28 @@ class Limits:
     outcomes: Outcomes
 
 
+@dataclass(frozen=True)
+class Sought:
+    """What limit is searched.
+
+    Attributes:
+        quantity: "velocity" or "thickness".
+        tolerance: how far lower and upper may lie apart [m/s] or [m].
+        highest: largest value tried [m/s] or [m].
+        layer: whose thickness it is; 0 is the plate, 1 the first layer behind it.
+    """
+
+    quantity: str
+    tolerance: float
+    highest: float
+    layer: int = 0
+
+
 def limit_velocity(
     scene: Scene,
     shots: Shots,
     *,
-    numerics: Numerics | Fidelity | None = None,
+    numerics: Numerics | None = None,
     tolerance: float = VELOCITY_TOLERANCE,
     highest: float = HIGHEST_VELOCITY,
     device: str = "auto",
@@ -76,7 +95,7 @@ def limit_velocity(
 
     Args:
         shots: their own velocities are the first ones tried.
-        numerics: as in `simulate`, but the steps of a named fidelity are STEPS times shorter.
+        numerics: as in `simulate`; of an accuracy its `limit` counts. A level has short steps (STEPS).
         device, threads, progress: as in `simulate`; progress counts shots whose search has ended.
         tolerance: how far lower and upper may lie apart [m/s].
         highest: largest velocity tried [m/s].
@@ -85,16 +104,15 @@ def limit_velocity(
         ValueError: the plate weakens by time (`check_arrests`).
         DeviceError: the device is absent.
     """
-    compute = _Computing(scene, _in_short_steps(numerics), device, threads)
-    search = Search(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest)
-    return _searched(compute, shots, search, with_velocity, progress)
+    sought = Sought("velocity", tolerance, highest)
+    return _limits(scene, shots, sought, numerics or Numerics(), Worker(device, threads), progress)
 
 
 def limit_thickness(
     scene: Scene,
     shots: Shots,
     *,
-    numerics: Numerics | Fidelity | None = None,
+    numerics: Numerics | None = None,
     layer: int = 0,
     tolerance: float = THICKNESS_TOLERANCE,
     device: str = "auto",
@@ -115,11 +133,76 @@ def limit_thickness(
     Raises:
         ValueError, DeviceError: as `limit_velocity`.
     """
+    sought = Sought("thickness", tolerance, thickest(scene, layer), layer)
+    return _limits(scene, shots, sought, numerics or Numerics(), Worker(device, threads), progress)
+
+
+def thickest(scene: Scene, layer: int) -> float:
+    """The largest thickness of a layer that is tried [m]."""
+    return THICKEST * scene.target.layers[layer].thickness
+
+
+def _limits(
+    scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress | None
+) -> Limits:
+    if numerics.explicit is None:
+        pilot = spread(shots, limits_pilot_size(numerics.asked))
+        numerics = pilot_of_limits(scene, pilot, sought, numerics, worker).numerics
+    return limits(scene, shots, sought, numerics, worker, progress)
+
+
+def pilot_of_limits(
+    scene: Scene,
+    pilot: Shots,
+    sought: Sought,
+    numerics: Numerics,
+    worker: Worker,
+    trying: Callable[[int], object] = lambda level: None,
+) -> LimitErrors:
+    """Find the level of resolution for an accuracy of limits (solver/pilot.py); the arguments are those of
+    `simulate.pilot_of`."""
+
+    def limits_at(level: int) -> Array:
+        trying(level)
+        return limits(scene, pilot, sought, at_level(level, numerics), worker).value
+
+    return pilot_limits(limits_at, numerics, sought.quantity)
+
+
+def limits(
+    scene: Scene,
+    shots: Shots,
+    sought: Sought,
+    numerics: Numerics,
+    worker: Worker,
+    progress: Progress | None = None,
+) -> Limits:
+    """Find the limit of every shot, with numerics that fix the resolution."""
+    check_arrests(scene, shots)
+    search, put = _begun(scene, shots, sought)
+    numerics, total = short_steps(numerics), len(shots)
+    kept, failing = _Kept(total), _Kept(total)
+    while len(which := search.pending):
+        tried = search.trial(which)
+        ended = computed(prepare(scene, put(shots[which], tried), numerics), worker)
+        kept.take(search.learn(which, tried, ended), which, tried, ended)
+        failing.take(np.flatnonzero(ended.status >= Status.UNFINISHED), which, tried, ended)
+        if progress is not None:
+            progress(total - len(search.pending), total)
+    failed = np.flatnonzero(search.failed)
+    if len(failed):
+        kept.take(failed, np.arange(total), failing.values, failing.outcomes)
+    return Limits(search.value(), *search.ends(), search.runs, search.converged, put(shots, kept.values), kept.outcomes)
+
+
+def _begun(scene: Scene, shots: Shots, sought: Sought) -> tuple[Search, Callable[[Shots, Array], Shots]]:
+    """A search of limits, and what gives shots the values that are tried."""
+    tolerance, highest, layer = sought.tolerance, sought.highest, sought.layer
+    if sought.quantity == "velocity":
+        return Search(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest), with_velocity
     start = np.broadcast_to(shots.own_of(scene.target, "thickness", layer), len(shots))
-    highest = THICKEST * scene.target.layers[layer].thickness
     search = Search(start, 0.0, shots.velocity**2, tolerance, highest)
-    compute = _Computing(scene, _in_short_steps(numerics), device, threads)
-    return _searched(compute, shots, search, partial(with_thickness, layer), progress)
+    return search, partial(with_thickness, layer)
 
 
 def with_velocity(shots: Shots, values: Array) -> Shots:
@@ -132,17 +215,11 @@ def with_thickness(layer: int, shots: Shots, values: Array) -> Shots:
     return shots.with_own({"thickness": values}, layer)
 
 
-def short_steps(fidelity: Fidelity) -> Fidelity:
-    """A fidelity as limits need it."""
-    return replace(fidelity, travel=fidelity.travel / STEPS)
-
-
-def _in_short_steps(numerics: Numerics | Fidelity | None) -> Numerics | Fidelity:
-    """The numerics of a search: those given, unless they are a name alone."""
-    numerics = numerics or Numerics()
-    if isinstance(numerics, Fidelity) or numerics.explicit is not None:
+def short_steps(numerics: Numerics) -> Numerics:
+    """Numerics as limits need them: a level has steps that are STEPS times shorter."""
+    if numerics.level is None or numerics.travel is not None or numerics.explicit == "scheme" or numerics.time_step:
         return numerics
-    return computed_as(short_steps(FIDELITIES[numerics.fidelity]), numerics)
+    return numerics.model_copy(update={"travel": LADDER[numerics.level].travel / STEPS})
 
 
 def check_arrests(scene: Scene, shots: Shots | None = None) -> None:
@@ -169,46 +246,6 @@ def _weakens(plate: Plate, shots: Shots | None, layer: int) -> bool:
     """Whether a layer weakens in any shot."""
     own = None if shots is None or not shots.differs("degradation", layer) else shots.columns["degradation"][:, layer]
     return plate.degradation < 1.0 or (own is not None and bool((own < 1.0).any()))
-
-
-class _Computing(NamedTuple):
-    """What stays the same from run to run."""
-
-    scene: Scene
-    numerics: Numerics | Fidelity
-    device: str
-    threads: int | None
-
-    def __call__(self, shots: Shots, progress: Progress) -> Outcomes:
-        rest = self._asdict()
-        return simulate(rest.pop("scene"), shots, **rest, progress=progress)
-
-
-def _searched(
-    compute: _Computing,
-    shots: Shots,
-    search: Search,
-    put: Callable[[Shots, Array], Shots],
-    progress: Progress | None,
-) -> Limits:
-    check_arrests(compute.scene, shots)
-    total = len(shots)
-
-    def show(*_: Any) -> None:  # within a round nothing new, but a chance to end the computation
-        if progress is not None:
-            progress(total - len(search.pending), total)
-
-    kept, failing = _Kept(total), _Kept(total)
-    while len(which := search.pending):
-        tried = search.trial(which)
-        ended = compute(put(shots[which], tried), show)
-        kept.take(search.learn(which, tried, ended), which, tried, ended)
-        failing.take(np.flatnonzero(ended.status >= Status.UNFINISHED), which, tried, ended)
-        show()
-    failed = np.flatnonzero(search.failed)
-    if len(failed):
-        kept.take(failed, np.arange(total), failing.values, failing.outcomes)
-    return Limits(search.value(), *search.ends(), search.runs, search.converged, put(shots, kept.values), kept.outcomes)
 
 
 class _Kept:

@@ -23,12 +23,9 @@ from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
-from warpimpact.scene import MassProperties, Numerics, Scene, Shots
-from warpimpact.solver.arrays import Arrays, arrays_of
-from warpimpact.solver.blocks import first_window
+from warpimpact.scene import MassProperties
 from warpimpact.solver.bursts import (
     bytes_of,
-    check_bursts,
     chunk_of,
     earlier_hits,
     in_turns,
@@ -49,7 +46,8 @@ from warpimpact.solver.layering import (
     share_left,
     weakened,
 )
-from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.worker import NEVER, Cancel
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -69,31 +67,17 @@ MEMORY_SHARE = 0.5
 
 
 class March:
-    """One scene on one device, ready to march; see `simulate` for the arguments.
+    """What was prepared, on one device, ready to march; see `simulate` for the arguments."""
 
-    Args:
-        traced: keep the history of every shot.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        numerics: Numerics | Fidelity,
-        shots: Shots,
-        device: Any,
-        *,
-        threads: int | None = None,
-        traced: bool = False,
-    ) -> None:
-        self.scene, self.shots, self.device = scene, shots, device
+    def __init__(self, prepared: Prepared, device: Any, *, threads: int | None = None) -> None:
+        self.scene, self.shots, self.device = prepared.scene, prepared.shots, device
         self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
-        check_bursts(shots, numerics)
-        self._take(arrays_of(scene, numerics, shots, traced=traced))
-        self.at_a_plate = shots.at_a_plate if self.variant.burst else 1
-        self.history = wp.empty((len(shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
+        self._take(prepared)
+        self.at_a_plate = self.shots.at_a_plate if self.variant.burst else 1
+        self.history = wp.empty((len(self.shots) * self.arrays.rows, WIDTH), dtype=self.variant.real, device=device)
         self.cells = self._window_cells()
 
-    def _take(self, arrays: Arrays) -> None:
+    def _take(self, arrays: Prepared) -> None:
         """Put the arrays on the device, with what their build of the kernels fills besides the outcomes."""
         self.arrays, count = arrays, len(self.shots)
         self.inputs = Inputs(arrays, self.device)
@@ -102,20 +86,25 @@ class March:
         free = self.scene.record.flies_free(self.scene.core, self.scene.target)
         self.passages = Passages(self.stage, count, free, self.variant, self.device)
 
-    def march(self, progress: Progress | None = None) -> Any:
+    def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:
         """March all shots; repeat those that leave their window in wider windows."""
-        progress = progress or (lambda done, total: None)
         count = len(self.shots)
+
+        def reached(done: int) -> None:
+            cancel.check()
+            if progress is not None:
+                progress(done, count)
+
         outcomes = self._empty(self.stage.Outcomes, (count,))
         pending = np.arange(count)
         for _ in range(MAX_DOUBLINGS):
-            self._march_some(pending, outcomes, _after(count - len(pending), count, progress))
+            self._march_some(pending, outcomes, _after(count - len(pending), reached))
             pending = whole_plates(outcomes.status.numpy() == Status.LEFT_WINDOW, self.at_a_plate)
             if not len(pending) or not self._fits(2 * self.cells[0], 2 * self.cells[1]):
                 break
             self._widen()
         outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
-        progress(count, count)
+        reached(count)
         return outcomes
 
     def _widen(self) -> None:
@@ -159,7 +148,9 @@ class March:
     def body(self) -> MassProperties:
         """Mass properties of the last shot."""
         names = ("mass", "inertia_axial", "inertia_transverse")
-        return self.scene.core.mass_properties._replace(**{name: float(self.arrays.shots[name][-1]) for name in names})
+        return self.scene.core.mass_properties._replace(
+            **{name: float(self.arrays.conditions[name][-1]) for name in names}
+        )
 
     def nodes(self) -> tuple[Array, Array]:
         """Coordinates in the plate of the nodes of the last shot's window, along y and z [m]."""
@@ -203,7 +194,7 @@ class March:
 
     def _window_cells(self) -> tuple[int, int]:
         """Cells of a first window, or what memory allows."""
-        cells_y = cells_z = first_window(self.arrays, self.shots)
+        cells_y = cells_z = self.arrays.cells
         while not self._fits(cells_y, cells_z):  # a shot that leaves a smaller window ends as LEFT_WINDOW
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
@@ -363,9 +354,9 @@ class March:
                     future.cancel()
 
 
-def _after(finished: int, total: int, progress: Progress) -> Progress1:
+def _after(finished: int, progress: Progress1) -> Progress1:
     """Progress of what comes after the shots already finished."""
-    return lambda done: progress(finished + done, total)
+    return lambda done: progress(finished + done)
 
 
 def _host(array: Any) -> Array:

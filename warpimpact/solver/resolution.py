@@ -1,22 +1,24 @@
-"""From a scene to the arrays that the kernels read: rings of the core, tile of the plate, filter, time step."""
+"""Patches, grid and time step of a scene, from what its numerics give (docs/model.md §4)."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import exclusions as asked
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Fidelity:
-    """Numbers behind a named fidelity; lengths scale with the scene (docs/model.md §4's table)."""
+class Level:
+    """Settings that go together; lengths scale with the scene (docs/model.md §4's table)."""
 
     patches_axial: int
     patches_around: int
@@ -25,9 +27,6 @@ class Fidelity:
     travel: float
     """Way per time step at impact velocity, as a share of the thickness of the plate, or of SLENDER times the
     core's length where the plate is thicker than that."""
-    double: bool = False
-    block: bool = False
-    """Whether a block of threads computes a shot (kernels/block.py)."""
 
     @property
     def patch_width(self) -> float:
@@ -51,24 +50,17 @@ SLOWING = 0.25
 `travel`: near the limit velocity a core would else lose most of its energy in one step. No step of the paper's shots is
 shortened by it."""
 
-FIDELITIES = {
-    "draft": Fidelity(14, 16, 1.0, 0.5),
-    "standard": Fidelity(23, 32, 1.5, 0.37),
-    "reference": Fidelity(64, 56, 5.0, 0.05),
-}
-"""What `simulate` takes for a name; a campaign takes the level of LADDER that keeps the promise (solver/promise.py)."""
-
 LADDER = (
-    Fidelity(14, 16, 1.0, 0.5),
-    Fidelity(18, 24, 1.2, 0.42),
-    Fidelity(23, 32, 1.5, 0.37),
-    Fidelity(28, 40, 1.5, 0.28),
-    Fidelity(32, 48, 2.0, 0.2),
-    Fidelity(44, 60, 2.5, 0.14),
-    Fidelity(60, 80, 3.5, 0.1),
-    Fidelity(84, 108, 5.0, 0.07),
-    Fidelity(116, 148, 7.0, 0.05),
-    Fidelity(160, 204, 10.0, 0.035),
+    Level(14, 16, 1.0, 0.5),
+    Level(18, 24, 1.2, 0.42),
+    Level(23, 32, 1.5, 0.37),
+    Level(28, 40, 1.5, 0.28),
+    Level(32, 48, 2.0, 0.2),
+    Level(44, 60, 2.5, 0.14),
+    Level(60, 80, 3.5, 0.1),
+    Level(84, 108, 5.0, 0.07),
+    Level(116, 148, 7.0, 0.05),
+    Level(160, 204, 10.0, 0.035),
 )
 """Levels of resolution, coarse to fine: patches, grid and step are refined together. The error about halves from one
 to the next, and the cost about doubles."""
@@ -82,17 +74,20 @@ NODAL: dict[str, Any] = {
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
 
 
-ONE_PLATE = "the nodal scheme knows one plate and no layers behind it; the consistent scheme takes layers"
-
-
-def level(index: int, numerics: Numerics) -> Fidelity:
+def at_level(index: int, numerics: Numerics) -> Numerics:
     """A level of the ladder, in precision and layout of the numerics."""
-    return computed_as(LADDER[index], numerics)
+    kept = {name: getattr(numerics, name) for name in ("precision", "layout") if name in numerics.model_fields_set}
+    return Numerics(level=index, **kept)
 
 
-def computed_as(fidelity: Fidelity, numerics: Numerics) -> Fidelity:
-    """A fidelity in precision and layout of the numerics."""
-    return replace(fidelity, double=numerics.precision == "double", block=numerics.layout == "block")
+def coarsest_level(strictness: float) -> int:
+    """The level from which on an accuracy is looked for, by how many times as strict as draft it is."""
+    return int(np.clip(math.floor(math.log2(max(strictness, 1.0)) + 1e-9), 0, len(LADDER) - 2))
+
+
+def base_level(numerics: Numerics) -> int:
+    """The level that fills in what the numerics do not give."""
+    return coarsest_level(numerics.asked.strictness) if numerics.level is None else numerics.level
 
 
 @dataclass(frozen=True)
@@ -163,49 +158,41 @@ class Resolution:
         return min(self.step_of(impact, plate) for plate in target.layers)
 
 
-def resolve(numerics: Numerics | Fidelity, scene: Scene, shots: Shots | None = None) -> Resolution:
-    """Fill in what the numerics leave to fidelity and scheme; a fidelity need not have a name.
+def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Resolution:
+    """Fill in what the numerics do not give.
 
     Args:
-        shots: whose own quantities count, too.
+        weakening: whether each layer weakens.
     """
-    core, plate, plates = scene.core, scene.target.layers[0], scene.target.layers
-    weakening = weakens(scene.target, shots)
-    if isinstance(numerics, Fidelity):
-        fidelity, numerics = numerics, Numerics()
-    else:
-        fidelity = FIDELITIES[numerics.fidelity]
-    lengths = [one.degradation_length for one, does in zip(plates, weakening, strict=True) if does]
+    core, plate = scene.core, scene.target.layers[0]
+    nodal, level = numerics.scheme == "nodal", LADDER[base_level(numerics)]
+    lengths = [one.degradation_length for one, does in zip(scene.target.layers, weakening, strict=True) if does]
     finest = min(lengths, default=plate.degradation_length)
-    width = fidelity.patch_width * finest if lengths else math.inf
+    width = level.patch_width * finest if lengths else math.inf
     defaults: dict[str, Any] = {
         "time_step": None,
-        "patches_axial": fidelity.patches_axial,
-        "patches_around": max(fidelity.patches_around, 4 * math.ceil(0.25 * math.pi * core.max_radius / width)),
-        "grid_spacing": plate.degradation_length / fidelity.cells_per_length,
+        "patches_axial": level.patches_axial,
+        "patches_around": max(level.patches_around, 4 * math.ceil(0.25 * math.pi * core.max_radius / width)),
+        "grid_spacing": plate.degradation_length / level.cells_per_length,
     }
-    if numerics.scheme == "nodal":
+    if nodal:
         defaults = NODAL
-        if len(plates) > 1:
-            raise ValueError(ONE_PLATE)
-        if plate.degradation_distance is not None:
-            raise ValueError(
-                "the nodal scheme weakens the plate once per time step: it knows no degradation_distance, which the "
-                "consistent scheme takes"
-            )
+        by_path = plate.degradation_distance is not None
+        asked.check_together({asked.NODAL: True, asked.LAYERS: len(scene.target.layers) > 1, asked.BY_PATH: by_path})
     given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
+    travel = level.travel if numerics.travel is None else numerics.travel
     return Resolution(
-        nodal=numerics.scheme == "nodal",
-        double=fidelity.double if numerics.precision is None else numerics.precision == "double",
-        block=fidelity.block or numerics.layout == "block",
-        travel=fidelity.travel,
+        nodal=nodal,
+        double=numerics.precision == "double",
+        block=numerics.layout == "block",
+        travel=travel,
         slender=SLENDER * core.length,
-        way_along=ALONG * fidelity.travel * finest,
-        weakening=WEAKENING * fidelity.travel,
-        slowing=SLOWING * fidelity.travel * 0.5 / (math.pi * core.max_radius**2),
+        way_along=ALONG * travel * finest,
+        weakening=WEAKENING * travel,
+        slowing=SLOWING * travel * 0.5 / (math.pi * core.max_radius**2),
         mass=core.mass_properties.mass,
         static=scene.interaction.static,
-        patch_width=math.inf if numerics.scheme == "nodal" else width,
+        patch_width=math.inf if nodal else width,
         **(defaults | given),
     )
 
@@ -216,19 +203,6 @@ def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
         layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
         for k, layer in enumerate(target.layers)
     ]
-
-
-def spelt_out(fidelity: Fidelity, scene: Scene, impact: Impact) -> Numerics:
-    """Numerics that give, for one impact, what `resolve` would make of the fidelity if it had a name."""
-    plate = scene.target.layers[0]
-    return Numerics(
-        time_step=resolve(fidelity, scene).step_in(impact, scene.target),
-        patches_axial=fidelity.patches_axial,
-        patches_around=fidelity.patches_around,
-        grid_spacing=plate.degradation_length / fidelity.cells_per_length,
-        precision="double" if fidelity.double else "single",
-        **({"layout": "block"} if fidelity.block else {}),
-    )
 
 
 FASTEST_DECAY = 1.0e30

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,13 +13,14 @@ from warpimpact.kernels import free_flight
 from warpimpact.kernels import march as marching
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.arrays import arrays_of, variant_of
 from warpimpact.solver.device import find_device, load
 from warpimpact.solver.history import History
 from warpimpact.solver.layering import Weakened
 from warpimpact.solver.marching import March, Progress
-from warpimpact.solver.materials import materials_of
-from warpimpact.solver.resolution import Fidelity, resolve
+from warpimpact.solver.pilot import HitErrors, pilot_hits, pilot_size
+from warpimpact.solver.prepare import Prepared, prepare
+from warpimpact.solver.resolution import at_level
+from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 Array = NDArray[np.float64]
 
@@ -51,58 +53,88 @@ def simulate(
     scene: Scene,
     shots: Shots,
     *,
-    numerics: Numerics | Fidelity | None = None,
+    numerics: Numerics | None = None,
     device: str = "auto",
     threads: int | None = None,
     progress: Progress | None = None,
+    cancel: Cancel = NEVER,
 ) -> Outcomes:
     """Compute every shot on its own copy of the target (docs/model.md §§1–5), or those of a sample one after another on
     one copy (`Shots.sample`, docs/model.md §8).
 
     Args:
-        numerics: resolution and scheme; None is the standard fidelity.
-        device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
-        threads: number on a CPU; None is one for every core that this process may use.
-        progress: called repeatedly with (shots done, all shots); an exception that it raises ends the computation.
+        numerics: as in a campaign. None is the standard fidelity: a pilot on some of the shots finds the resolution. A
+            level or a single setting, such as Numerics(level=2), needs no pilot.
+        device, threads, cancel: as in `Worker`.
+        progress: called repeatedly with (shots done, all shots).
 
     Returns:
         The outcomes, with what the scene records (records/registry.py).
 
     Raises:
         DeviceError: the device is absent.
-        ValueError: the numerics cannot compute the bending moment that the scene records or
-            several shots at one plate.
+        ValueError, MemoryError: as in `prepare`.
     """
-    march = March(scene, numerics or Numerics(), shots, find_device(device), threads=threads)
-    return _outcomes(march, march.march(progress))
+    numerics, worker = numerics or Numerics(), Worker(device, threads, cancel)
+    if numerics.explicit is None:
+        numerics = pilot_of(scene, spread(shots, pilot_size(numerics.asked)), numerics, worker).numerics
+    return computed(prepare(scene, shots, numerics), worker, progress)
 
 
-def build(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None, device: str = "auto") -> None:
-    """Compile the kernels that `simulate` would need for these arguments, once per version and machine."""
-    resolution = resolve(numerics or Numerics(), scene, shots)
-    variant = variant_of(resolution, scene, shots, materials_of(scene, shots))
-    if resolution.block:  # the window is a part of this variant
-        variant = arrays_of(scene, numerics or Numerics(), shots).variant
+def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
+    """Compute what was prepared; see `simulate`."""
+    march = March(prepared, find_device(worker.device), threads=worker.threads)
+    return _outcomes(march, march.march(progress, worker.cancel))
+
+
+def pilot_of(
+    scene: Scene, pilot: Shots, numerics: Numerics, worker: Worker, trying: Callable[[int], object] = lambda level: None
+) -> HitErrors:
+    """Find the level of resolution for an accuracy (solver/pilot.py).
+
+    Args:
+        pilot: some of the shots.
+        trying: called with every level that is computed.
+    """
+
+    def outcomes_at(level: int) -> Outcomes:
+        trying(level)
+        return computed(prepare(scene, pilot, at_level(level, numerics)), worker)
+
+    return pilot_hits(outcomes_at, pilot, numerics)
+
+
+def spread(shots: Shots, most: int) -> Shots:
+    """Some of the shots at even distances; those at one plate go together."""
+    together = shots.at_a_plate
+    plates = len(shots) // together
+    places = np.linspace(0, plates, min(plates, -(-most // together)), endpoint=False).astype(int)
+    return shots[(places[:, None] * together + np.arange(together)).reshape(-1)]
+
+
+def build(prepared: Prepared, device: str = "auto") -> None:
+    """Compile the kernels that `computed` needs, once per version and machine."""
     for stage in (marching, free_flight):
-        load(stage.build(variant).kernel, find_device(device))
+        load(stage.build(prepared.variant).kernel, find_device(device))
 
 
 def _outcomes(march: March, contact: Any) -> Outcomes:
     return Outcomes.collected(march.scene, march.shots, march.report(contact))
 
 
-def trace(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None) -> list[Array]:
+def trace(scene: Scene, shots: Shots, *, numerics: Numerics) -> list[Array]:
     """Histories of shots on the CPU: one array [steps + 1, WIDTH] per shot (kernels/trace.py)."""
     march = _traced(scene, shots, numerics)
     return march.traces(march.march())
 
 
-def replay(scene: Scene, shots: Shots, *, numerics: Numerics | Fidelity | None = None, snapshots: int = 6) -> Replay:
+def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6) -> Replay:
     """Compute one shot again on the CPU, with its history. The outcome equals that of `simulate` on the same CPU, bit
     for bit.
 
     Args:
-        shots: the shot, after those that hit the same plate before it; the numerics as in `simulate`.
+        shots: the shot, after those that hit the same plate before it.
+        numerics: the resolution with which `simulate` computed it.
         snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. Each computes
             the shot again up to there; 0 computes no field of any layer.
     """
@@ -136,5 +168,5 @@ def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
     return last._replace(share=np.stack([share(one.get(number)) for one in left]))
 
 
-def _traced(scene: Scene, shots: Shots, numerics: Numerics | Fidelity | None) -> March:
-    return March(scene, numerics or Numerics(), shots, find_device("cpu"), traced=True)
+def _traced(scene: Scene, shots: Shots, numerics: Numerics) -> March:
+    return March(prepare(scene, shots, numerics, traced=True), find_device("cpu"))

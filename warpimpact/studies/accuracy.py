@@ -29,34 +29,37 @@ from warpimpact.results.dataset import study_dataset
 from warpimpact.scene import Hits, Numerics, Shots, make_shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.resolution import FIDELITIES, Fidelity, Resolution, resolve, spelt_out
+from warpimpact.solver.resolution import Level, Resolution, resolve, weakens
 from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]
 
 LEVELS = (
-    Fidelity(72, 72, 5.0, 0.06),
-    Fidelity(108, 108, 7.5, 0.04),
-    Fidelity(162, 160, 11.0, 0.027),
+    Level(72, 72, 5.0, 0.06),
+    Level(108, 108, 7.5, 0.04),
+    Level(162, 160, 11.0, 0.027),
 )
 """Levels of the converged answer, coarse to fine; the uncertainty is the change from the second last to the last."""
 
 SWEEP = (
-    Fidelity(8, 12, 0.7, 0.8),
-    Fidelity(12, 16, 1.0, 0.8),
-    Fidelity(12, 16, 1.0, 0.6),
-    Fidelity(16, 24, 1.0, 0.4),
-    Fidelity(24, 24, 1.0, 0.4),
-    Fidelity(24, 24, 1.5, 0.4),
-    Fidelity(24, 32, 2.0, 0.3),
-    Fidelity(32, 24, 1.5, 0.3),
-    Fidelity(40, 32, 2.0, 0.2),
-    Fidelity(48, 40, 2.5, 0.15),
-    Fidelity(56, 48, 4.0, 0.1),
-    Fidelity(72, 72, 6.0, 0.07),
+    Level(8, 12, 0.7, 0.8),
+    Level(12, 16, 1.0, 0.8),
+    Level(12, 16, 1.0, 0.6),
+    Level(16, 24, 1.0, 0.4),
+    Level(24, 24, 1.0, 0.4),
+    Level(24, 24, 1.5, 0.4),
+    Level(24, 32, 2.0, 0.3),
+    Level(32, 24, 1.5, 0.3),
+    Level(40, 32, 2.0, 0.2),
+    Level(48, 40, 2.5, 0.15),
+    Level(56, 48, 4.0, 0.1),
+    Level(72, 72, 6.0, 0.07),
 )
-"""Settings to measure besides the named fidelities, coarse to fine. They are close to the best of 280 settings on the
+"""Settings to measure besides levels of the ladder, coarse to fine. They are close to the best of 280 settings on the
 slotted plate."""
+
+LADDER_LEVELS = (0, 2, 4, 6)
+"""Levels of the ladder that are measured."""
 
 NODAL_STEPS = (1.0e-6, 0.5e-6)
 """Time steps of the paper's literal scheme [s]."""
@@ -106,7 +109,7 @@ def study(
     device: str = "auto",
     progress: Progress | None = None,
     settings: Mapping[str, Numerics] | None = None,
-    levels: Sequence[Fidelity] = LEVELS,
+    levels: Sequence[Level] = LEVELS,
 ) -> xarray.Dataset:
     """Measure error and speed of settings of the numerics on a campaign's scene.
 
@@ -114,8 +117,8 @@ def study(
         hits: how many hits, spread evenly over the campaign's cell.
         device: "auto" (CUDA if there is one, else CPU), "cpu", "cuda:0", …
         progress: called with (hits done, all hits); their ratio is the finished share of the estimated work.
-        settings: settings to measure, by name; None for the fidelities, a sweep and the literal scheme
-            (`default_settings`).
+        settings: settings to measure, by name, each fixing a resolution; None for levels of the ladder, a sweep and
+            the literal scheme (`default_settings`).
         levels: levels of the converged answer, at least two, coarse to fine.
 
     Returns:
@@ -132,7 +135,7 @@ def study(
         )
     settings = default_settings(campaign) if settings is None else settings
     bench = _Bench(campaign, hits, device, progress or (lambda done, total: None))
-    pairs = [(bench.numerics(_doubled(level)), bench.numerics(level)) for level in levels]
+    pairs = [(spelt_out(_doubled(level), campaign), spelt_out(level, campaign)) for level in levels]
     bench.expect([*settings.values(), *(numerics for pair in pairs for numerics in pair)])
     measured = [bench.measure(numerics) for numerics in settings.values()]
     truth = converged([(bench.compute(double)[0], bench.compute(single)[0]) for double, single in pairs])
@@ -166,20 +169,35 @@ def study(
 
 
 def default_settings(campaign: Campaign) -> dict[str, Numerics]:
-    """The fidelities by their names; the sweep and the literal scheme, which takes one plate, by their settings."""
-    fidelities = {name: Numerics(fidelity=name) for name in FIDELITIES}
-    sweep = [spelt_out(setting, campaign.scene, campaign.impact) for setting in SWEEP]
+    """Levels of the ladder by their numbers; the sweep and the literal scheme, which takes one plate, by their
+    settings."""
+    levels = {f"level {level}": Numerics(level=level) for level in LADDER_LEVELS}
+    sweep = [spelt_out(setting, campaign) for setting in SWEEP]
     nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
-    swept = fidelities | {label(campaign, numerics): numerics for numerics in sweep}
+    swept = levels | {label(campaign, numerics): numerics for numerics in sweep}
     return swept if campaign.layer else swept | nodal
+
+
+def spelt_out(level: Level, campaign: Campaign) -> Numerics:
+    """Numerics with the settings of a level that is none of the ladder."""
+    return Numerics(
+        patches_axial=level.patches_axial,
+        patches_around=level.patches_around,
+        grid_spacing=campaign.plate.degradation_length / level.cells_per_length,
+        travel=level.travel,
+    )
 
 
 def label(campaign: Campaign, numerics: Numerics) -> str:
     """Patches, cells per degradation length and time step as one short name."""
-    resolution = resolve(numerics, campaign.scene)
+    resolution = _resolution(campaign, numerics)
     cells = campaign.plate.degradation_length / resolution.grid_spacing
     step = _time_step(campaign, resolution)
     return f"{resolution.patches_axial}×{resolution.patches_around}, ℓ/{cells:.3g}, {step * 1e6:.3g} µs"
+
+
+def _resolution(campaign: Campaign, numerics: Numerics) -> Resolution:
+    return resolve(campaign.scene, numerics, weakens(campaign.target))
 
 
 def _time_step(campaign: Campaign, resolution: Resolution) -> float:
@@ -238,9 +256,6 @@ class _Bench:
         spread = Hits(count=hits, seed=campaign.hits.seed, replicates=1)
         self.shots = make_shots(campaign.impact, spread, campaign.plate, campaign.scatter)
 
-    def numerics(self, fidelity: Fidelity) -> Numerics:
-        return spelt_out(fidelity, self.campaign.scene, self.campaign.impact)
-
     def expect(self, runs: Sequence[Numerics]) -> None:
         """Announce all runs to come, for the progress."""
         self.total = sum(self._work(numerics) for numerics in runs)
@@ -266,7 +281,7 @@ class _Bench:
         copies, spent, best = 1, elapsed, len(self.shots) / elapsed
         while spent < MEASURED_TIME or elapsed < shortest:
             copies *= max(1, math.ceil(shortest / elapsed))
-            elapsed = self._seconds(numerics, _repeated(self.shots, copies))
+            elapsed = self._seconds(numerics, Shots.joined([self.shots] * copies))
             spent, best = spent + elapsed, max(best, copies * len(self.shots) / elapsed)
         return answer, best
 
@@ -277,25 +292,21 @@ class _Bench:
 
     def _work(self, numerics: Numerics) -> float:
         """Estimated work of a hit: proportional to patches times steps."""
-        resolution = resolve(numerics, self.campaign.scene)
+        resolution = _resolution(self.campaign, numerics)
         return resolution.patches_axial * resolution.patches_around / _time_step(self.campaign, resolution)
 
     def _simulate(self, numerics: Numerics, shots: Shots, progress: Progress) -> Outcomes:
         return simulate(self.scene, shots, numerics=numerics, device=str(self.device), progress=progress)
 
 
-def _repeated(shots: Shots, copies: int) -> Shots:
-    return Shots.joined([shots] * copies)
-
-
-def _doubled(level: Fidelity) -> Fidelity:
+def _doubled(level: Level) -> Level:
     """The same patches and grid with twice the time step."""
     return replace(level, travel=2.0 * level.travel)
 
 
 def _numerics_values(campaign: Campaign, settings: Mapping[str, Numerics]) -> dict[str, Any]:
     """The numerics of every setting, with every default filled in."""
-    resolutions = [resolve(numerics, campaign.scene) for numerics in settings.values()]
+    resolutions = [_resolution(campaign, numerics) for numerics in settings.values()]
     values: dict[str, Any] = {
         name: np.array([getattr(resolution, name) for resolution in resolutions])
         for name in (v.PATCHES_AXIAL, v.PATCHES_AROUND, v.GRID_SPACING)

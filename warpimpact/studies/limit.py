@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 import time
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import xarray
@@ -24,23 +23,28 @@ from warpimpact.results.dataset import failed
 from warpimpact.results.limits import with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import HitMap, at_solid, described, pilot_of
-from warpimpact.scene import Scene, Shots, Target
+from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, pilot_shots
+from warpimpact.runs.describe import computed_by, described, found_attributes
+from warpimpact.runs.task import Task
+from warpimpact.scene import Numerics, Scene, Shots, Target
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
-    THICKEST,
     THICKNESS_TOLERANCE,
     VELOCITY_TOLERANCE,
     Limits,
+    Sought,
     check_arrests,
-    limit_thickness,
-    limit_velocity,
+    limits,
+    pilot_of_limits,
+    short_steps,
+    thickest,
     with_thickness,
     with_velocity,
 )
-from warpimpact.solver.limit_promise import PILOT, LimitPromise, keep_limits
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.resolution import Fidelity
+from warpimpact.solver.pilot import LimitErrors, limits_pilot_size
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
 
 if TYPE_CHECKING:
@@ -51,21 +55,11 @@ QUANTILES = {"V50": 0.5, "V05": 0.05}
 
 
 @dataclass(frozen=True)
-class LimitMap(HitMap):
-    """What `warpimpact limit` computes of every hit.
+class LimitMap:
+    """The limit of every hit, as a `runs.task.Computation`: what `warpimpact limit` computes."""
 
-    Attributes:
-        quantity: "velocity" or "thickness".
-        tolerance: how far the ends of a limit may lie apart [m/s] or [m].
-        highest: largest value tried [m/s] or [m].
-        layer: whose thickness it is; 0 is the plate.
-    """
-
-    quantity: str
-    tolerance: float
-    highest: float
-    layer: int = 0
-    most_solid = 256
+    sought: Sought
+    most_solid: ClassVar[int] = 256
 
     @classmethod
     def of(
@@ -85,115 +79,92 @@ class LimitMap(HitMap):
         except ValueError as error:
             raise CampaignError(str(error)) from None
         if quantity == "velocity":
-            return cls(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+            return cls(Sought(quantity, tolerance or VELOCITY_TOLERANCE, HIGHEST_VELOCITY))
         plates = campaign.target.layers
         if layer >= len(plates):
             raise CampaignError(f"got layer {layer}, but the target has layers 0 (the plate) to {len(plates) - 1}")
-        return cls(quantity, tolerance or THICKNESS_TOLERANCE, THICKEST * plates[layer].thickness, layer)
+        return cls(Sought(quantity, tolerance or THICKNESS_TOLERANCE, thickest(campaign.scene, layer), layer))
 
     @property
     def content(self) -> Mapping[str, str]:
         """What decides the bits beside the campaign."""
-        of_layer = f" of layer {self.layer}" if self.layer else ""
-        return {"limit": f"{self.quantity}{of_layer} within {self.tolerance:g}, at most {self.highest:g}"}
+        sought = self.sought
+        of_layer = f" of layer {sought.layer}" if sought.layer else ""
+        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}"}
 
     @property
     def measures(self) -> tuple[str, ...]:
         """The running estimates: the mean limit."""
-        return (f"mean({v.LIMITS[self.quantity].value})",)
+        return (f"mean({v.LIMITS[self.sought.quantity].value})",)
 
-    def compute(self, campaign: Campaign, shots: Shots, **how: Any) -> Table:
+    def compute(self, campaign: Campaign, task: Task, worker: Worker, progress: Progress | None = None) -> Table:
         """Search the limits of some shots. The Dataset is that of the shots as they just perforate, with their limits.
 
         Args:
-            shots: whole groups of images, as the campaign's sampler gives them.
-            how: promise, solid, device, threads and progress as in `campaign.compute.compute`.
+            progress: as in `simulate`.
         """
-        promise: LimitPromise | None = how["promise"]
-        device, images = how.get("device", "auto"), len(campaign.symmetries)
+        scene, sought, images, found = campaign.scene, self.sought, len(campaign.symmetries), task.found
+        numerics = numerics_of(campaign, found)
         begin = time.perf_counter()
-        limits = self._search_drawn(
-            campaign.drawn,
-            campaign.scene,
-            shots[::images],
-            campaign.numerics if promise is None else promise.fidelity,
-            device=device,
-            threads=how.get("threads"),
-            progress=_of_images(how.get("progress"), images),
+        searched = _searched(
+            campaign.drawn, scene, task.shots[::images], sought, numerics, worker, of_images(progress, images)
         )
-        dataset = described(
-            campaign,
-            self._put(campaign, shots, limits, images),
-            limits.outcomes.assign(**{name: getattr(limits, name.field) for name in v.LIMITS[self.quantity]}),
-            numerics=campaign.numerics if promise is None else promise.fidelity,
-            device=device,
-            elapsed=time.perf_counter() - begin,
-            attributes={
-                attr.LIMIT: self.quantity,
-                attr.LIMIT_LAYER: self.layer,
-                **self.weights(campaign.target),
-                attr.LIMIT_TOLERANCE: self.tolerance,
-                attr.LIMIT_HIGHEST: self.highest,
-            }
-            | ({} if promise is None else _promised(promise)),
-        )
-        begun, *_ = dataset.attrs[attr.HISTORY].split()
-        dataset.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {self.quantity}"
-        return dataset if how.get("solid") is None else self._beside_solid(campaign, dataset, **how)
+        elapsed = time.perf_counter() - begin
+        attributes = {
+            **computed_by(campaign, worker.device, len(task.shots) // images, elapsed),
+            **found_attributes(campaign, found),
+            **({attr.LIMIT_ERROR: found.error} if isinstance(found, LimitErrors) else {}),
+            attr.LIMIT: sought.quantity,
+            attr.LIMIT_LAYER: sought.layer,
+            **self.weights(campaign.target),
+            attr.LIMIT_TOLERANCE: sought.tolerance,
+            attr.LIMIT_HIGHEST: sought.highest,
+        }
+        put = self._put(campaign, task.shots, searched, images)
+        resolution = prepare(scene, put[:1], short_steps(numerics)).resolution
+        found_limits = {name: getattr(searched, name.field) for name in v.LIMITS[sought.quantity]}
+        table = described(campaign, put, searched.outcomes.assign(**found_limits), resolution, attributes)
+        begun, *_ = table.attrs[attr.HISTORY].split()
+        table.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {sought.quantity}"
+        return table if task.solid is None else self._beside_solid(campaign, table, task.solid, numerics, worker)
 
-    def _beside_solid(self, campaign: Campaign, found: Table, **how: Any) -> Table:
-        """The Dataset with the limits of some shots at the solid plate that is as heavy as the whole target."""
-        plate, promise, progress, hits = campaign.target.solid, how["promise"], how.get("progress"), found.sizes["hit"]
+    def _beside_solid(
+        self, campaign: Campaign, table: Table, solid: Shots, numerics: Numerics, worker: Worker
+    ) -> Table:
+        """The columns with the limits of some shots at the solid plate that is as heavy as the whole target."""
+        plate, sought = campaign.target.solid, replace(self.sought, layer=0)
         scene = campaign.scene.model_copy(update={"target": plate})
+        if sought.quantity == "thickness":
+            sought = replace(sought, highest=thickest(scene, 0))
         begin = time.perf_counter()
-        limits = replace(self, layer=0)._search_drawn(
-            campaign.drawn,
-            scene,
-            at_solid(campaign, how["solid"]),
-            campaign.numerics if promise is None else promise.fidelity,
-            device=how.get("device", "auto"),
-            threads=how.get("threads"),
-            progress=progress and (lambda done, total: progress(hits, hits)),
-        )
-        highest = self.highest if self.quantity == "velocity" else THICKEST * plate.thickness
+        searched = _searched(campaign.drawn, scene, at_solid(campaign, solid), sought, numerics, worker)
         told = {
             attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
             attr.SOLID_LIMIT_DENSITY: plate.density,
-            attr.SOLID_LIMIT_HIGHEST: highest,
+            attr.SOLID_LIMIT_HIGHEST: sought.highest,
         }
-        return with_solid_limits(found, self.quantity, limits).assign_attrs(attr.with_units(told))
+        return with_solid_limits(table, sought.quantity, searched).assign_attrs(attr.with_units(told))
 
-    def promise_of(
-        self, campaign: Campaign, device: str = "auto", progress: Progress | None = None
-    ) -> LimitPromise | None:
+    def pilot(
+        self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
+    ) -> LimitErrors | None:
         """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
         if campaign.numerics.explicit is not None:
             return None
-        pilot = pilot_of(campaign, PILOT)
-        follow = progress and (lambda done, total: progress(0, len(pilot)))  # nothing new, but a place to stop
+        pilot = pilot_shots(campaign, limits_pilot_size(campaign.numerics.asked))
+        return pilot_of_limits(campaign.scene, pilot, self.sought, campaign.numerics, worker, trying)
 
-        def search(fidelity: Fidelity) -> Limits:
-            return self._search(campaign.scene, pilot, fidelity, device=device, progress=follow)
-
-        return keep_limits(search, campaign.numerics, squared=self.quantity == "thickness")
-
-    def promise_in(self, dataset: Result) -> LimitPromise | None:
-        """The promise with which a result was computed."""
-        told = dataset.attrs
-        if attr.LIMIT_RESOLUTION not in told:
+    def found_in(self, result: Result) -> LimitErrors | None:
+        """What the pilot of a result found."""
+        if attr.RESOLUTION not in result.attrs:
             return None
-        return LimitPromise(
-            fidelity=Fidelity(**json.loads(told[attr.LIMIT_RESOLUTION])),
-            kept=bool(told[attr.LIMIT_PROMISE_KEPT]),
-            error=float(told[attr.LIMIT_ERROR_P90]),
-            shown=told[attr.LIMIT_ERROR_SHOWN],
-        )
+        return LimitErrors(*found_in(result), float(result.attrs[attr.LIMIT_ERROR]), result.attrs[attr.LIMIT])
 
     def weights(self, target: Target) -> dict[str, float]:
         """What turns the thickness of the layer into the areal density of the target; nothing of a velocity."""
-        if self.quantity == "velocity":
+        if self.sought.quantity == "velocity":
             return {}
-        layer = target.layers[self.layer]
+        layer = target.layers[self.sought.layer]
         return {
             attr.LIMIT_DENSITY: layer.areal_density / layer.thickness,
             attr.LIMIT_ELSEWHERE: target.areal_density - layer.areal_density,
@@ -201,58 +172,40 @@ class LimitMap(HitMap):
 
     def _put(self, campaign: Campaign, shots: Shots, limits: Limits, images: int) -> Shots:
         """Shots, with their images, as they just perforate."""
-        if self.quantity == "velocity":
+        if self.sought.quantity == "velocity":
             return with_velocity(shots, np.repeat(limits.shots.velocity, images))
-        tried = limits.shots.own_of(campaign.target, "thickness", self.layer)
-        return with_thickness(self.layer, shots, np.repeat(tried, images))
-
-    def _search_drawn(
-        self, drawn: Posterior | None, scene: Scene, shots: Shots, numerics: Any, progress: Progress | None, **how: Any
-    ) -> Limits:
-        """Limits of shots, some of which may need a scene of their own for their draw of a posterior."""
-        if drawn is None or not drawn.of_scene:
-            return self._search(scene, shots, numerics, progress=progress, **how)
-        places: list[NDArray[np.int64]] = []
-        parts: list[Limits] = []
-        for which, own in drawn.scenes(scene, shots):
-            follow = progress and _from(sum(map(len, places)), len(shots), progress)
-            parts.append(self._search(own, shots[which], numerics, progress=follow, **how))
-            places.append(which)
-        order = np.argsort(np.concatenate(places), kind="stable")
-        numbers = ("value", "lower", "upper", "runs", "converged")
-        return Limits(
-            **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
-            shots=Shots.joined([part.shots for part in parts])[order],
-            outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
-        )
-
-    def _search(self, scene: Scene, shots: Shots, numerics: Any, **how: Any) -> Limits:
-        how |= {"numerics": numerics, "tolerance": self.tolerance}
-        if self.quantity == "velocity":
-            return limit_velocity(scene, shots, highest=self.highest, **how)
-        return limit_thickness(scene, shots, layer=self.layer, **how)
+        tried = limits.shots.own_of(campaign.target, "thickness", self.sought.layer)
+        return with_thickness(self.sought.layer, shots, np.repeat(tried, images))
 
 
-def _from(before: int, total: int, progress: Progress) -> Progress:
-    """The progress of a part of some shots, told as that of all of them."""
-    return lambda done, _: progress(before + done, total)
+def _searched(
+    drawn: Posterior | None,
+    scene: Scene,
+    shots: Shots,
+    sought: Sought,
+    numerics: Numerics,
+    worker: Worker,
+    progress: Progress | None = None,
+) -> Limits:
+    """Limits of shots. Draws of a posterior may need scenes of their own."""
+    if drawn is None or not drawn.of_scene:
+        return limits(scene, shots, sought, numerics, worker, progress)
+    places, parts = list[NDArray[np.int64]](), list[Limits]()
+    for which, own in drawn.scenes(scene, shots):
+        parts.append(limits(own, shots[which], sought, numerics, worker))
+        places.append(which)
+        if progress is not None:
+            progress(sum(map(len, places)), len(shots))
+    order = np.argsort(np.concatenate(places), kind="stable")
+    numbers = ("value", "lower", "upper", "runs", "converged")
+    return Limits(
+        **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
+        shots=Shots.joined([part.shots for part in parts])[order],
+        outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
+    )
 
 
-def _of_images(progress: Progress | None, images: int) -> Progress | None:
-    return progress and (lambda done, total: progress(done * images, total * images))
-
-
-def _promised(promise: LimitPromise) -> dict[str, Any]:
-    """What is told of a promise."""
-    return {
-        attr.LIMIT_RESOLUTION: json.dumps(asdict(promise.fidelity)),
-        attr.LIMIT_PROMISE_KEPT: int(promise.kept),
-        attr.LIMIT_ERROR_P90: promise.error,
-        attr.LIMIT_ERROR_SHOWN: promise.shown,
-    }
-
-
-def told_of(campaign: Campaign, quantity: str) -> str | None:
+def warning_of(campaign: Campaign, quantity: str) -> str | None:
     """What a user should know of a campaign whose limits are asked for."""
     if (quantity, 0) not in campaign.scatter.given:
         return None

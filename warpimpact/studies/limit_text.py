@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import xarray
 
@@ -14,6 +16,7 @@ from warpimpact.results.limits import solid_limits
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.pilot import hits_text, limit_error_text
 from warpimpact.studies.limit import QUANTILES, quantiles
 
 _MOST_LISTED = 12
@@ -100,7 +103,9 @@ def promise_line(dataset: xarray.Dataset) -> str:
     unit, factor = shown_unit(told[attr.LIMIT])
     of_layer = f"thickness of layer {told[attr.LIMIT_LAYER]}; " if told[attr.LIMIT_LAYER] else ""
     ends = f"{of_layer}ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
-    if attr.LIMIT_ERROR_SHOWN not in told:
+    if attr.LIMIT_ERROR not in told:
         return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
-    kept = "" if told[attr.LIMIT_PROMISE_KEPT] else ", more than the fidelity promises"
-    return f"{ends}; against a finer level 90 % of the hits are within {told[attr.LIMIT_ERROR_SHOWN]}{kept}"
+    kept = "" if told[attr.PROMISE_KEPT] else ", more than was asked for"
+    error = limit_error_text(told[attr.LIMIT_ERROR], told[attr.LIMIT])
+    hits = hits_text(json.loads(told[attr.ACCURACY])["share"])
+    return f"{ends}; against a finer level {hits} are within {error}{kept}"

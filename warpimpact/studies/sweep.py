@@ -39,9 +39,9 @@ _MOST = 10_000
 """Points of a sweep."""
 _OF_A_POINT = (
     *(attr.CAMPAIGN, attr.HISTORY, attr.FINGERPRINT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.TITLE),
-    *(attr.RESOLUTION, attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR_P90, attr.TILT_ERROR_P90, attr.NUMERICS_GIVEN),
+    *(attr.RESOLUTION, attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.NUMERICS_GIVEN),
     *(attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS),
-    *(attr.DEPTH_ERROR_P90, attr.CONFIDENCE, attr.SYMMETRIES, attr.COMPUTED_HITS),
+    *(attr.DEPTH_ERROR, attr.CONFIDENCE, attr.SYMMETRIES, attr.COMPUTED_HITS),
 )
 """Attributes of the result of a single point."""
 
@@ -243,8 +243,11 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
     Args:
         points: results in the order of `sweep.campaigns`.
     """
-    numbers = np.arange(max(point.sizes["hit"] for point in points), dtype=np.int32)
-    same = [point if point.sizes["hit"] == len(numbers) else point.reindex(hit=numbers) for point in points]
+    every: dict[str, Any] = {v.HIT: np.arange(max(point.sizes["hit"] for point in points), dtype=np.int32)}
+    for along in (v.STANDOFF, v.LAYER_STANDOFF):
+        if all(along in point.coords for point in points):
+            every[along] = np.unique(np.concatenate([point[along].values for point in points]))
+    same = [_with(every, point) for point in points]
     names = tuple(one.name for one in sweep.inputs)
     first = same[0]
     outcomes = {str(name) for name in v.outcome_variables(first)}
@@ -263,6 +266,12 @@ def joined(sweep: Sweep, points: Sequence[xarray.Dataset]) -> xarray.Dataset:
             stacked = np.stack([column.values for column in columns]).reshape(sweep.shape + array.shape)
             into[str(name)] = ((*names, *array.dims), stacked, array.attrs)
     return xarray.Dataset(data, coordinates, _attributes(sweep, same))
+
+
+def _with(every: Mapping[str, Any], point: xarray.Dataset) -> xarray.Dataset:
+    """A point with these values along the dimensions in which it has others."""
+    other = {name: values for name, values in every.items() if not np.array_equal(point[name].values, values)}
+    return point.reindex(other) if other else point
 
 
 def _equal(one: xarray.Variable, other: xarray.Variable) -> bool:

@@ -10,7 +10,7 @@ import xarray
 
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import best_rows, comparison_text
-from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiveness_text
+from warpimpact.analysis.effectiveness import EffectMeasure, effectiveness, effectiveness_text
 from warpimpact.analysis.proxy import proxy
 from warpimpact.analysis.summary import summary, summary_text
 from warpimpact.campaign.campaign import Campaign
@@ -20,6 +20,10 @@ from warpimpact.plotting import comparison_figure, weight_figure
 from warpimpact.results.dataset import described
 from warpimpact.results.files import ResultError
 from warpimpact.results.variables import LIMITS, STATUS
+from warpimpact.runs.task import Task
+from warpimpact.scene import Numerics
+from warpimpact.solver.limit import Sought
+from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
 from warpimpact.studies.limit_text import limits_text
 
@@ -40,7 +44,7 @@ def layered(
     )
 
 
-def named(dataset: xarray.Dataset) -> dict[str, Measure]:
+def named(dataset: xarray.Dataset) -> dict[str, EffectMeasure]:
     return {measure.name: measure for measure in effectiveness(dataset)}
 
 
@@ -231,17 +235,17 @@ def test_the_figure_of_limits_stands_over_the_weight_that_the_target_needs(make_
 
 def test_a_search_tells_the_weights_of_the_target() -> None:
     target = read_plates(CAMPAIGNS / "base_thickness.toml")["base of 5 mm"].target
-    told = LimitMap("thickness", 1e-5, 0.1, 1).weights(target)
+    told = LimitMap(Sought("thickness", 1e-5, 0.1, 1)).weights(target)
     assert told["limit_density"] == pytest.approx(7850.0)
     assert told["limit_elsewhere"] + 7850.0 * 5e-3 == pytest.approx(target.areal_density)
-    assert LimitMap("velocity", 1.0, 3000.0).weights(target) == {}
+    assert LimitMap(Sought("velocity", 1.0, 3000.0)).weights(target) == {}
 
 
 def test_the_proxy_beside_the_limit_thickness() -> None:
     """The ratio of base armour that a core needs at 0° and at 85°: 2.8 by the kernel, 4.4 by the proxy."""
     campaign = Campaign.from_toml(CAMPAIGNS / "base_armour.toml")
-    job = LimitMap.of(campaign, "thickness")
-    dataset = job.compute(campaign, campaign.sampler().shots(0, 7), promise=None, device="cpu").to_xarray()
+    job, fixed = LimitMap.of(campaign, "thickness"), campaign.model_copy(update={"numerics": Numerics(level=2)})
+    dataset = job.compute(fixed, Task(campaign.sampler().shots(0, 7)), Worker("cpu")).to_xarray()
     thickness, found = 1e3 * dataset["limit_thickness"].values, proxy(dataset)
     assert found is not None
     assert found.inclination == pytest.approx([0, 15, 30, 45, 60, 75, 85])

@@ -22,7 +22,7 @@ from warpimpact.plotting import comparison_figure
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Standing
+from warpimpact.runs.run import RunProgress
 
 pytestmark = pytest.mark.usefixtures("small_shards")
 TWO_PLATES = Path(__file__).parents[3] / "campaigns" / "two_plates.toml"
@@ -347,15 +347,15 @@ def test_a_comparison_that_was_broken_off_goes_on(
     command = ["compare", "two.toml", "--count", "512", "--device", "cpu"]
 
     @contextmanager
-    def breaking() -> Iterator[Callable[[Standing], None]]:
-        def follow(standing: Standing) -> None:
+    def breaking() -> Iterator[Callable[[RunProgress], None]]:
+        def follow(standing: RunProgress) -> None:
             if Path("slots.nc").exists() and standing.saved >= 256:
                 raise KeyboardInterrupt
 
         yield follow
 
     with monkeypatch.context() as patched:
-        patched.setattr("warpimpact.cli.compare.show_standing", breaking)
+        patched.setattr("warpimpact.cli.compare.show_run", breaking)
         assert main(command) == 130
     assert "continue with --resume" in capsys.readouterr().err
     assert main(command) == 2

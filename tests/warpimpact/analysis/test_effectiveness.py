@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.effectiveness import Measure, effectiveness, effectiveness_text
+from warpimpact.analysis.effectiveness import EffectMeasure, effectiveness, effectiveness_text
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.kernels.status import Status
 from warpimpact.results.files import ResultError
@@ -26,7 +26,7 @@ def with_solid(dataset: xarray.Dataset, velocity: np.ndarray) -> xarray.Dataset:
     )
 
 
-def named(dataset: xarray.Dataset, **options: float) -> dict[str, Measure]:
+def named(dataset: xarray.Dataset, **options: float) -> dict[str, EffectMeasure]:
     return {measure.name: measure for measure in effectiveness(dataset, **options)}
 
 

@@ -60,13 +60,17 @@ def test_from_a_campaign_to_its_result(tmp_path: Path, capsys: pytest.CaptureFix
 @pytest.mark.parametrize(
     ("tail", "changes", "sentence"),
     [
-        (STOP.replace("bending = true", ""), (), "but that needs output.bending = true"),
+        (STOP.replace("bending = true", ""), (), " needs output.bending = true: it is not recorded otherwise"),
         (
             "bending = true\n",
             (('mass = "4 g"', 'mass = "4 g"\ninertia_axial = 2e-8'),),
-            "beside core.inertia_axial, but",
+            "output.bending = true cannot be combined with core.inertia_axial",
         ),
-        ("bending = true\n", (('"consistent"', '"nodal"'),), 'beside numerics.scheme = "nodal", but it must be'),
+        (
+            "bending = true\n",
+            (('"consistent"', '"nodal"'),),
+            'output.bending = true cannot be combined with numerics.scheme = "nodal"',
+        ),
         ("bending = 1\n", (), "output.bending: got 1, but it must be a valid boolean"),
     ],
 )

@@ -1,5 +1,6 @@
 """Bursts from a campaign file to a result: shards, resuming, replay, intervals, and a sentence for each mistake."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,10 +13,11 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally, dealing
 from warpimpact.runs import shards
-from warpimpact.runs.compute import promise_of
+from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
+from warpimpact.runs.run import Interrupted, RunProgress, run, run_to_file
 from warpimpact.scene.plausible import Implausible
+from warpimpact.solver.worker import Worker
 
 TEXT = (Path(__file__).parents[3] / "campaigns" / "burst_of_five.toml").read_text(encoding="utf-8")
 DRAFT = '[numerics]\nfidelity = "draft"\n\n[output]'
@@ -63,7 +65,7 @@ def test_a_run_is_resumed_with_the_same_bits(
     campaign = campaign_of(150)
     assert shards.extent(750, 5) == 160  # 32 bursts
 
-    def interrupt(standing: Standing) -> None:
+    def interrupt(standing: RunProgress) -> None:
         assert standing.total == 750
         if standing.saved:
             raise KeyboardInterrupt
@@ -96,12 +98,12 @@ def test_an_interval_counts_bursts(result: xarray.Dataset) -> None:
 def test_the_pilot_takes_whole_bursts(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
 
-    def kept(scene: object, numerics: object, pilot: object, **rest: object) -> None:
+    def piloted(scene: object, pilot: object, *rest: object) -> None:
         seen.append(pilot)
 
-    monkeypatch.setattr("warpimpact.runs.compute.keep", kept)
+    monkeypatch.setattr("warpimpact.runs.compute.pilot_of", piloted)
     for sampling in ("sobol", "grid"):
-        promise_of(campaign_of(60, ('sampling = "sobol"', f'sampling = "{sampling}"')), "cpu")
+        HitMap().pilot(campaign_of(60, ('sampling = "sobol"', f'sampling = "{sampling}"')), Worker("cpu"))
     for pilot in seen:
         assert pilot.at_a_plate == 5
         assert len(pilot) == 65  # of at least 64
@@ -109,16 +111,19 @@ def test_the_pilot_takes_whole_bursts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_what_a_burst_does_not_take_is_refused_in_one_sentence() -> None:
     for change, sentence in (
-        (("seed = 1", "seed = 1\nirreducible = true"), "got hits.irreducible = true beside burst"),
-        (('fidelity = "draft"', 'scheme = "nodal"'), 'got numerics.scheme = "nodal" beside burst'),
+        (
+            ("seed = 1", "seed = 1\nirreducible = true"),
+            "[burst] cannot be combined with hits.irreducible = true: the hits of a burst have no images",
+        ),
+        (('fidelity = "draft"', 'scheme = "nodal"'), '[burst] cannot be combined with numerics.scheme = "nodal"'),
         (
             ('fidelity = "draft"', 'fidelity = "draft"\nlayout = "block"'),
-            'got numerics.layout = "block" beside several shots at one plate, but it must be "simple"',
+            'numerics.layout = "block" cannot be combined with [burst]: a block computes one hit',
         ),
         (('scatter = "5 mm"', 'scatter = "30 m"'), "but they are exact up to"),
         (('scatter = "5 mm"', 'scatter = "5 kg"'), "burst.scatter"),
     ):
-        with pytest.raises(CampaignError, match=sentence.replace(".", r"\.")):
+        with pytest.raises(CampaignError, match=re.escape(sentence)):
             campaign_of(60, change)
 
 

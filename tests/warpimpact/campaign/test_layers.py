@@ -90,8 +90,16 @@ def test_layers_stand_behind_the_plate_in_order() -> None:
         ('"8 mm"', "{ distribution = 'normal', mean = '1 mm', std = '1 mm' }", r"layer\[1\].thickness: got a normal"),
         ('["2 mm", "0 mm"]', '"2 mm"', r"layer\[0\].offset: got \"2 mm\", but it must be a list"),
         ('["2 mm", "0 mm"]', '["2 mm", {distribution = "x"}]', r"layer\[0\].offset\[1\]"),
-        ("patches_axial = 14", 'scheme = "nodal"', r"got numerics.scheme = \"nodal\" beside 2 \[\[layer\]\]"),
-        ("replicates = 8", "irreducible = true", r"got hits.irreducible = true beside layer\[0\] with a pattern"),
+        (
+            "patches_axial = 14",
+            'scheme = "nodal"',
+            r"\[\[layer\]\] cannot be combined with numerics.scheme = \"nodal\"",
+        ),
+        (
+            "replicates = 8",
+            "irreducible = true",
+            r"hits.irreducible = true cannot be combined with layer\[0\] with a pattern",
+        ),
     ],
 )
 def test_a_message_names_the_layer(old: str, new: str, message: str) -> None:

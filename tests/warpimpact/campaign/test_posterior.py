@@ -199,7 +199,7 @@ def test_lengths_make_scenes_of_their_own(tmp_path: Path) -> None:
         (("degradation = 0.8", 'degradation = 0.8\ndegradation_distance = "1 mm"'), "gives plate.degradation_interval"),
         (
             ('resistance = "1 GPa"', 'resistance = { distribution = "uniform", low = "1 GPa", high = "2 GPa" }'),
-            "got a distribution of plate.resistance beside a posterior, which gives it",
+            "posterior cannot be combined with a distribution of plate.resistance: the posterior gives it",
         ),
     ],
 )

@@ -13,9 +13,11 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.variables import OUTCOME_VARIABLES
-from warpimpact.runs.compute import compute, promise_in
+from warpimpact.runs.compute import HitMap, compute
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, Standing, run, run_to_file
+from warpimpact.runs.run import Interrupted, RunProgress, run, run_to_file
+from warpimpact.runs.task import Task
+from warpimpact.solver.worker import Worker
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -61,8 +63,9 @@ def test_a_hit_does_not_depend_on_its_company(tmp_path: Path) -> None:
     changes = 'obliquity = { distribution = "uniform", low = 0, high = "50 deg" }\nspin = 1e4'
     campaign = campaign_with(tmp_path, (VELOCITY, f"{NORMAL}\n{changes}"))
     whole = run(campaign, device="cpu")
+    found = HitMap().found_in(whole)
     for hit in range(0, 64, 9):
-        alone = compute(campaign, campaign.sampler().shots(hit, 1), promise=promise_in(whole), device="cpu")
+        alone = compute(campaign, Task(campaign.sampler().shots(hit, 1), found=found), Worker("cpu"))
         for name in OUTCOME_VARIABLES:
             assert np.array_equal(alone[name].values[0], whole[name][hit], equal_nan=True), name
 
@@ -94,7 +97,7 @@ def test_scatter_in_plate_and_core_from_file_to_result(
     count = 1000
     campaign = own.model_copy(update={"hits": own.hits.model_copy(update={"count": count})})
 
-    def break_off(standing: Standing) -> None:
+    def break_off(standing: RunProgress) -> None:
         if standing.saved >= 256:
             raise KeyboardInterrupt
 
@@ -173,7 +176,9 @@ def test_attitude_does_not_scatter_beside_irreducible_hits(tmp_path: Path) -> No
     irreducible = ("seed = 1", "seed = 1\nirreducible = true")
     assert campaign_with(tmp_path, (VELOCITY, NORMAL), irreducible).symmetries[1:]
     yaw = '"825 m/s"\nyaw = { distribution = "normal", mean = 0, std = "1 deg" }'
-    with pytest.raises(CampaignError, match=r"campaign.toml: got hits.irreducible = true beside .* of impact.yaw, but"):
+    with pytest.raises(
+        CampaignError, match=r"campaign.toml: hits.irreducible = true cannot be combined with .* of impact.yaw: a"
+    ):
         campaign_with(tmp_path, (VELOCITY, yaw), irreducible)
 
 

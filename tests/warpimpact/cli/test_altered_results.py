@@ -131,6 +131,7 @@ ALTERATIONS = (
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.usefixtures("unrendered")
 @pytest.mark.parametrize(("command", "seed"), [(name, seed) for name, seeds in SEEDS.items() for seed in seeds])
 def test_an_altered_result_is_read_or_refused_in_a_sentence(
     command: str,
@@ -143,7 +144,6 @@ def test_an_altered_result_is_read_or_refused_in_a_sentence(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     draw = random.Random(f"{command} {seed}")
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, *_, **__: figure.draw_without_rendering())
     for attempt in itertools.count():  # some alterations do not fit each other, or netCDF
         try:
             altered(result, draw).to_netcdf("a.nc")

@@ -254,10 +254,8 @@ def test_a_result_shows_no_control_characters(
     assert capsys.readouterr().out.startswith("$\\frac\\x1b[31m$\n")
 
 
-def test_a_title_is_no_formula(
-    make_result: Callable[..., xarray.Dataset], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda figure, *_, **__: figure.draw_without_rendering())
+@pytest.mark.usefixtures("unrendered")
+def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> None:
     path = tmp_path / "a.nc"
     files.write(make_result(100).assign_attrs(title=r"costs 5 $ or $\notacommand{"), path)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 0

@@ -7,18 +7,18 @@ from dataclasses import replace
 
 import pytest
 
-from warpimpact.cli.progress import show_standing
+from warpimpact.cli.progress import show_run
 from warpimpact.results.measures import Estimate, Measure
-from warpimpact.runs.run import Standing
-from warpimpact.solver.promise import Promise
-from warpimpact.solver.resolution import LADDER
+from warpimpact.runs.progress import RunProgress
+from warpimpact.scene import Numerics
+from warpimpact.solver.pilot import HitErrors
 
 
-def standing(done: int, *, failed: int = 0, resumed: int = 100) -> Standing:
+def standing(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:
     velocity = Estimate(731.25, 730.5, 732.0, done, 10.0)
     tilt = Estimate(23.0, 22.0, 24.0, done, 5.0)
     measures = (Measure.parse("mean(residual_velocity)"), Measure.parse("mean(tilt@130mm)"))
-    return Standing(done, 1000, done, resumed, failed, dict(zip(measures, (velocity, tilt), strict=True)))
+    return RunProgress(done, 1000, done, resumed, failed, dict(zip(measures, (velocity, tilt), strict=True)))
 
 
 class Terminal(io.StringIO):
@@ -34,7 +34,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 
 def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with show_standing() as show:
+    with show_run() as show:
         for done in range(100, 1001, 10):
             clock[0] += 0.1
             show(standing(done, failed=done // 300))
@@ -50,7 +50,7 @@ def test_a_log_gets_a_line_per_tenth(capsys: pytest.CaptureFixture[str], clock: 
 
 
 def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
-    with show_standing() as show:
+    with show_run() as show:
         for _ in range(100):
             show(standing(101))
             clock[0] += 60.0
@@ -60,7 +60,7 @@ def test_a_slow_run_is_not_silent(capsys: pytest.CaptureFixture[str], clock: lis
 def test_a_log_speaks_every_few_seconds_at_first_and_every_minute_later(
     capsys: pytest.CaptureFixture[str], clock: list[float]
 ) -> None:
-    with show_standing() as show:
+    with show_run() as show:
         for _ in range(600):
             show(standing(101))
             clock[0] += 0.1
@@ -75,7 +75,7 @@ def test_a_log_speaks_every_few_seconds_at_first_and_every_minute_later(
 def test_a_terminal_gets_a_bar_that_counts_what_was_resumed_as_done(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stderr", terminal)
-    with show_standing() as show:
+    with show_run() as show:
         show(standing(100))
         show(standing(600, failed=3))
         show(standing(590, failed=3))  # what is under way may be given up: a bar does not go back
@@ -92,8 +92,56 @@ def test_a_line_tells_the_accuracy_that_the_pilot_found(capsys: pytest.CaptureFi
         (True, "for 90 % of the hits, 0 failed"),
         (False, "for 90 % of the hits, not as promised, 0 failed"),
     ):
-        promise = Promise(LADDER[2], kept, 0.42, math.radians(0.7))
-        with show_standing() as show:
+        found = HitErrors(Numerics(level=2), kept, 0.9, 0.42, math.radians(0.7))
+        with show_run() as show:
             clock[0] += 1.0
-            show(replace(standing(400), promise=promise))
+            show(replace(standing(400), found=found))
         assert capsys.readouterr().err.splitlines()[0].endswith(f"accuracy 0.42 m/s and 0.7 deg {end}")
+
+
+def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
+    capsys: pytest.CaptureFixture[str], clock: list[float]
+) -> None:
+    begun = standing(0, resumed=0)
+    with show_run() as show:
+        for tenth in range(700):
+            show(replace(begun, piloting=True, trying=2 if tenth < 300 else 4))
+            clock[0] += 0.1
+        show(begun)
+        clock[0] += 4.0
+        show(standing(400, resumed=0))
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "a pilot looks for the resolution, level 2, for 2 s so far"
+    assert sum("level 4" in line for line in lines) < 10
+    assert [line for line in lines if line.startswith("0 of")] == ["0 of 1000 hits"]
+    assert lines[-1].startswith("400 of 1000 hits, 100 hits/s, 6 s left; ")
+
+
+def test_a_short_pilot_says_nothing(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+    with show_run() as show:
+        show(replace(standing(0), piloting=True))
+        clock[0] += 1.9
+        show(replace(standing(0), piloting=True))
+    assert capsys.readouterr().err == ""
+
+
+def test_a_bar_keeps_its_width_beside_long_estimates(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with show_run() as show:
+        show(replace(standing(100), piloting=True, trying=3))
+        show(standing(500))
+    shown = terminal.getvalue()
+    assert "a pilot looks for the resolution, level 3" in shown
+    assert len(shown.split("\r")[-1].split("|")[1]) == 20
+
+
+def test_runs_one_after_another_begin_anew(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+    with show_run() as show:
+        for _ in range(2):
+            for done in (0, 500, 1000):
+                show(standing(done, resumed=0))
+                clock[0] += 10.0
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 6
+    assert lines[4].startswith("500 of 1000 hits, 50 hits/s, 10 s left")

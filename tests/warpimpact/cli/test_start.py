@@ -113,7 +113,7 @@ def test_bash_completes_commands_and_options(capsys: pytest.CaptureFixture[str])
     [
         ([], "64 of 64 hits", "warpimpact.solver"),
         (["-q"], "", "of 64 hits"),
-        (["-v"], "warpimpact.solver.promise: pilot at level", "warpimpact.solver.device"),
+        (["-v"], "warpimpact.solver.pilot: pilot at level", "warpimpact.solver.device"),
         (["-vv"], "warpimpact.solver.device: march on cpu: loaded in", "nothing of the kind"),
     ],
 )

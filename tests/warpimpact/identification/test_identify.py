@@ -10,7 +10,7 @@ import xarray
 from warpimpact.cli import main
 from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.identify import Standing, identify_to_file, rounds
+from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
 from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.reading import fit_from
 from warpimpact.identification.text import posterior_text
@@ -84,7 +84,7 @@ def test_figures_are_drawn(posterior: Path) -> None:
 def test_a_resumed_fit_equals_an_undisturbed_one(posterior: Path, make_fit: FitMaker, tmp_path: Path) -> None:
     fit, path = make_fit(SMALL), tmp_path / "posterior.nc"
 
-    def stop(standing: Standing) -> None:
+    def stop(standing: FitProgress) -> None:
         if standing.done >= 64 and not standing.resumed:
             raise KeyboardInterrupt
 
@@ -94,7 +94,7 @@ def test_a_resumed_fit_equals_an_undisturbed_one(posterior: Path, make_fit: FitM
         identify_to_file(fit, path, device="cpu")
     with pytest.raises(OutputError, match="cannot be resumed: fit was"):
         identify_to_file(make_fit(SMALL, ("600 m/s", "601 m/s")), path, device="cpu", resume=True)
-    standings: list[Standing] = []
+    standings: list[FitProgress] = []
     identify_to_file(fit, path, device="cpu", resume=True, progress=standings.append)
     assert standings[-1].resumed >= 64
     one, other = files.read(posterior), files.read(path)

@@ -33,7 +33,7 @@ def history_of(resistance: float = 2.6e9, standoff_point: str = "centre_of_mass"
         ),
         impact=Impact(velocity=600.0, obliquity=17, azimuth=40),
         hits=Hits(count=2),
-        numerics=Numerics(fidelity="draft"),
+        numerics=Numerics(level=0),
         output={"standoffs": (0.05, 0.13), "standoff_point": standoff_point},
     )
     return replay(run(campaign, device="cpu"), 1, folder=Path())

@@ -16,7 +16,8 @@ from warpimpact import Campaign
 from warpimpact.cli import main
 from warpimpact.runs.cluster import _compute_alike, _How, _looked_at, cluster_team
 from warpimpact.runs.compute import HitMap
-from warpimpact.runs.run import Standing, run_to_file
+from warpimpact.runs.run import RunProgress, run_to_file
+from warpimpact.runs.task import Task
 from warpimpact.runs.team import ClusterError
 from warpimpact.solver.device import DeviceError
 
@@ -42,7 +43,7 @@ resistance = "3 GPa"
 [impact]
 velocity = "500 m/s"
 [hits]
-count = 300
+count = 72
 [numerics]
 fidelity = "draft"
 """
@@ -74,7 +75,7 @@ def test_a_killed_worker_costs_nothing(
     victim = next(iter(workers.values()))
     killed_at = []
 
-    def kill_one(standing: Standing) -> None:
+    def kill_one(standing: RunProgress) -> None:
         if standing.saved >= 512 and not killed_at:
             os.kill(victim, signal.SIGKILL)
             killed_at.append(standing.done)
@@ -102,9 +103,10 @@ def test_the_command_starts_workers_and_a_local_run_resumes_them(
 
 
 def test_limits_on_workers_are_those_of_a_local_search(
-    tmp_path: Path, assert_same_bits: Callable[[Path, Path], None]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, assert_same_bits: Callable[[Path, Path], None]
 ) -> None:
     # Workers search their shards apart. The promise of the pilot goes to all of them.
+    monkeypatch.setattr("warpimpact.runs.shards.FEWEST", 32)
     path, output, local = tmp_path / "campaign.toml", tmp_path / "a.nc", tmp_path / "local.nc"
     path.write_text(LAYERED_LIMIT, encoding="utf-8")
     command = ["limit", str(path), "--quantity", "thickness", "--layer", "1", "--device", "cpu"]
@@ -129,7 +131,7 @@ def test_a_mistake_on_a_worker_is_told_and_leaves_nothing(
 def test_workers_that_would_compute_other_bits_are_refused(campaign: Campaign) -> None:
     kind = {"warpimpact_version": "0.0.0", "warp_version": "1", "device": "cpu"}
     with pytest.raises(DeviceError, match=r'the workers differ: warpimpact_version is "0.0.0" on one and'):
-        _compute_alike(HitMap(), campaign, None, campaign.sampler().shots(0, 1), None, _How("cpu", None, kind))
+        _compute_alike(HitMap(), campaign, Task(campaign.sampler().shots(0, 1)), _How("cpu", None, kind))
 
 
 def test_the_ligament_of_a_mask_is_found_once_for_all_workers(
@@ -158,7 +160,7 @@ def test_a_lost_scheduler_is_told_with_the_way_to_resume(
     """A client whose scheduler is killed raises one of these where it waits."""
     error = {"closed": distributed.comm.CommClosedError("in <TCP>"), "cancelled": CancelledError()}[lost]
 
-    def lose_it(_: Standing) -> None:
+    def lose_it(_: RunProgress) -> None:
         raise error
 
     output = tmp_path / "a.nc"
@@ -181,7 +183,7 @@ def test_a_scheduler_that_is_lost_between_tasks_is_told(
     def lose_it(*_: object, **__: object) -> None:
         raise error
 
-    def lose_all(_: Standing) -> None:
+    def lose_all(_: RunProgress) -> None:
         monkeypatch.setattr(distributed.Client, request_, lose_it)
 
     team = cluster_team(campaign, address=cluster.scheduler_address, device="cpu")

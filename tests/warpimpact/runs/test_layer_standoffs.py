@@ -156,7 +156,7 @@ def test_a_replay_shows_the_core_between_the_layers(result: xarray.Dataset) -> N
 def test_a_plate_alone_has_no_stand_offs_behind_layers() -> None:
     front, _, behind = CAMPAIGN.partition("[[layer]]")
     alone = front + behind[behind.index("[impact]") :]
-    with pytest.raises(CampaignError, match=r"got output.layer_standoffs without \[\[layer\]\]"):
+    with pytest.raises(CampaignError, match=r"output.layer_standoffs needs \[\[layer\]\]"):
         campaign(alone)
 
 

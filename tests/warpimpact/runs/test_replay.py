@@ -30,7 +30,7 @@ HOLES = Plate(
     pattern=CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3)),
 )
 STRAIGHT, SLANTED = Impact(velocity=825.0), Impact(velocity=600.0, obliquity=17, azimuth=40, yaw=6, spin=1e4)
-DRAFT = Numerics(fidelity="draft")
+DRAFT = Numerics(level=0)
 
 
 def campaign(**changes: Any) -> Campaign:
@@ -51,7 +51,7 @@ def stored(result: xarray.Dataset, path: Path) -> xarray.Dataset:
     [
         (STRAIGHT, DRAFT, HOLES, Status.PERFORATED),
         (SLANTED, DRAFT, HOLES, Status.PERFORATED),
-        (SLANTED, Numerics(fidelity="draft", precision="double"), HOLES, Status.PERFORATED),
+        (SLANTED, Numerics(level=0, precision="double"), HOLES, Status.PERFORATED),
         (SLANTED, Numerics(scheme="nodal", grid_spacing=5e-5), HOLES, Status.PERFORATED),
         (STRAIGHT, DRAFT, HOLES.model_copy(update={"resistance": 1e11}), Status.ARRESTED),
         (Impact(velocity=300.0, obliquity=75), DRAFT, HOLES, Status.RICOCHETED),
@@ -74,7 +74,7 @@ def test_replay_ends_with_the_bits_of_the_stored_outcome(
 @pytest.fixture(scope="module")
 def result() -> xarray.Dataset:
     """Slanted hits in double precision, computed on the CPU."""
-    numerics = Numerics(fidelity="draft", precision="double")
+    numerics = Numerics(level=0, precision="double")
     return run(campaign(impact=SLANTED, numerics=numerics), device="cpu")
 
 

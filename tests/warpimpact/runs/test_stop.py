@@ -15,7 +15,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, Standing, _Held, _Watch, run, run_to_file
+from warpimpact.runs.run import Interrupted, RunProgress, _Watch, run, run_to_file
+from warpimpact.runs.shards import Shards
 from warpimpact.statistics.intervals import estimate_of
 
 SameBits = Callable[[Path, Path], None]
@@ -88,7 +89,7 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
     held, ends = 0, []
     for seed in range(TRIALS):
         reseeded = scene.model_copy(update={"hits": scene.hits.model_copy(update={"seed": seed})})
-        watch = _Watch(reseeded, 2**16, _Held(256))
+        watch = _Watch(reseeded, 2**16, Shards(256))
         values = surface(reseeded, 0, 2**14)
         while watch.end is None:
             watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
@@ -110,7 +111,7 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
         ("mean(deflection@130mm)", "1 deg", 'stop.quantity: got "deflection", which has no stand-off'),
         ("mean(tilt@100mm)", "1 deg", "got stop.quantity at 0.1 m, but output.standoffs are 0.05 m, 0.13 m"),
         ("P(tilt@130mm > 30 m)", "0.01", 'stop.quantity: got "30 m", which is not an angle'),
-        ("P(broken)", "0.01", 'got stop.quantity = "P(broken)", but that needs'),
+        ("P(broken)", "0.01", 'stop.quantity = "P(broken)" needs core.strength'),
         ("quantile(deflection, 1.5)", "1 deg", "stop.quantity: got the quantile 1.5, but it must lie between 0 and 1"),
         ("mean(residual_velocity)", "1 deg", 'stop.half_width: got "1 deg", which is not a speed'),
         ("mean(residual_velocity)", "-1 m/s", 'stop.half_width: got "-1 m/s", but it must be greater than 0'),
@@ -130,7 +131,7 @@ def test_a_rule_takes_the_place_of_the_count(tmp_path: Path) -> None:
     assert again.model_dump() == scene.model_dump()
     with pytest.raises(CampaignError, match=r"got hits.count = 7 beside stop.max_count = 3000"):
         campaign(tmp_path, "mean(residual_velocity)", "1 m/s", max_count=3000, count="7\nseed = 1")
-    with pytest.raises(CampaignError, match=r'got stop beside hits.sampling = "grid"'):
+    with pytest.raises(CampaignError, match=r'\[stop\] cannot be combined with hits.sampling = "grid"'):
         campaign(tmp_path, "mean(residual_velocity)", "1 m/s", sampling='"grid"')
 
 
@@ -145,7 +146,7 @@ def test_a_run_stops_at_the_same_shot_however_it_was_computed(tmp_path: Path, as
     share = np.array([(dataset["tilt"].values[r::16, 1] > 30.0).mean() for r in range(16)])
     assert told["estimate"] == pytest.approx(share.mean(), rel=1e-12)
 
-    def interrupt(standing: Standing) -> None:
+    def interrupt(standing: RunProgress) -> None:
         if standing.saved >= 256:
             raise KeyboardInterrupt
 

@@ -20,7 +20,7 @@ from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.runs import compute as computing
 from warpimpact.runs import shards
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, Standing, run_to_file
+from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
@@ -41,7 +41,7 @@ ROUNDING = {"m s-1": 1e-10, "degree": 1e-10, "rad s-1": 1e-8, "J": 1e-9, "s": 1e
 def campaign(pattern: Any = SLOTS, impact: Impact = STRAIGHT, count: int = 32, **changes: Any) -> Campaign:
     plate = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05, degradation=0.8, pattern=pattern)
     usual: dict[str, Any] = {"title": "a test", "core": CORE, "plate": plate, "impact": impact}
-    usual |= {"numerics": Numerics(fidelity="draft", precision="double"), "output": Output(solid_reference=False)}
+    usual |= {"numerics": Numerics(level=0, precision="double"), "output": Output(solid_reference=False)}
     return Campaign(**usual | {"hits": Hits(count=count, seed=2, irreducible=True)} | changes)
 
 
@@ -126,7 +126,7 @@ def test_a_finite_plate_is_unfolded_by_mirror_images(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("impact", [STRAIGHT, PITCHED], ids=["straight", "pitched"])
 def test_every_image_replays_to_the_bits_of_its_outcome(impact: Impact, tmp_path: Path) -> None:
-    scene = campaign(impact=impact, count=16, numerics=Numerics(fidelity="draft"))
+    scene = campaign(impact=impact, count=16, numerics=Numerics(level=0))
     files.write(run(scene, device="cpu"), tmp_path / "a.nc")
     stored = files.read(tmp_path / "a.nc")
     for hit in range(8, 16):
@@ -169,6 +169,7 @@ def common(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return at, of
 
 
+@pytest.mark.usefixtures("unrendered")
 def test_the_command_tells_what_was_computed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,9 +196,9 @@ def test_an_unfolded_run_is_streamed_resumed_and_replayed(
     tmp_path: Path, small_shards: None, assert_same_bits: Callable[[Path, Path], None]
 ) -> None:
     scatter = Scatter(velocity={"distribution": "normal", "mean": "820 m/s", "std": "10 m/s"})
-    scene = campaign(count=1100, numerics=Numerics(fidelity="draft"), scatter=scatter)  # 137 orbits
+    scene = campaign(count=1100, numerics=Numerics(level=0), scatter=scatter)  # 137 orbits
 
-    def interrupt(standing: Standing) -> None:
+    def interrupt(standing: RunProgress) -> None:
         assert standing.total == 1096
         if standing.saved >= shards.FEWEST:
             raise KeyboardInterrupt
@@ -226,7 +227,7 @@ def test_an_unfolded_run_is_streamed_resumed_and_replayed(
 def test_a_stop_rule_counts_a_hit_and_its_images_once(sampling: str, small_shards: None) -> None:
     rule = Stop(quantity="mean(residual_velocity)", half_width="3 m/s", max_count=8192)
     hits = Hits(sampling=sampling, count=8192, seed=3, irreducible=True)
-    scene = campaign(hits=hits, numerics=Numerics(fidelity="draft"), stop=rule)
+    scene = campaign(hits=hits, numerics=Numerics(level=0), stop=rule)
     result = run(scene, device="cpu")
     assert 256 < result.sizes["hit"] < 8192
     computed = Tally(rule.measure, replicates=scene.replicates)

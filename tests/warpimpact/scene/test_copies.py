@@ -204,7 +204,7 @@ def test_a_plate_of_a_comparison_can_be_changed() -> None:
 
 def test_a_campaign_changed_to_what_cannot_be_is_refused(folder: Path) -> None:
     campaign = read(folder, SCATTERED)
-    with pytest.raises(ValidationError, match=r"got stop beside hits.sampling"):
+    with pytest.raises(ValidationError, match=r"\[stop\] cannot be combined with hits.sampling"):
         campaign.model_copy(update={"hits": Hits(sampling="grid", count=64)})
     with pytest.raises(ValidationError, match=r"got output.standoffs of 0.001 m"):
         read(folder, PLAIN).model_copy(update={"output": {"standoffs": ["1 mm"]}})

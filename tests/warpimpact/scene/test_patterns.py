@@ -203,7 +203,7 @@ def test_to_the_rim_counts_what_the_rim_leaves_whole() -> None:
     assert CIRCLE.ligament((4 * MM, 4 * MM)) == math.inf  # no plate is left around it
 
 
-@settings(deadline=None, max_examples=10)
+@settings(deadline=None, max_examples=5)
 @given(pattern=st.deferred(lambda: lattices()), sides=st.tuples(*[st.integers(50, 70)] * 2))
 def test_whole_cells_more_change_no_ligament(pattern: LatticePattern, sides: tuple[int, int]) -> None:
     odd = [(side + 0.12345) * MM for side in sides]  # no hole of round numbers just touches the rim

@@ -101,5 +101,5 @@ def test_hits_cover_the_cell_or_all_of_a_finite_plate() -> None:
         assert (np.ptp(shots.hit_y), np.ptp(shots.hit_z)) == pytest.approx(extent, rel=2e-3)
     solid = plate.is_solid(shots.hit_y, shots.hit_z)
     assert solid.mean() == pytest.approx(1 - plate.open_area, abs=5e-3)
-    with pytest.raises(ValueError, match=r'got hits.area = "plate" without plate.size, but only a'):
+    with pytest.raises(ValueError, match=r'hits.area = "plate" needs plate.size: only a'):
         make_shots(impact, Hits(count=4, area="plate"), Plate(**STEEL, pattern=SLOTS))

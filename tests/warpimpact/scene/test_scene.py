@@ -53,7 +53,7 @@ def test_a_plate_alone_is_a_target() -> None:
         ),
         (
             {"core": CORE.model_copy(update={"centre_of_mass": 15e-3}), "record": {"bending": True}},
-            "got bending = true beside core.centre_of_mass, but a bending moment needs the mass of every slice",
+            "output.bending = true cannot be combined with core.centre_of_mass: it needs the mass of every slice",
         ),
     ],
 )
@@ -65,7 +65,7 @@ def test_what_cannot_be_is_refused(changes: dict[str, Any], complaint: str) -> N
 
 def test_simulate_gives_what_a_campaign_of_the_same_scene_gives() -> None:
     assert warpimpact.simulate is simulate
-    standoffs, numerics = (0.05, 0.13), Numerics(fidelity="draft")
+    standoffs, numerics = (0.05, 0.13), Numerics(level=0)
     impact, hits = Impact(velocity=825.0, obliquity=12), Hits(count=4)
     campaign = Campaign(title="", core=CORE, plate=PLATE, impact=impact, hits=hits, numerics=numerics)
     scene = Scene(core=CORE, target=PLATE, record=Record(standoffs=standoffs))
@@ -78,7 +78,7 @@ def test_simulate_gives_what_a_campaign_of_the_same_scene_gives() -> None:
 
 def test_a_scene_without_standoffs_records_none() -> None:
     shots = make_shots(Impact(velocity=825.0), Hits(count=2), PLATE)
-    outcomes = simulate(Scene(core=CORE, target=PLATE), shots, numerics=Numerics(fidelity="draft"), device="cpu")
+    outcomes = simulate(Scene(core=CORE, target=PLATE), shots, numerics=Numerics(level=0), device="cpu")
     assert outcomes.tilt.shape == (2, 0)
     assert (outcomes.residual_velocity > 0.0).all()
 

@@ -1,5 +1,6 @@
 """The block layout on request: what it takes, what it refuses, and windows that do not fit a block."""
 
+import re
 from typing import Any
 
 import numpy as np
@@ -7,12 +8,12 @@ import pytest
 
 from warpimpact.scene import Impact, Layer, Numerics, Plate, PolynomialCore, Record, Scene, Shots, Target
 from warpimpact.solver import blocks, simulate
-from warpimpact.solver.arrays import arrays_of
-from warpimpact.solver.resolution import LADDER, level
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.resolution import LADDER, at_level
 
 CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation=0.8, degradation_interval=1e-6)
-BLOCK = Numerics(layout="block")
+SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
 
 
 def shots_of(count: int = 3, at_a_plate: int = 1, **columns: float) -> Shots:
@@ -25,23 +26,22 @@ def shots_of(count: int = 3, at_a_plate: int = 1, **columns: float) -> Shots:
 
 @pytest.mark.parametrize("index", [0, 2, 4])
 def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
-    arrays = arrays_of(Scene(core=CORE, target=PLATE), level(index, BLOCK), shots_of())
-    nodes = blocks.first_window(arrays, shots_of()) ** 2
-    assert arrays.variant.window == min(size for size in blocks.SIZES if size >= nodes)
+    prepared = prepare(Scene(core=CORE, target=PLATE), shots_of(), at_level(index, BLOCK))
+    assert prepared.variant.window == min(size for size in blocks.SIZES if size >= prepared.cells**2)
     assert 2 * 4 * max(blocks.SIZES) <= 48 * 1024
 
 
-def test_fidelities_of_a_pilot_keep_the_layout() -> None:
-    assert level(2, BLOCK).block
-    assert not level(2, Numerics()).block
-    assert arrays_of(Scene(core=CORE, target=PLATE), level(3, BLOCK), shots_of()).variant.window
+def test_levels_of_a_pilot_keep_the_layout() -> None:
+    assert at_level(2, BLOCK).layout == "block"
+    assert at_level(2, SIMPLE).layout == "simple"
+    assert prepare(Scene(core=CORE, target=PLATE), shots_of(), at_level(3, BLOCK)).variant.window
 
 
 def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
     shots = shots_of(obliquity=1.2)
-    assert not arrays_of(Scene(core=CORE, target=PLATE), BLOCK, shots).variant.window
-    assert not arrays_of(Scene(core=CORE, target=PLATE), level(len(LADDER) - 1, BLOCK), shots_of()).variant.window
-    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (None, BLOCK))
+    assert not prepare(Scene(core=CORE, target=PLATE), shots, BLOCK).variant.window
+    assert not prepare(Scene(core=CORE, target=PLATE), shots_of(), at_level(len(LADDER) - 1, BLOCK)).variant.window
+    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
 
 
@@ -50,7 +50,7 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
 ) -> None:
     monkeypatch.setattr(blocks, "WINDOW_SLACK", 1.02)
     shots = shots_of(pitch=0.03)
-    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (None, BLOCK))
+    simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.status, simple.status)
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
 
@@ -58,16 +58,16 @@ def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_l
 @pytest.mark.parametrize(
     ("scene", "numerics", "shots", "words"),
     [
-        ({}, {"precision": "double"}, {}, "double precision"),
-        ({}, {"scheme": "nodal"}, {}, "the nodal scheme"),
-        ({"record": Record(bending=True)}, {}, {}, "the bending moment"),
-        ({"target": Target(layers=(PLATE, Layer(**PLATE.model_dump())))}, {}, {}, "layers"),
-        ({}, {}, {"count": 4, "at_a_plate": 2}, "several shots at one plate"),
+        ({}, {"precision": "double"}, {}, 'numerics.precision = "double"'),
+        ({}, {"scheme": "nodal"}, {}, 'numerics.scheme = "nodal"'),
+        ({"record": Record(bending=True)}, {}, {}, "output.bending = true"),
+        ({"target": Target(layers=(PLATE, Layer(**PLATE.model_dump())))}, {}, {}, "[[layer]]"),
+        ({}, {}, {"count": 4, "at_a_plate": 2}, "[burst]"),
     ],
 )
 def test_what_a_block_does_not_compute_is_refused(
     scene: dict[str, Any], numerics: dict[str, Any], shots: dict[str, int], words: str
 ) -> None:
     whole = Scene(**{"core": CORE, "target": PLATE} | scene)
-    with pytest.raises(ValueError, match=f'got numerics.layout = "block" beside {words}, but it must be "simple"'):
+    with pytest.raises(ValueError, match=re.escape(f'numerics.layout = "block" cannot be combined with {words}: a')):
         simulate.simulate(whole, shots_of(**shots), numerics=Numerics(layout="block", **numerics))

@@ -9,16 +9,20 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import CirclePattern, Layer, OgiveCore, Plate, Scene, Shots, Target
+from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
-from warpimpact.solver.limit import limit_thickness, limit_velocity
+from warpimpact.solver.limit import Sought, limit_thickness, limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.simulate import simulate
+from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
 Array = NDArray[np.float64]
 
 CORE = OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, shear_coefficient=0.05)
+SCENE = Scene(core=CORE, target=PLATE)
+STANDARD = Numerics(level=2)
 
 
 def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
@@ -32,22 +36,24 @@ def test_parameters_of_a_shot_count() -> None:
         "thickness": np.array([4e-3, 4e-3, 1e-3]),
         "shear_coefficient": np.full(3, 0.05),
     }
-    value = limit_velocity(Scene(core=CORE, target=PLATE), shots(3, **own), tolerance=0.5, device="cpu").value
+    value = limit_velocity(SCENE, shots(3, **own), numerics=STANDARD, tolerance=0.5, device="cpu").value
     # ½ m v² ∝ Y h in a solid plate; the standard fidelity is within 2 % of that.
     assert value / value[0] == pytest.approx([1.0, 0.5, 0.5], rel=0.02)
 
 
 @pytest.mark.parametrize("velocity", [10.0, 300.0, 3000.0])
 def test_at_most_fourteen_runs_from_any_start(velocity: float) -> None:
-    scene = Scene(core=CORE, target=PLATE)
-    limits = limit_velocity(scene, shots(2, velocity), device="cpu")
+    scene = SCENE
+    limits = limit_velocity(scene, shots(2, velocity), numerics=STANDARD, device="cpu")
     assert (limits.runs <= MOST_RUNS).all()
     assert limits.converged.all()
-    assert limits.value == pytest.approx(limit_velocity(scene, shots(2), device="cpu").value, abs=1.0)
+    assert limits.value == pytest.approx(
+        limit_velocity(scene, shots(2), numerics=STANDARD, device="cpu").value, abs=1.0
+    )
 
 
 def test_a_tolerance_beyond_reach_ends_after_fourteen_runs() -> None:
-    limits = limit_velocity(Scene(core=CORE, target=PLATE), shots(1), tolerance=1e-9, device="cpu")
+    limits = limit_velocity(SCENE, shots(1), numerics=STANDARD, tolerance=1e-9, device="cpu")
     assert limits.runs.tolist() == [MOST_RUNS]
     assert not limits.converged.any()
     assert limits.lower < limits.value < limits.upper
@@ -56,7 +62,9 @@ def test_a_tolerance_beyond_reach_ends_after_fourteen_runs() -> None:
 def test_what_touches_nothing_has_no_limit_to_search() -> None:
     holes = PLATE.model_copy(update={"pattern": CirclePattern(diameter=12e-3, spacing=(20e-3, 20e-3))})
     scene = Scene(core=CORE, target=holes)
-    velocity, thickness = (search(scene, shots(1), device="cpu") for search in (limit_velocity, limit_thickness))
+    velocity, thickness = (
+        search(scene, shots(1), numerics=STANDARD, device="cpu") for search in (limit_velocity, limit_thickness)
+    )
     assert (velocity.value.item(), velocity.lower.item(), velocity.upper.item()) == (0.0, 0.0, 0.0)
     assert thickness.value.item() == thickness.lower.item() == np.inf
     for limits in (velocity, thickness):
@@ -66,10 +74,12 @@ def test_what_touches_nothing_has_no_limit_to_search() -> None:
 
 def test_a_limit_beyond_the_largest_value_tried_is_infinite() -> None:
     strong = PLATE.model_copy(update={"thickness": 0.2})
-    velocity = limit_velocity(Scene(core=CORE, target=strong), shots(1), highest=1000.0, device="cpu")
+    velocity = limit_velocity(
+        Scene(core=CORE, target=strong), shots(1), numerics=STANDARD, highest=1000.0, device="cpu"
+    )
     assert (velocity.value.item(), velocity.lower.item(), velocity.upper.item()) == (np.inf, 1000.0, np.inf)
     thin = PLATE.model_copy(update={"thickness": 0.1e-3})
-    thickness = limit_thickness(Scene(core=CORE, target=thin), shots(1), device="cpu")
+    thickness = limit_thickness(Scene(core=CORE, target=thin), shots(1), numerics=STANDARD, device="cpu")
     assert (thickness.value.item(), thickness.lower.item(), thickness.upper.item()) == (np.inf, 1.6e-3, np.inf)
     assert velocity.converged.item()
     assert thickness.converged.item()
@@ -79,8 +89,8 @@ def test_thickness_of_a_layer_of_its_own() -> None:
     # Solid plates far apart take their work one after the other: what the front leaves to do is done by the base.
     base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
     scene = Scene(core=CORE, target=Target(layers=(PLATE, base)))
-    alone = limit_thickness(Scene(core=CORE, target=PLATE), shots(1), device="cpu").value.item()
-    behind = limit_thickness(scene, shots(1), layer=1, device="cpu")
+    alone = limit_thickness(SCENE, shots(1), numerics=STANDARD, device="cpu").value.item()
+    behind = limit_thickness(scene, shots(1), numerics=STANDARD, layer=1, device="cpu")
     assert behind.converged.all()
     assert behind.value.item() == pytest.approx(alone - 4e-3, rel=0.03)
     assert behind.shots.own_of(scene.target, "thickness", 1).item() == behind.lower.item()
@@ -89,9 +99,9 @@ def test_thickness_of_a_layer_of_its_own() -> None:
 def test_the_limit_velocity_of_a_target_of_layers_adds_their_work() -> None:
     base = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
     scene = Scene(core=CORE, target=Target(layers=(PLATE, base)))
-    whole = limit_velocity(scene, shots(1), device="cpu").value.item()
+    whole = limit_velocity(scene, shots(1), numerics=STANDARD, device="cpu").value.item()
     parts = [
-        limit_velocity(Scene(core=CORE, target=PLATE), shots(1, thickness=np.full(1, h)), device="cpu").value.item()
+        limit_velocity(SCENE, shots(1, thickness=np.full(1, h)), numerics=STANDARD, device="cpu").value.item()
         for h in (4e-3, 3e-3)
     ]
     assert whole == pytest.approx(np.hypot(*parts), rel=0.01)
@@ -105,7 +115,7 @@ def test_a_layer_that_weakens_by_time_is_refused() -> None:
 
 def test_a_plate_without_resistance_is_passed_at_any_velocity() -> None:
     weak = PLATE.model_copy(update={"resistance": 0.0})
-    limits = limit_velocity(Scene(core=CORE, target=weak), shots(1), device="cpu")
+    limits = limit_velocity(Scene(core=CORE, target=weak), shots(1), numerics=STANDARD, device="cpu")
     assert limits.value.item() < 1.0
     assert limits.converged.item()
 
@@ -114,7 +124,7 @@ def test_a_shot_does_not_depend_on_its_neighbours() -> None:
     plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
     scene, rng = Scene(core=CORE, target=plate), np.random.default_rng(1)
     many = replace(shots(40), hit_y=rng.uniform(-4e-3, 4e-3, 40), hit_z=rng.uniform(-4e-3, 4e-3, 40))
-    together = limit_velocity(scene, many, device="cpu", threads=2)
+    together = limit_velocity(scene, many, numerics=STANDARD, device="cpu", threads=2)
     alone = limit_velocity(scene, many[np.arange(30, 40)], device="cpu", threads=1)
     assert np.array_equal(together.value[30:], alone.value)
     assert np.array_equal(together.outcomes.tilt[30:], alone.outcomes.tilt, equal_nan=True)
@@ -125,29 +135,31 @@ def test_a_shot_does_not_depend_on_its_neighbours() -> None:
 def test_a_plate_that_weakens_by_time_is_refused(search: object) -> None:
     weakening = PLATE.model_copy(update={"degradation": 0.8})
     with pytest.raises(ValueError, match=r"stops no core.*give degradation_distance in its place"):
-        search(Scene(core=CORE, target=weakening), shots(1))
+        search(Scene(core=CORE, target=weakening), shots(1), numerics=STANDARD)
     with pytest.raises(ValueError, match="degradation_distance"):
-        search(Scene(core=CORE, target=PLATE), shots(2, degradation=np.array([1.0, 0.9])))
+        search(SCENE, shots(2, degradation=np.array([1.0, 0.9])), numerics=STANDARD)
 
 
-def test_progress_counts_the_searches_that_have_ended_and_may_end_the_computation() -> None:
+def test_progress_counts_the_searches_that_have_ended() -> None:
     told: list[tuple[int, int]] = []
-    limit_velocity(Scene(core=CORE, target=PLATE), shots(3), device="cpu", progress=lambda *done: told.append(done))
+    limit_velocity(SCENE, shots(3), numerics=STANDARD, device="cpu", progress=lambda *done: told.append(done))
     assert told[-1] == (3, 3)
     assert told == sorted(told)
 
-    def end(done: int, total: int) -> None:
-        raise InterruptedError
 
-    with pytest.raises(InterruptedError):
-        limit_velocity(Scene(core=CORE, target=PLATE), shots(3), device="cpu", progress=end)
+def test_a_search_that_is_cancelled_ends() -> None:
+    cancel = Cancel()
+    cancel.cancel()
+    with pytest.raises(Cancelled):
+        limit.limits(SCENE, shots(3), Sought("velocity", 1.0, 3000.0), STANDARD, Worker("cpu", cancel=cancel))
 
 
 def outcomes_by(end: Callable[[Shots], tuple[Array, Array]]) -> Callable[..., Outcomes]:
-    """A `simulate` with status and residual velocity [m/s] by a formula."""
-    base = simulate(Scene(core=CORE, target=PLATE), shots(1), device="cpu")
+    """A `computed` with status and residual velocity [m/s] by a formula."""
+    base = simulate(SCENE, shots(1), numerics=STANDARD, device="cpu")
 
-    def ended(scene: Scene, some: Shots, **_: object) -> Outcomes:
+    def ended(prepared: Prepared, *_: object) -> Outcomes:
+        some = prepared.shots
         status, speed = end(some)
         columns = {name: np.repeat(column, len(some), axis=0) for name, column in vars(base).items()}
         return Outcomes(**columns | {"status": status.astype(np.int8), "residual_velocity": speed})
@@ -164,8 +176,8 @@ def test_a_run_that_fails_far_from_the_limit_spoils_nothing(monkeypatch: pytest.
         speed[lost] = np.nan
         return status, speed
 
-    monkeypatch.setattr(limit, "simulate", outcomes_by(end))
-    found = limit_velocity(Scene(core=CORE, target=PLATE), shots(2, 825.0))
+    monkeypatch.setattr(limit, "computed", outcomes_by(end))
+    found = limit_velocity(SCENE, shots(2, 825.0), numerics=STANDARD)
     assert found.converged.all()
     assert found.value == pytest.approx([775.0] * 2, abs=1.0)
     assert (found.outcomes.status == Status.PERFORATED).all()
@@ -177,8 +189,8 @@ def test_a_run_that_fails_beside_the_limit_leaves_none(monkeypatch: pytest.Monke
         status = np.where(passes, Status.PERFORATED, np.where(some.velocity > 700.0, Status.NOT_FINITE, 1))
         return status, np.where(passes, 100.0, 0.0)
 
-    monkeypatch.setattr(limit, "simulate", outcomes_by(end))
-    found = limit_velocity(Scene(core=CORE, target=PLATE), shots(1))
+    monkeypatch.setattr(limit, "computed", outcomes_by(end))
+    found = limit_velocity(SCENE, shots(1), numerics=STANDARD)
     assert np.isnan(found.value.item())
     assert not found.converged.item()
     assert found.outcomes.status.item() == Status.NOT_FINITE
@@ -193,7 +205,7 @@ def test_a_speed_that_grows_with_the_thickness_does_not_creep(monkeypatch: pytes
         speed = np.where(passes, 150.0 * (some.thickness[:, 0] / 4e-3) ** 0.5, 0.0)
         return np.where(passes, Status.PERFORATED, Status.ARRESTED), speed
 
-    monkeypatch.setattr(limit, "simulate", outcomes_by(end))
-    found = limit_thickness(Scene(core=CORE, target=PLATE), shots(1), tolerance=0.1e-3)
+    monkeypatch.setattr(limit, "computed", outcomes_by(end))
+    found = limit_thickness(SCENE, shots(1), numerics=STANDARD, tolerance=0.1e-3)
     assert found.converged.item()
     assert found.value.item() == pytest.approx(40e-3, abs=0.1e-3)

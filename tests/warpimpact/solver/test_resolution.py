@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from warpimpact.scene import (
     Impact,
@@ -14,25 +15,57 @@ from warpimpact.scene import (
 )
 from warpimpact.solver import materials
 from warpimpact.solver.materials import onset_jump
-from warpimpact.solver.resolution import FASTEST_DECAY, FIDELITIES, NODAL, SLENDER, WEAKENING, decay_rate, resolve
+from warpimpact.solver.resolution import (
+    FASTEST_DECAY,
+    LADDER,
+    NODAL,
+    SLENDER,
+    WEAKENING,
+    Resolution,
+    decay_rate,
+    resolve,
+)
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 SCENE = Scene(core=PAPER, target=PLATE)
 
 
-@pytest.mark.parametrize("name", FIDELITIES)
-def test_fidelity_fills_in_what_is_not_given(name: str) -> None:
-    fidelity = FIDELITIES[name]
-    resolution = resolve(Numerics(fidelity=name), SCENE)
+def resolved(**numerics: Any) -> Resolution:
+    return resolve(SCENE, Numerics(**numerics), [True])
+
+
+@pytest.mark.parametrize("index", range(len(LADDER)))
+def test_a_level_fills_in_what_is_not_given(index: int) -> None:
+    level, resolution = LADDER[index], resolved(level=index)
     assert not resolution.nodal
+    assert not resolution.double
     assert resolution.time_step is None
-    assert (resolution.patches_axial, resolution.patches_around) == (
-        fidelity.patches_axial,
-        fidelity.patches_around,
-    )
-    assert resolution.grid_spacing == pytest.approx(0.6e-3 / fidelity.cells_per_length)
-    assert resolution.double is fidelity.double
+    assert (resolution.patches_axial, resolution.patches_around) == (level.patches_axial, level.patches_around)
+    assert resolution.grid_spacing == pytest.approx(0.6e-3 / level.cells_per_length)
+    assert resolution.travel == level.travel
+
+
+@pytest.mark.parametrize(("fidelity", "index"), [("draft", 0), ("standard", 2), ("reference", 4)])
+def test_a_single_setting_goes_with_the_coarsest_level_of_a_fidelity(fidelity: str, index: int) -> None:
+    assert resolved(fidelity=fidelity, patches_axial=20) == resolved(level=index, patches_axial=20)
+
+
+@pytest.mark.parametrize(
+    ("numerics", "words"),
+    [
+        ({"fidelity": "draft", "level": 2}, "got fidelity beside level"),
+        ({"fidelity": "draft", "accuracy": {"tilt": "1 deg"}}, "got fidelity beside accuracy"),
+        ({"accuracy": {"tilt": "1 deg"}, "patches_axial": 20}, "got patches_axial beside accuracy"),
+        ({"travel": 0.1, "time_step": 1e-6}, "got travel beside time_step"),
+        ({"travel": 0.1, "scheme": "nodal"}, "got travel beside scheme"),
+        ({"accuracy": {}}, "at least one of them must be given"),
+        ({"accuracy": {"tilt": "1 deg", "share": 0.995}}, "less than or equal to 0.99"),
+    ],
+)
+def test_a_resolution_is_asked_for_in_one_way(numerics: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValidationError, match=words):
+        Numerics(**numerics)
 
 
 @pytest.mark.parametrize("scheme", ["consistent", "nodal"])
@@ -40,23 +73,22 @@ def test_fidelity_fills_in_what_is_not_given(name: str) -> None:
     ("name", "value"),
     [("time_step", 3e-7), ("patches_axial", 10), ("patches_around", 20), ("grid_spacing", 0.1e-3)],
 )
-def test_single_setting_goes_before_fidelity_and_scheme(name: str, value: float, scheme: str) -> None:
-    given: dict[str, Any] = {"scheme": scheme, "fidelity": "reference"}
-    plain = resolve(Numerics(**given), SCENE)
-    changed = resolve(Numerics(**given, **{name: value}), SCENE)
+def test_single_setting_goes_before_level_and_scheme(name: str, value: float, scheme: str) -> None:
+    given: dict[str, Any] = {"scheme": scheme, "level": 5}
+    plain = resolved(**given)
+    changed = resolved(**given, **{name: value})
     assert getattr(changed, name) == value
     assert {k for k in vars(plain) if getattr(plain, k) != getattr(changed, k)} == {name}
 
 
 @pytest.mark.parametrize(("precision", "double"), [("single", False), ("double", True)])
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_precision_goes_before_fidelity(fidelity: str, precision: str, double: bool) -> None:
-    assert resolve(Numerics(fidelity=fidelity, precision=precision), SCENE).double is double
+def test_precision_goes_before_the_level(precision: str, double: bool) -> None:
+    assert resolved(level=2, precision=precision).double is double
 
 
-@pytest.mark.parametrize("fidelity", FIDELITIES)
-def test_nodal_scheme_has_the_paper_s_own_resolution(fidelity: str) -> None:
-    resolution = resolve(Numerics(scheme="nodal", fidelity=fidelity), SCENE)
+@pytest.mark.parametrize("level", [None, 4])
+def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
+    resolution = resolved(scheme="nodal", level=level)
     assert resolution.nodal
     assert {name: getattr(resolution, name) for name in NODAL} == NODAL
     assert (resolution.patches_axial, resolution.patches_around) == (36, 36)
@@ -64,20 +96,20 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(fidelity: str) -> None:
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
-    way = 800.0 * resolve(Numerics(), SCENE).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
-    standard = FIDELITIES["standard"].travel
+    way = 800.0 * resolved(level=2).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
+    standard = LADDER[2].travel
     np.testing.assert_allclose(way, [standard * 1e-3, standard * SLENDER * PAPER.length])
 
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
-    resolution, velocity = resolve(Numerics(), SCENE), 800.0
+    resolution, velocity = resolved(level=2), 800.0
     free = resolution.step_at(velocity, 0.0, PLATE.thickness, np.inf)
     for degradation, interval in ((1.0, 1e-6), (0.9, 1e-6), (0.05, 1e-6), (0.05, 1e-9), (0.0, 1e-6)):
         plate = PLATE.model_copy(update={"degradation": degradation, "degradation_interval": interval})
         step = resolution.step_of(Impact(velocity=velocity), plate)
         bound = np.inf if degradation == 1.0 else 0.0
         if 0.0 < degradation < 1.0:
-            bound = WEAKENING * FIDELITIES["standard"].travel * interval / -np.log(degradation)
+            bound = WEAKENING * LADDER[2].travel * interval / -np.log(degradation)
         assert step == pytest.approx(min(free, max(bound, 0.25 * free)))
 
 

@@ -18,7 +18,7 @@ from warpimpact.plotting import study_figure
 from warpimpact.results.files import write
 from warpimpact.results.variables import STUDY_COORDINATES, STUDY_VARIABLES
 from warpimpact.scene import Numerics, Shots
-from warpimpact.solver.resolution import FIDELITIES, Fidelity, resolve, spelt_out
+from warpimpact.solver.resolution import Level
 from warpimpact.studies import accuracy as studies
 from warpimpact.studies.accuracy import (
     Answer,
@@ -27,13 +27,14 @@ from warpimpact.studies.accuracy import (
     extrapolated,
     front,
     label,
+    spelt_out,
     study,
 )
 from warpimpact.studies.accuracy_text import advantage, study_text
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
-LADDER = {"coarse": Fidelity(8, 16, 1.0, 0.8), "middle": Fidelity(16, 32, 2.0, 0.4), "fine": Fidelity(32, 64, 4.0, 0.2)}
-LEVELS = (Fidelity(36, 72, 4.0, 0.15), Fidelity(54, 108, 6.0, 0.1))
+LADDER = {"coarse": Level(8, 16, 1.0, 0.8), "middle": Level(16, 32, 2.0, 0.4), "fine": Level(32, 64, 4.0, 0.2)}
+LEVELS = (Level(36, 72, 4.0, 0.15), Level(54, 108, 6.0, 0.1))
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def campaign() -> Campaign:
 @pytest.fixture(scope="module")
 def small(campaign: Campaign) -> xarray.Dataset:
     """A study of three settings and the literal scheme on a coarse grid, 16 hits."""
-    settings = {name: spelt_out(setting, campaign.scene, campaign.impact) for name, setting in LADDER.items()}
+    settings = {name: spelt_out(setting, campaign) for name, setting in LADDER.items()}
     settings["nodal"] = Numerics(scheme="nodal", grid_spacing=5e-5)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(studies, "MEASURED_TIME", 0.0)
@@ -132,34 +133,14 @@ def test_speed_is_that_of_many_hits_without_their_preparation(
 
     monkeypatch.setattr(studies, "simulate", fake)
     monkeypatch.setattr(studies.time, "perf_counter", lambda: clock[0])
-    bench = studies._Bench(campaign, 16, "cpu", lambda done, total: None)
-    bench.expect([Numerics()])
-    _, rate = bench.measure(Numerics())
-    assert 90.0 < rate < 100.0
+    once, twice = spelt_out(LEVELS[0], campaign), spelt_out(studies._doubled(LEVELS[0]), campaign)
+    assert twice == once.model_copy(update={"travel": 2.0 * LEVELS[0].travel})
 
 
-def test_runs_for_the_extrapolation_differ_in_the_time_step_alone(campaign: Campaign) -> None:
-    bench = studies._Bench(campaign, 1, "cpu", lambda done, total: None)
-    once, twice = bench.numerics(LEVELS[0]), bench.numerics(studies._doubled(LEVELS[0]))
-    assert twice == once.model_copy(update={"time_step": 2.0 * once.time_step})
-
-
-def test_spelt_out_fidelities_resolve_as_their_names_do(campaign: Campaign) -> None:
-    impact = campaign.impact
-    for name, fidelity in FIDELITIES.items():
-        named = resolve(Numerics(fidelity=name), campaign.scene)
-        spelt = resolve(spelt_out(fidelity, campaign.scene, impact), campaign.scene)
-        step = named.step_of(impact, campaign.plate)
-        assert spelt.step_of(impact, campaign.plate) == pytest.approx(step, rel=1e-12)
-        assert spelt.time_step == pytest.approx(step, rel=1e-12)
-        for field in ("nodal", "double", "patches_axial", "patches_around", "grid_spacing"):
-            assert getattr(spelt, field) == getattr(named, field)
-
-
-def test_default_settings_hold_fidelities_sweep_and_literal_scheme(campaign: Campaign) -> None:
+def test_default_settings_hold_levels_sweep_and_literal_scheme(campaign: Campaign) -> None:
     settings = default_settings(campaign)
-    assert len(settings) == len(FIDELITIES) + len(studies.SWEEP) + 2
-    assert settings["draft"].fidelity == "draft"
+    assert len(settings) == len(studies.LADDER_LEVELS) + len(studies.SWEEP) + 2
+    assert settings["level 2"] == Numerics(level=2)
     assert settings["nodal, 0.5 µs"] == Numerics(scheme="nodal", time_step=0.5e-6)
     assert label(campaign, settings["8×12, ℓ/0.7, 3.86 µs"]) == "8×12, ℓ/0.7, 3.86 µs"
 
@@ -230,7 +211,7 @@ def test_file_gives_back_what_was_measured(small: xarray.Dataset, tmp_path: Path
 
 def test_progress_ends_with_all_hits_and_never_goes_back(campaign: Campaign) -> None:
     seen: list[tuple[int, int]] = []
-    settings = {"only": spelt_out(LADDER["coarse"], campaign.scene, campaign.impact)}
+    settings = {"only": spelt_out(LADDER["coarse"], campaign)}
     levels = (LADDER["coarse"], LADDER["middle"])
     study(campaign, hits=8, device="cpu", settings=settings, levels=levels, progress=lambda *now: seen.append(now))
     assert seen == sorted(seen)

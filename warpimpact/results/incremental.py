@@ -1,27 +1,24 @@
-"""A result file on its way: it grows with the parts of a run."""
+"""A result file that is written part by part, as a run goes on."""
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import netCDF4
-
 from warpimpact.results.files import CHUNK, aside, told_as
 from warpimpact.results.interrupts import uninterrupted
-from warpimpact.results.netcdf import write_table
+from warpimpact.results.netcdf import append, open_to_append, write_table
 from warpimpact.results.table import Table, joined
 
 
-class Growing:
-    """A result file that grows part by part under another name, and gets its own when it is complete.
+class IncrementalFile:
+    """A result file that is written part by part under another name, and gets its own when it is complete.
 
     Args:
         path: the file.
-        written: where it grows, on the same disk; an existing file is replaced.
+        written: where its parts are written, on the same disk; an existing file is replaced.
         hits: how many there will be.
     """
 
@@ -71,14 +68,7 @@ class Growing:
         with uninterrupted():
             if self._at == 0:
                 write_table(table, self._written, chunk=self._chunk)
-                self._file = netCDF4.Dataset(self._written, "a")
-                self._file.set_auto_maskandscale(False)
-                for variable in self._file.variables.values():
-                    if variable.chunking() != "contiguous":  # of the megabytes that it may keep, two chunks will do
-                        size = 2 * math.prod(variable.chunking()) * variable.dtype.itemsize
-                        variable.set_var_chunk_cache(size=size)
-            end = self._at + table.sizes["hit"]
-            for name, variable in self._file.variables.items() if self._at else ():
-                if "hit" in variable.dimensions:
-                    variable[self._at : end] = table[name].values
-            self._at = end
+                self._file = open_to_append(self._written)
+            else:
+                append(table, self._file, self._at)
+            self._at += table.sizes["hit"]

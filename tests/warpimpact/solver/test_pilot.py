@@ -1,9 +1,7 @@
 """The promise of a named fidelity: the level that a pilot chooses keeps it on hits that were not in the pilot."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +9,10 @@ import pytest
 from warpimpact import Campaign, run
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.runs.compute import promise_in
+from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
 from warpimpact.scene import (
+    PRESETS,
     CirclePattern,
     Hits,
     Impact,
@@ -23,23 +22,22 @@ from warpimpact.scene import (
     Plate,
     Record,
     Scene,
+    Shots,
     Target,
     make_shots,
 )
-from warpimpact.solver import promise
-from warpimpact.solver.promise import (
+from warpimpact.solver import pilot
+from warpimpact.solver.changes import RISK, SLOW, changes, upper_error, upper_place
+from warpimpact.solver.pilot import (
     MARGIN,
-    PROMISES,
-    RISK,
-    SLOW,
-    changes,
+    HitErrors,
     errors_text,
-    keep,
+    pilot_hits,
+    pilot_size,
     upper_digits,
-    upper_place,
 )
-from warpimpact.solver.resolution import LADDER
-from warpimpact.solver.simulate import simulate
+from warpimpact.solver.simulate import pilot_of, simulate
+from warpimpact.solver.worker import Worker
 
 CORE = OgiveCore(diameter=6.17e-3, crh=3, length=27e-3, mass=5.25e-3)
 PLATE = Plate(
@@ -58,67 +56,99 @@ OTHERS = make_shots(IMPACT, Hits(count=96, seed=6), PLATE)
 @pytest.fixture(scope="module")
 def limit() -> Outcomes:
     """Of the hits that are not in the pilot, on the finest level."""
-    return simulate(SCENE, OTHERS, numerics=LADDER[-1], device="cpu")
+    return simulate(SCENE, OTHERS, numerics=Numerics(level=9), device="cpu")
 
 
-def errors(fidelity: Any, limit: Outcomes) -> tuple[float, float]:
+def found_for(numerics: Numerics, shots: Shots = PILOT, scene: Scene = SCENE) -> HitErrors:
+    return pilot_of(scene, shots, numerics, Worker("cpu"))
+
+
+def errors(numerics: Numerics, limit: Outcomes) -> tuple[float, float]:
     """90th percentiles of the errors in residual velocity [m/s] and in tilt at the last stand-off [rad]."""
-    velocity, tilt, _ = changes(simulate(SCENE, OTHERS, numerics=fidelity, device="cpu"), limit)
+    velocity, tilt, _ = changes(simulate(SCENE, OTHERS, numerics=numerics, device="cpu"), limit)
     return float(np.quantile(velocity, 0.9)), float(np.quantile(tilt, 0.9))
 
 
 @pytest.mark.parametrize("name", ["draft", "standard"])
 def test_a_shanked_core_gets_the_accuracy_that_the_name_promises(name: str, limit: Outcomes) -> None:
-    found, tolerance = keep(SCENE, Numerics(fidelity=name), PILOT, device="cpu"), PROMISES[name].accuracy
+    found, accuracy = found_for(Numerics(fidelity=name)), PRESETS[name]
     assert found.kept
-    velocity, tilt = errors(found.fidelity, limit)
-    assert velocity <= tolerance.residual_velocity
-    assert tilt <= tolerance.tilt
+    velocity, tilt = errors(found.numerics, limit)
+    assert velocity <= accuracy.residual_velocity
+    assert tilt <= accuracy.tilt
     # The errors that are told are upper estimates of the true ones.
-    assert velocity <= found.residual_velocity_error <= tolerance.residual_velocity
-    assert tilt <= found.tilt_error <= tolerance.tilt
+    assert velocity <= found.residual_velocity_error <= accuracy.residual_velocity
+    assert tilt <= found.tilt_error <= accuracy.tilt
+
+
+def test_an_accuracy_in_numbers_is_what_its_name_is() -> None:
+    asked = {"residual_velocity": "5 m/s", "tilt": "5 deg"}
+    numbers, name = (
+        found_for(numerics, PILOT[:8]) for numerics in (Numerics(accuracy=asked), Numerics(fidelity="draft"))
+    )
+    assert (numbers.numerics, numbers.phrase) == (name.numerics, name.phrase)
+    looser = found_for(Numerics(accuracy=asked | {"share": 0.5}), PILOT[:16])
+    assert looser.tilt_error < found_for(Numerics(accuracy=asked), PILOT[:16]).tilt_error
+    assert looser.phrase.endswith("for 50 % of the hits")
+
+
+def test_simulate_keeps_a_promise_as_a_run_does() -> None:
+    numerics = Numerics(fidelity="draft")
+    every, piloted = PILOT[:8], found_for(numerics, PILOT[:8]).numerics
+    asked, named = (simulate(SCENE, every, numerics=one, device="cpu") for one in (numerics, piloted))
+    np.testing.assert_array_equal(asked.residual_velocity, named.residual_velocity)
+
+
+@pytest.mark.parametrize(("share", "shots"), [(0.5, 64), (0.9, 64), (0.975, 64), (0.99, 160)])
+def test_a_pilot_has_shots_beyond_the_share(share: float, shots: int) -> None:
+    assert pilot_size(Numerics(accuracy={"tilt": "5 deg", "share": share}).asked) == shots
+    assert pilot_size(PRESETS["reference"]) == 32
 
 
 def test_a_stricter_name_takes_a_finer_level_in_the_precision_asked_for() -> None:
     levels = [
-        keep(SCENE, Numerics(fidelity=name, precision="double"), PILOT[:8], device="cpu").fidelity
-        for name in ("draft", "standard")
+        found_for(Numerics(fidelity=name, precision="double"), PILOT[:8]).numerics for name in ("draft", "standard")
     ]
-    places = [LADDER.index(replace(level, double=False)) for level in levels]
-    assert places[0] < places[1]
-    assert all(level.double for level in levels)
+    assert levels[0].level < levels[1].level
+    assert all(one.precision == "double" for one in levels)
+
+
+NOTHING = Numerics(accuracy={"residual_velocity": 1e-9})
 
 
 def test_what_cannot_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     # With a ladder of two levels and a promise of nothing, the finest level that can be judged is taken.
-    monkeypatch.setattr(promise, "LADDER", LADDER[:2])
-    nothing = PROMISES["draft"].accuracy.model_copy(update={"residual_velocity": 1e-9})
-    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0, 5, 8))
-    found = keep(SCENE, Numerics(fidelity="draft"), PILOT[:8], device="cpu")
+    monkeypatch.setattr(pilot, "LADDER", pilot.LADDER[:2])
+    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+    found = found_for(NOTHING, PILOT[:8])
     assert not found.kept
-    assert found.fidelity == LADDER[0]
-    coarse, fine = (simulate(SCENE, PILOT[:8], numerics=level, device="cpu") for level in LADDER[:2])
+    assert found.numerics == Numerics(level=0)
+    coarse, fine = (simulate(SCENE, PILOT[:8], numerics=Numerics(level=k), device="cpu") for k in (0, 1))
     largest = np.abs(coarse.residual_velocity - fine.residual_velocity).max()
     assert found.residual_velocity_error == pytest.approx(MARGIN[1] * largest)
 
 
-def test_a_name_ends_at_its_finest_level(monkeypatch: pytest.MonkeyPatch) -> None:
-    nothing = PROMISES["draft"].accuracy.model_copy(update={"residual_velocity": 1e-9})
-    monkeypatch.setitem(promise.PROMISES, "draft", promise.Named(nothing, 0, 1, 4))
-    found = keep(SCENE, Numerics(fidelity="draft"), PILOT[:4], device="cpu")
+def test_a_promise_ends_at_its_finest_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(pilot, "FURTHER", 1)
+    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+    found = found_for(NOTHING, PILOT[:4])
     assert not found.kept
-    assert found.fidelity == LADDER[1]
+    assert found.numerics == Numerics(level=1)
 
 
-def test_levels_that_do_not_fit_the_memory_end_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(*args: Any, **how: Any) -> Outcomes:
+def test_levels_that_do_not_fit_the_memory_end_the_search() -> None:
+    def full(level: int) -> Outcomes:
         raise MemoryError
 
-    monkeypatch.setattr(promise, "simulate", full)
-    found = keep(SCENE, Numerics(), PILOT[:4], device="cpu")
+    found = pilot_hits(full, PILOT[:4], Numerics())
     assert not found.kept
     assert math.isinf(found.tilt_error)
-    assert found.fidelity == LADDER[PROMISES["standard"].first]
+    assert found.numerics == Numerics(level=2)
+
+
+def test_a_run_needs_an_accuracy_of_outcomes() -> None:
+    with pytest.raises(ValueError, match="needs residual_velocity or tilt"):
+        found_for(Numerics(accuracy={"limit": 0.01}), PILOT[:4])
 
 
 CAMPAIGN = """
@@ -148,17 +178,17 @@ fidelity = "draft"
 def test_a_result_tells_its_promise_and_replays_on_its_level(hits: str) -> None:
     campaign = Campaign.from_text(CAMPAIGN.replace("count = 12", hits), name="t", folder=Path())
     result = run(campaign, device="cpu")
-    found = promise_in(result)
+    found = HitMap().found_in(result)
     assert found is not None
     assert result.attrs["promise_kept"] == 1
-    assert 0.0 < result.attrs["residual_velocity_error_p90"] <= 5.0
-    assert 0.0 < result.attrs["tilt_error_p90"] <= 5.0
+    assert 0.0 < result.attrs["residual_velocity_error"] <= 5.0
+    assert 0.0 < result.attrs["tilt_error"] <= 5.0
     assert replay(result, 5, folder=Path()).attrs["agreement"] == "bit-identical"
 
 
 def test_a_single_setting_promises_nothing() -> None:
     campaign = Campaign.from_text(CAMPAIGN + "patches_axial = 20\n", name="t", folder=Path())
-    assert not {"promise_kept", "resolution", "tilt_error_p90"} & run(campaign, device="cpu").attrs.keys()
+    assert not {"promise_kept", "resolution", "tilt_error"} & run(campaign, device="cpu").attrs.keys()
 
 
 # Stops some of the cores, and lets others go on slowly.
@@ -167,12 +197,14 @@ STOPPING = SCENE.model_copy(update={"target": Target(layers=(PLATE, BASE))})
 
 
 def test_draft_tells_errors_that_other_hits_keep_where_a_base_stops_some_of_them() -> None:
-    pilot, others = (make_shots(IMPACT, Hits(count=64, seed=seed), PLATE) for seed in (5, 6))
-    found = keep(STOPPING, Numerics(fidelity="draft"), pilot, device="cpu")
-    coarse, fine = (simulate(STOPPING, others, numerics=one, device="cpu") for one in (found.fidelity, LADDER[7]))
+    some, others = (make_shots(IMPACT, Hits(count=64, seed=seed), PLATE) for seed in (5, 6))
+    found = found_for(Numerics(fidelity="draft"), some, STOPPING)
+    coarse, fine = (
+        simulate(STOPPING, others, numerics=one, device="cpu") for one in (found.numerics, Numerics(level=7))
+    )
     assert 0.2 < (fine.status == Status.ARRESTED).mean() < 0.8
     velocity, tilt, depth = changes(coarse, fine)
-    assert LADDER.index(found.fidelity) <= 5
+    assert found.numerics.level <= 5
     assert found.kept == (found.residual_velocity_error <= 5.0 and found.tilt_error <= math.radians(5.0))
     assert np.quantile(velocity, 0.9) <= found.residual_velocity_error
     assert np.quantile(tilt, 0.9) <= found.tilt_error
@@ -198,7 +230,7 @@ def test_errors_of_slow_cores_are_those_of_their_energy(limit: Outcomes) -> None
 
 
 def test_fast_cores_count_as_they_are(limit: Outcomes) -> None:
-    coarse = simulate(SCENE, OTHERS, numerics=LADDER[1], device="cpu")
+    coarse = simulate(SCENE, OTHERS, numerics=Numerics(level=1), device="cpu")
     velocity, tilt, _ = changes(coarse, limit, OTHERS.velocity)
     plain = changes(coarse, limit)
     assert limit.residual_velocity.min() > SLOW * 820.0
@@ -208,8 +240,8 @@ def test_fast_cores_count_as_they_are(limit: Outcomes) -> None:
 
 def test_shots_at_one_plate_count_as_one() -> None:
     errors = np.arange(60.0)
-    assert promise._upper(errors, 1) == upper_place(60) - 1 < 59
-    assert promise._upper(errors, 3) == 59  # of 20 plates the last one
+    assert upper_error(errors, 1, 0.9) == upper_place(60, 0.9) - 1 < 59
+    assert upper_error(errors, 3, 0.9) == 59  # of 20 plates the last one
 
 
 def test_a_failed_computation_has_no_bound(limit: Outcomes) -> None:
@@ -220,10 +252,11 @@ def test_a_failed_computation_has_no_bound(limit: Outcomes) -> None:
     assert velocity[1] == tilt[1] == 0.0
 
 
-def test_an_estimate_is_rarely_below_the_percentile_that_it_stands_for() -> None:
-    assert [upper_place(count) for count in (1, 16, 32, 64)] == [1, 16, 31, 61]
-    errors = np.random.default_rng(3).exponential(size=(20000, 64))
-    below = np.sort(errors)[:, upper_place(64) - 1] < -np.log(0.1)
+@pytest.mark.parametrize(("share", "shots"), [(0.5, 64), (0.9, 64), (0.99, 200)])
+def test_an_estimate_is_rarely_below_the_percentile_that_it_stands_for(share: float, shots: int) -> None:
+    assert [upper_place(count, 0.9) for count in (1, 16, 32, 64)] == [1, 16, 31, 61]
+    errors = np.random.default_rng(3).exponential(size=(20000, shots))
+    below = np.sort(errors)[:, upper_place(shots, share) - 1] < -np.log(1.0 - share)
     assert 0.08 < below.mean() < RISK
 
 

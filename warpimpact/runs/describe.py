@@ -1,0 +1,169 @@
+"""What a result says of its campaign and of how it was computed."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import to_table
+from warpimpact.results.table import Table
+from warpimpact.scene import Burst, Shots
+from warpimpact.scene.quantities import QUANTITIES
+from warpimpact.solver.device import find_device
+from warpimpact.solver.pilot import Found
+from warpimpact.solver.resolution import Resolution
+
+
+def described(
+    campaign: Campaign, shots: Shots, outcomes: Outcomes, resolution: Resolution, attributes: Mapping[str, Any]
+) -> Table:
+    """The columns of some shots of a campaign.
+
+    Args:
+        shots: whole groups of images.
+        outcomes: of the first shot of every group.
+        resolution: with which they were computed.
+        attributes: those of how they were computed (`computed_by`), and of what is not the same in any campaign.
+    """
+    table = to_table(
+        campaign.scene,
+        shots,
+        outcomes.unfolded(campaign.symmetries),
+        period=campaign.hits.covered(campaign.plate),
+        attributes={**_campaign(campaign), **_numerics(campaign, resolution), **attributes},
+        double=is_double(campaign),
+    )
+    return table if campaign.output.exit_state else table.drop_vars(v.EXIT_VARIABLES)
+
+
+def is_double(campaign: Campaign) -> bool:
+    """Whether it is computed, and stored, in double precision."""
+    return campaign.numerics.precision == "double"
+
+
+def computed_by(campaign: Campaign, device: str, computed: int, elapsed: float) -> dict[str, Any]:
+    """Who computed so many shots, and in what time [s]."""
+    chosen, group = find_device(device), campaign.symmetries
+    told = {
+        **attr.versions(),
+        **attr.machine(),
+        attr.DEVICE: f"{chosen.alias} ({chosen.name})",
+        attr.COMPUTE_TIME: elapsed,
+        attr.HITS_PER_SECOND: computed / elapsed,
+    }
+    if campaign.hits.irreducible:
+        told |= {attr.SYMMETRIES: ", ".join(map(str, group)), attr.IMAGES: len(group), attr.COMPUTED_HITS: computed}
+    return told
+
+
+def found_attributes(campaign: Campaign, found: Found | None) -> dict[str, Any]:
+    """What a pilot was asked for and found; nothing without one. The errors are for the kind of computation to add."""
+    if found is None:
+        return {}
+    asked = campaign.numerics.asked
+    accuracy = {"residual_velocity": asked.residual_velocity, "tilt": asked.tilt, "limit": asked.limit}
+    given = {name: value for name, value in accuracy.items() if value is not None and math.isfinite(value)}
+    return {
+        attr.RESOLUTION: found.numerics.model_dump_json(),
+        attr.PROMISE_KEPT: int(found.kept),
+        attr.ACCURACY: json.dumps(given | {"share": asked.share}),
+    }
+
+
+def made_by(device: str) -> dict[str, str]:
+    """Versions and kind of device: with the campaign, they determine the bits of a result."""
+    chosen = find_device(device)
+    return {**attr.versions(), attr.DEVICE: "cpu" if chosen.is_cpu else chosen.name}
+
+
+def _campaign(campaign: Campaign) -> dict[str, Any]:
+    ligament = campaign.plate.ligament
+    told = {
+        attr.TITLE: campaign.title,
+        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        attr.CAMPAIGN: campaign.text,
+        attr.SAMPLING: campaign.hits.sampling,
+        attr.SEED: campaign.hits.seed,
+        attr.REPLICATES: campaign.replicates,
+        attr.STANDOFF_POINT: campaign.output.standoff_point,
+        attr.OPEN_AREA: campaign.plate.open_area,
+        attr.AREAL_DENSITY: campaign.target.areal_density,
+        attr.CORE: campaign.core.model_dump_json(),
+        attr.PLATE: _plate(campaign),
+        attr.IMPACT: _impact(campaign),
+        attr.MATERIAL: _material(campaign),
+        attr.FAILED_SHARE: campaign.output.failed_share,
+    }
+    told |= {} if campaign.hits.count is None else {attr.COUNT: campaign.hits.count}
+    told |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
+    told |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
+    told |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
+    return told | ({} if campaign.burst is None else _burst(campaign.burst))
+
+
+def _impact(campaign: Campaign) -> str:
+    """Impact quantities as JSON, each with its value or its distribution, and the distribution of the core's mass."""
+    scatter = campaign.scatter.given.items()
+    given = {name: one.model_dump() for (name, _), one in scatter if not QUANTITIES[name].by_layer}
+    return json.dumps(dict(campaign.impact) | given)
+
+
+def _material(campaign: Campaign) -> str:
+    """What the plate resists with, as JSON: of its material, and of the law of its stress."""
+    of_plate = campaign.plate.model_dump(exclude={"thickness", "size", "margin", "pattern"})
+    return json.dumps(of_plate | campaign.interaction.model_dump())
+
+
+def _plate(campaign: Campaign) -> str:
+    """The plate as JSON; of a mask, the name of its file."""
+    told = campaign.plate.model_dump(mode="json")
+    if isinstance(file := told["pattern"].get("file"), str):
+        told["pattern"]["file"] = Path(file).name
+    return json.dumps(told)
+
+
+def _layers(campaign: Campaign) -> str:
+    """What stands behind the plate, as JSON: each layer by its number, with what scatters in it."""
+    layers = {str(k + 1): json.loads(layer.model_dump_json()) for k, layer in enumerate(campaign.layer)}
+    for (name, k), given in campaign.scatter.given.items():
+        if k:
+            layers[str(k)][name] = given.model_dump()
+    return json.dumps(layers)
+
+
+def _burst(burst: Burst) -> dict[str, Any]:
+    """How many shots hit a plate, and how they lie."""
+    return {attr.BURST: burst.model_dump_json(exclude_none=True), attr.SHOTS_AT_A_PLATE: burst.count}
+
+
+def _numerics(campaign: Campaign, resolution: Resolution) -> dict[str, Any]:
+    """The numerics as they were given, and in force with every choice made: as one line and as numbers."""
+    numerics, impact, precision = campaign.numerics, campaign.impact, "double" if resolution.double else "single"
+    return {
+        attr.NUMERICS: f"{_asked(campaign)}, {numerics.scheme} scheme, "
+        f"time_step {resolution.step_in(impact, campaign.target):.4g} s, "
+        f"patches_axial {resolution.patches_axial}, patches_around {resolution.patches_around}, "
+        f"grid_spacing {resolution.grid_spacing:.4g} m, precision {precision}",
+        attr.NUMERICS_GIVEN: json.dumps(dict(numerics), default=lambda accuracy: accuracy.model_dump()),
+        attr.PRECISION: precision,
+        attr.PATCHES_AXIAL: resolution.patches_axial,
+        attr.PATCHES_AROUND: resolution.patches_around,
+        attr.GRID_SPACING: resolution.grid_spacing,
+        attr.TIME_STEP: resolution.step_of(impact, campaign.plate),
+    }
+
+
+def _asked(campaign: Campaign) -> str:
+    """What decided the resolution."""
+    numerics = campaign.numerics
+    if numerics.explicit is None:
+        return "accuracy in numbers" if numerics.accuracy is not None else f"{numerics.fidelity} fidelity"
+    return "given resolution" if numerics.level is None else f"level {numerics.level}"

@@ -1,0 +1,77 @@
+"""What excludes what, and what needs what: rows from which the messages and a page of the documentation are made."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+BURST, LAYERS, POSTERIOR, STOP = "[burst]", "[[layer]]", "posterior", "[stop]"
+IMAGES = "hits.irreducible = true"
+NODAL = 'numerics.scheme = "nodal"'
+BLOCK = 'numerics.layout = "block"'
+DOUBLE = 'numerics.precision = "double"'
+DEEP = "a plate or laminate that weakens and is thicker than its degradation_depth"
+BENDING = "output.bending = true"
+STRENGTH = "core.strength"
+BY_PATH = "plate.degradation_distance"
+MASS_PROPERTIES = "core.centre_of_mass, core.inertia_axial or core.inertia_transverse"
+TURNED = "a distribution of impact.obliquity, azimuth, pitch, yaw or spin"
+HOLED_LAYERS = "a [[layer]] with a pattern or a rim"
+SCATTER_OF_MATERIAL = "a distribution of what the posterior gives"
+UNEVEN = 'hits.sampling = "grid" or "list"'
+ONE_SCRAMBLING = "hits.replicates = 1"
+LISTED_STRENGTH = "a column strength in hits.file"
+LAYER_STANDOFFS = "output.layer_standoffs"
+STOP_BENDING, STOP_BROKEN = "stop.quantity of a bending moment or stress", "stop.quantity of broken cores"
+WHOLE_PLATE, SIZE = 'hits.area = "plate"', "plate.size"
+
+
+class Rule(NamedTuple):
+    """Two things that a campaign may ask for, and why not both, or not one without the other."""
+
+    what: str
+    other: str
+    why: str
+
+
+_BY_BLOCK = "a block computes one hit at a single plate of one depth, in single precision, without the bending moment"
+EXCLUDED = (
+    Rule(BURST, IMAGES, "the hits of a burst have no images"),
+    Rule(BURST, NODAL, "the nodal scheme does not know earlier hits"),
+    Rule(BURST, POSTERIOR, "the shots of a burst share one plate, not their draws"),
+    Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
+    Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
+    Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
+    Rule(DEEP, NODAL, "the nodal scheme weakens the whole thickness at once, so the depth must be no less"),
+    Rule(BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
+    *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING, LAYERS, BURST, DEEP)),
+    Rule(IMAGES, TURNED, "a symmetry must hold for every shot; of the impact quantities only velocity may scatter"),
+    Rule(IMAGES, HOLED_LAYERS, "only layers that are solid and unbounded leave the symmetry of the plate"),
+    Rule(POSTERIOR, SCATTER_OF_MATERIAL, "the posterior gives it"),
+    Rule(STOP, UNEVEN, 'an interval needs "sobol" or "random"'),
+    Rule(STOP, ONE_SCRAMBLING, 'an interval of "sobol" needs several scramblings'),
+)
+NEEDED = (
+    Rule(LISTED_STRENGTH, BENDING, "a core breaks by its bending stress"),
+    Rule(STRENGTH, BENDING, "a core breaks by its bending stress"),
+    Rule(LAYER_STANDOFFS, LAYERS, "behind a plate alone output.standoffs count"),
+    Rule(STOP_BENDING, BENDING, "it is not recorded otherwise"),
+    Rule(STOP_BROKEN, STRENGTH, "other cores do not break"),
+    Rule(WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
+)
+
+
+def check_together(given: Mapping[str, str | bool]) -> None:
+    """Refuse what cannot be combined.
+
+    Args:
+        given: whether each thing is asked for, or what of it was found. What it does not name is not judged.
+
+    Raises:
+        ValueError: names both things and says why.
+    """
+    found = {what: what if one is True else one for what, one in given.items() if one}
+    for what, other, why in EXCLUDED:
+        if what in found and other in found:
+            raise ValueError(f"{found[what]} cannot be combined with {found[other]}: {why}")
+    for what, other, why in NEEDED:
+        if what in found and other in given and other not in found:
+            raise ValueError(f"{found[what]} needs {other}: {why}")
