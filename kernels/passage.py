@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import warp as wp
 
 from . import rigid_body
-from .status import LayerStatus, Status
+from .status import Status
 from .variant import Variant
 
 
@@ -17,13 +17,7 @@ def build(variant: Variant) -> SimpleNamespace:
     one = real(1.0)
     use = variant.use(rigid_body)
     Body, State = use.rigid_body.Body, use.rigid_body.State
-    ARRESTED, RICOCHETED, UNFINISHED = (
-        wp.constant(int(s)) for s in (Status.ARRESTED, Status.RICOCHETED, Status.UNFINISHED)
-    )
-    PASSED, MISSED, ENTERED, NOT_REACHED = (
-        wp.constant(int(s))
-        for s in (LayerStatus.PERFORATED, LayerStatus.MISSED, LayerStatus.ARRESTED, LayerStatus.NOT_REACHED)
-    )
+    ENTERED = wp.constant(int(Status.ARRESTED))  # what a core that touches a layer is until it leaves
 
     @wp.struct
     class Passage:
@@ -52,7 +46,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def begin(passage: Passage, shot: wp.int32, layers: wp.int32):
         """No layer is reached yet."""
         for k in range(layers):
-            passage.status[shot, k] = NOT_REACHED
+            passage.status[shot, k] = Status.NOT_REACHED
             passage.velocity[shot, k] = real(wp.nan)
             passage.tilt[shot, k] = real(wp.nan)
             passage.time[shot, k] = real(wp.nan)
@@ -67,13 +61,13 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def enter(passage: Passage, shot: wp.int32, layer: wp.int32):
         """Record that the core touches a layer."""
-        if passage.status[shot, layer] == NOT_REACHED:
+        if passage.status[shot, layer] == Status.NOT_REACHED:
             passage.status[shot, layer] = ENTERED
 
     @wp.func
     def has_left(passage: Passage, shot: wp.int32, layer: wp.int32):
         """Whether the core has left a layer through its rear face before."""
-        return passage.status[shot, layer] == PASSED or passage.status[shot, layer] == MISSED
+        return passage.status[shot, layer] == Status.PERFORATED or passage.status[shot, layer] == Status.MISSED
 
     @wp.func
     def angle_between(a: vec3, b: vec3):
@@ -117,7 +111,7 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """Record how a core left a layer at a speed [m/s], `since` [s] before the time."""
         axis = use.rigid_body.turned(body, use.rigid_body.axis_of(state.attitude), state.angular_momentum, -since)
-        passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, PASSED, MISSED)
+        passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, Status.PERFORATED, Status.MISSED)
         passage.velocity[shot, layer] = speed
         passage.tilt[shot, layer] = angle_between(axis, flight)
         passage.time[shot, layer] = time - since
@@ -128,9 +122,9 @@ def build(variant: Variant) -> SimpleNamespace:
         """Say how the core ended in a layer that it did not leave through the rear face. It rests there if it is
         `inside`; `depth` is how far it came behind the front face [m]."""
         if passage.status[shot, layer] == ENTERED:
-            stays = status == ARRESTED and inside
-            other = wp.where(status >= UNFINISHED, status, RICOCHETED)
-            passage.status[shot, layer] = wp.where(stays, ARRESTED, other)
+            stays = status == Status.ARRESTED and inside
+            other = wp.where(status >= Status.UNFINISHED, status, Status.RICOCHETED)
+            passage.status[shot, layer] = wp.where(stays, Status.ARRESTED, other)
             if stays:
                 passage.stopped_in[shot] = layer
                 passage.depth[shot] = depth

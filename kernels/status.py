@@ -1,4 +1,4 @@
-"""How a shot ended: the codes kernels write and the sentences people read."""
+"""How a shot ended, or a core in one layer of the target: the codes kernels write and the sentences people read."""
 
 from enum import IntEnum
 
@@ -7,30 +7,8 @@ RUNNING = -1
 
 
 class Status(IntEnum):
-    """Outcome of one shot; codes from UNFINISHED on are failures of the computation, not of the plate."""
-
-    PERFORATED = 0
-    ARRESTED = 1
-    RICOCHETED = 2
-    MISSED = 3
-    UNFINISHED = 4
-    LEFT_WINDOW = 5
-    NOT_FINITE = 6
-    GAINED_ENERGY = 7
-
-    @property
-    def sentence(self) -> str:
-        """What happened, for a person."""
-        return _SENTENCES[self]
-
-    @property
-    def failed(self) -> bool:
-        """Whether the computation failed, so that the end of the shot is unknown."""
-        return self >= Status.UNFINISHED
-
-
-class LayerStatus(IntEnum):
-    """How a core ended in one layer of a target; codes as in `Status`, and one for a layer that it did not reach."""
+    """Outcome of one shot, or how its core ended in one layer. Codes from UNFINISHED to GAINED_ENERGY are failures of
+    the computation, not of the plate; only a layer can be NOT_REACHED."""
 
     PERFORATED = 0
     ARRESTED = 1
@@ -42,6 +20,16 @@ class LayerStatus(IntEnum):
     GAINED_ENERGY = 7
     NOT_REACHED = 8
 
+    @property
+    def sentence(self) -> str:
+        """What happened, for a person."""
+        return _SENTENCES[self]
+
+    @property
+    def failed(self) -> bool:
+        """Whether the computation failed, so that the end of the shot is unknown."""
+        return Status.UNFINISHED <= self < Status.NOT_REACHED
+
 
 _SENTENCES = {
     Status.PERFORATED: "The core touched the target and left it through the rear face.",
@@ -52,4 +40,8 @@ _SENTENCES = {
     Status.LEFT_WINDOW: "The core left the largest window of the plate that memory allows.",
     Status.NOT_FINITE: "The motion became infinite or undefined.",
     Status.GAINED_ENERGY: "The rounding errors of the precision added to the energy of the core.",
+    Status.NOT_REACHED: "The core did not reach this layer.",
 }
+
+OF_SHOTS = tuple(status for status in Status if status is not Status.NOT_REACHED)
+"""What a shot can end with."""

@@ -1,7 +1,7 @@
 """warpimpact on a CUDA device: hits per second of both layouts on some levels, ratio to the floor, comparison with
 the CPU, and ten million hits into a file.
 
-    python tests/benchmarks/gpu.py              # writes results/gpu.json and .png beside it, within ten minutes
+    python tests/benchmarks/gpu.py              # writes results/gpu.json, within ten minutes
 
 It needs the checkout and warpimpact's dependencies, no installation. The exit code is 1 if the device's answers differ
 from the CPU's by more than stated, and 2 if there is no CUDA device.
@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from bench import CAMPAIGN, copied, machine, seconds, shots_of, store
 from floor import work_of
-from matplotlib.figure import Figure
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
@@ -71,7 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     values = measure(Campaign.from_toml(CAMPAIGN), arguments.device, peak)
     values |= {"device": device.name, "clock_mhz": clock, "multiprocessors": device.sm_count, "lanes": lanes}
     values |= {"peak_operations_per_second": peak, "machine": machine()}
-    store("gpu", values, draw(values))
+    store("gpu", values)
     if not values["same"]:
         print("the device's answers are further from the CPU's than stated", file=sys.stderr)
     return 0 if values["same"] else 1
@@ -164,24 +163,6 @@ def difference(campaign: Campaign, numerics: Numerics, device: str) -> dict[str,
 
 def _told(differences: dict[str, tuple[float, float]]) -> str:
     return ", ".join(f"{key} {one:.2g} m/s and {other:.2g}°" for key, (one, other) in differences.items())
-
-
-def draw(values: dict[str, Any]) -> Figure:
-    """Hits per second against hits, with the floors."""
-    figure = Figure(figsize=(7.5, 5), layout="constrained")
-    axes = figure.subplots()
-    for name, colour in zip(LEVELS, ("#009E73", "#0072B2", "#D55E00"), strict=True):
-        found = values["levels"][name]
-        for layout, measured in found["layouts"].items():
-            rates = measured["hits_per_second"]
-            style = "o-" if layout == "block" else "s--"
-            axes.plot(list(rates), list(rates.values()), style, color=colour, label=f"level {name}, {layout}")
-        axes.axhline(found["floor_hits_per_second"], color=colour, linestyle=":")
-    axes.set(xscale="log", yscale="log", xlabel="hits", ylabel="hits per second")
-    axes.grid(color="0.9")
-    axes.legend(title="dotted: what its arithmetic allows")
-    figure.suptitle(f"Slotted plate; {values['device']}, {values['machine']['date']}")
-    return figure
 
 
 if __name__ == "__main__":

@@ -141,10 +141,7 @@ def _ratios(folder: Path, repeats: int) -> dict[str, Any]:
 def _simulated(count: int) -> tuple[float, float]:
     """Elapsed and processor time of `simulate` alone [s]."""
     done = subprocess.run(
-        [sys.executable, "-c", SIMULATE, str(CAMPAIGN), str(count)],
-        capture_output=True,
-        text=True,
-        check=True,
+        [sys.executable, "-c", SIMULATE, str(CAMPAIGN), str(count)], capture_output=True, text=True, check=True
     )
     elapsed, processor = map(float, done.stdout.split()[-2:])
     return elapsed, processor

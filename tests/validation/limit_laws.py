@@ -60,11 +60,7 @@ def thin_plate(thickness: Array) -> Array:
     Near a free face material is pushed aside more easily, so a plate resists the less the thinner it is.
     """
     calibres = thickness / CORE.diameter
-    return np.where(
-        calibres < 1.0 / 3.0,
-        2.0 / 3.0 + 4.0 * calibres,
-        2.0 + 0.8 * np.log(np.maximum(calibres, 1.0)),
-    )
+    return np.where(calibres < 1.0 / 3.0, 2.0 / 3.0 + 4.0 * calibres, 2.0 + 0.8 * np.log(np.maximum(calibres, 1.0)))
 
 
 class Shapes(NamedTuple):

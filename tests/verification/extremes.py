@@ -226,10 +226,7 @@ def _core(draw: _Draw) -> Core:
     core = ProfileCore(s=stations, r=radii, density=draw.one_of(STEEL, draw.spread(1.0, 1e5)))
     own = core.mass_properties
     axial, transverse = (draw.one_of(1.0, draw.spread(0.1, 10.0)) for _ in range(2))
-    inertia = {
-        "inertia_axial": axial * own.inertia_axial,
-        "inertia_transverse": transverse * own.inertia_transverse,
-    }
+    inertia = {"inertia_axial": axial * own.inertia_axial, "inertia_transverse": transverse * own.inertia_transverse}
     return core.model_copy(update=inertia)
 
 

@@ -317,9 +317,7 @@ def ogive_nose(*, diameter: float, crh: float) -> Nose:
         return sqrt(arc**2 - (length - s) ** 2)
 
     return Nose(
-        radius=lambda s: height(s) - arc + diameter / 2,
-        slope=lambda s: (length - s) / height(s),
-        length=length,
+        radius=lambda s: height(s) - arc + diameter / 2, slope=lambda s: (length - s) / height(s), length=length
     )
 
 

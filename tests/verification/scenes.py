@@ -126,12 +126,7 @@ class History:
 
 
 def histories(
-    plate: Plate,
-    shots: Shots,
-    *,
-    core: Core = PAPER_CORE,
-    interaction: Interaction = STATIC,
-    **numerics: Any,
+    plate: Plate, shots: Shots, *, core: Core = PAPER_CORE, interaction: Interaction = STATIC, **numerics: Any
 ) -> list[History]:
     """`warpimpact.solver.simulate.trace` with named columns."""
     scene = Scene(core=core, target=plate, interaction=interaction)

@@ -43,10 +43,7 @@ def test_half_a_cone_on_an_edge_receives_its_impulse(
     shear_coefficient: float, along: str, turning: list[float], device: str
 ) -> None:
     plate = solid_plate(
-        size=(2 * HALF_SIZE, 2 * HALF_SIZE),
-        resistance=WEAK,
-        shear_coefficient=shear_coefficient,
-        degradation=1.0,
+        size=(2 * HALF_SIZE, 2 * HALF_SIZE), resistance=WEAK, shear_coefficient=shear_coefficient, degradation=1.0
     )
     shots = shots_at(**{f"hit_{along}": HALF_SIZE})
     outcomes = simulate(plate, shots, core=CONE, precision="double", device=device)

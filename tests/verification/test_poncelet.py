@@ -34,8 +34,7 @@ CONE = Case(
     references.cone_nose(diameter=6e-3, length=10e-3),
 )
 OGIVE = Case(
-    OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3),
-    references.ogive_nose(diameter=6.17e-3, crh=3.0),
+    OgiveCore(diameter=6.17e-3, length=27e-3, crh=3.0, mass=5.25e-3), references.ogive_nose(diameter=6.17e-3, crh=3.0)
 )
 CASES = pytest.mark.parametrize("case", [CONE, OGIVE], ids=["cone", "ogive"])
 SHEAR = pytest.mark.parametrize("shear_coefficient", [0.0, 0.05])

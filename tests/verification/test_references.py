@@ -72,12 +72,7 @@ def test_exposure_spread_over_a_wide_length_degrades_nothing(shear_coefficient: 
 def test_nonlocal_degradation_meets_a_cartesian_grid(
     degradation_length: float, shear_coefficient: float, on_a_grid: float
 ) -> None:
-    case = {
-        **PAPER_SHOT,
-        **DEGRADING,
-        "shear_coefficient": shear_coefficient,
-        "degradation_length": degradation_length,
-    }
+    case = {**PAPER_SHOT, **DEGRADING, "shear_coefficient": shear_coefficient, "degradation_length": degradation_length}
     residual = references.nonlocal_degradation_residual(**case)
     assert residual == pytest.approx(on_a_grid, abs=0.004)
     assert references.nonlocal_degradation_residual(**case, resolution=4) == pytest.approx(residual, abs=0.02)
@@ -110,10 +105,7 @@ def test_tent_over_disc_meets_brute_force(radius: float) -> None:
     # twelve Gauss points of each side leave about as much at the kinks of K.
     grid = ((np.arange(cells) + 0.5) / cells * 2 - 1) * length
     tent = np.outer(1 - abs(grid) / length, 1 - abs(grid) / length) / length**2 * (2 * length / cells) ** 2
-    distance, angle = (
-        radius * np.array([0.0, 0.5, 0.9, 1.0, 1.1, 1.5]),
-        np.array([0.1, 0.7, 0.3, 0.0, 0.6, 0.78]),
-    )
+    distance, angle = (radius * np.array([0.0, 0.5, 0.9, 1.0, 1.1, 1.5]), np.array([0.1, 0.7, 0.3, 0.0, 0.6, 0.78]))
     y, z = distance * np.cos(angle), distance * np.sin(angle)
     expected = [
         tent[np.add.outer((y_p - grid) ** 2, (z_p - grid) ** 2) < radius**2].sum()

@@ -89,10 +89,7 @@ def test_attitude_at_the_standoffs_is_that_of_precession() -> None:
     planes = SMALL_PLATE.thickness + np.array(STANDOFFS)
     time = (planes - history.position[-1, 0]) / history.velocity[-1, 0]
     axis = references.torque_free_axis(
-        time,
-        history.axis[-1],
-        history.angular_momentum[-1],
-        PAPER_CORE.mass_properties.inertia_transverse,
+        time, history.axis[-1], history.angular_momentum[-1], PAPER_CORE.mass_properties.inertia_transverse
     )
     # Traced and untraced kernels are compiled apart, and may round differently: 1e-12 against angles of order 1.
     assert outcomes.pitch[0] == pytest.approx(np.arctan2(axis[:, 2], axis[:, 0]), abs=1e-11)

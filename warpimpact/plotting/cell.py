@@ -22,7 +22,7 @@ from scipy.spatial import KDTree
 
 from warpimpact.analysis.hit_map import chosen, hit_points
 from warpimpact.analysis.summary import breaks_promise
-from warpimpact.kernels.status import LayerStatus
+from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
@@ -45,7 +45,7 @@ WIDEST_GAP = 3.0  # largest distance from a pixel to its hit, in mean hit spacin
 GREY = "0.62"  # for hits without a value
 # Colours of Okabe and Ito: they differ in every kind of colour blindness.
 STATUS_COLOURS = ("#D55E00", "#56B4E9", "#009E73", "#E69F00", "#000000", "#CC79A7", "#F0E442", "#0072B2", "#FFFFFF")
-"""By the codes of `LayerStatus`: warm where the core comes through, cool where it is stopped or turned back, white
+"""By the codes of `Status`: warm where the core comes through, cool where it is stopped or turned back, white
 where it did not reach the layer."""
 
 _SIGNED = {v.AZIMUTH, v.IMPACT_PITCH, v.IMPACT_YAW, v.PITCH, v.YAW, v.LAYER_STANDOFF_PITCH, v.LAYER_STANDOFF_YAW}
@@ -171,7 +171,7 @@ def draw_status(axes: Axes, dataset: xarray.Dataset, layer: int | None = None) -
     status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
     scale = Normalize(-0.5, len(STATUS_COLOURS) - 0.5)
     _paint(axes, dataset, status.astype(float), ListedColormap(STATUS_COLOURS), scale)
-    found = [code for code in LayerStatus if np.any(status == code)]
+    found = [code for code in Status if np.any(status == code)]
     names = {code: words(code.name.lower()) for code in found}
     told = {code: f"{names[code]} {np.mean(status == code):.1%}" for code in found}
     labels, shares = (told, "status") if layer is None else (names, f"layer {layer}\n{', '.join(told.values())}")
@@ -263,7 +263,7 @@ def _without_value(dataset: xarray.Dataset, exists: NDArray[np.bool_], layer: in
     """Legend entry of the grey hits: their statuses."""
     status = dataset[v.STATUS].values if layer is None else dataset[v.LAYER_STATUS].values[:, layer]
     found = set(status[~exists].tolist())
-    return fill(f"no value: {', '.join(words(code.name.lower()) for code in LayerStatus if code in found)}", 30)
+    return fill(f"no value: {', '.join(words(code.name.lower()) for code in Status if code in found)}", 30)
 
 
 def _furnish(axes: Axes, dataset: xarray.Dataset, entries: Sequence[Artist], layer: int | None) -> None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels.status import OF_SHOTS, Status
 from warpimpact.records.group import Columns, Group, Returned, doubles
 from warpimpact.records.variable import AT_STANDOFF, HITS, MAIN, VECTORS, Variable
 
-STATUS = Variable("status", HITS, "1", "how the shot ended", flags=Status)
+STATUS = Variable("status", HITS, "1", "how the shot ended", flags=OF_SHOTS)
 RESIDUAL_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity", shown_by=MAIN)
 DEFLECTION = Variable("deflection", HITS, "degree", "angle between residual velocity and line of fire", shown_by=MAIN)
 ANGULAR_VELOCITY = Variable(

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.kernels.status import LayerStatus
+from warpimpact.kernels.status import Status
 from warpimpact.records.group import Columns, Group, Returned
 from warpimpact.records.variable import BEHIND_LAYER, HITS, IN_LAYER, Variable
 
 if TYPE_CHECKING:
     from warpimpact.scene import Scene, Shots
 
-LAYER_STATUS = Variable("layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=LayerStatus)
+LAYER_STATUS = Variable("layer_status", IN_LAYER, "1", "how the core ended in each layer", flags=Status)
 LAYER_RESIDUAL_VELOCITY = Variable(
     "layer_residual_velocity",
     IN_LAYER,

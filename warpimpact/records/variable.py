@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from enum import IntEnum
 from typing import Any, Literal, TypeAlias
 
@@ -33,7 +33,7 @@ class Variable(str):
     dims: tuple[str, ...]
     units: str
     long_name: str
-    flags: type[IntEnum] | None
+    flags: Iterable[IntEnum] | None
     field: str
     shown_by: frozenset[str]
     mirror: Mirror | None
@@ -45,7 +45,7 @@ class Variable(str):
         units: str,
         long_name: str,
         *,
-        flags: type[IntEnum] | None = None,
+        flags: Iterable[IntEnum] | None = None,
         field: str | None = None,
         shown_by: Collection[str] = (),
         mirror: Mirror | None = None,

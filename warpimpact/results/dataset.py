@@ -140,8 +140,8 @@ def solid_reference(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """
     if dataset.attrs.get(attr.OPEN_AREA) == 0.0 and v.LAYER_STATUS not in dataset.variables:
         return dataset
-    if not v.SOLID_VARIABLES.keys() <= dataset.variables.keys():
-        return None
+    if any(name not in dataset.variables or dataset[name].dims != name.dims for name in v.SOLID_VARIABLES):
+        return None  # results of different plates that were joined have several
     shots = dataset.sizes["solid_hit"]
     numbers = np.zeros(1, dtype=int) if shots == 1 else hit_numbers(dataset[[v.HIT]].isel(hit=slice(shots)))
     numbers = numbers[: np.argmax(np.append(numbers, shots) >= shots)]  # the first hits, as far as they have one

@@ -32,6 +32,8 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
     quantity = dataset.attrs.get(attr.LIMIT)
     if quantity is None or (name := v.SOLID_LIMITS[quantity]) not in dataset.variables:
         return None
+    if dataset[name].dims != name.dims:  # of results of different plates that were joined
+        return None
     if not {attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST} <= dataset.attrs.keys():
         return None
     values = dataset[name].values

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
@@ -32,7 +32,7 @@ _VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in v.SHOT_VARIAB
 MEASURED = tuple(_VARIABLES)
 _SIGNED = {v.PITCH, v.YAW, v.BROKEN_X}
 """Those that may be negative."""
-STATUSES = {status.name.lower(): status for status in Status if not status.failed}
+STATUSES = {status.name.lower(): status for status in OF_SHOTS if not status.failed}
 
 _VARIABLE = r"(?P<variable>[a-z_]+)(?:\s*@\s*(?P<standoff>[^<>,]+?))?"
 _FORMS = {

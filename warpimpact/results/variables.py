@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from warpimpact.kernels.status import Status
+from warpimpact.kernels.status import OF_SHOTS
 from warpimpact.records import registry
 from warpimpact.records.bending import *
 from warpimpact.records.broken import *
@@ -209,7 +209,7 @@ TIME_STEP = Variable("time_step", _SETTING, "s", "time step at impact velocity")
 HITS_PER_SECOND = Variable("hits_per_second", _SETTING, "s-1", "hits computed per second")
 OTHER_STATUS = Variable("other_status", _SETTING, "1", "hits whose status differs from the converged answer")
 SETTLED = Variable("settled", HITS, "1", "1 where the hit ends with the same status on all levels")
-CONVERGED_STATUS = Variable("status", HITS, "1", "how the shot ended, converged", flags=Status)
+CONVERGED_STATUS = Variable("status", HITS, "1", "how the shot ended, converged", flags=OF_SHOTS)
 CONVERGED_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity, converged")
 CONVERGED_TILT = Variable("tilt", AT_STANDOFF, "degree", "angle between core axis and line of fire, converged")
 

@@ -136,10 +136,7 @@ class Dealt:
             ends = stats.binom.ppf([tail, 1.0 - tail], count, self._share).astype(int)
             ordered = np.sort(sample.values)[:: self._images]
             low, high = ends[0] - 1, ends[1]
-            return (
-                float(ordered[low]) if low >= 0 else math.nan,
-                float(ordered[high]) if high < count else math.nan,
-            )
+            return (float(ordered[low]) if low >= 0 else math.nan, float(ordered[high]) if high < count else math.nan)
         if self._kind == "share":
             return _wilson(round(sample.mean * count), count, self._confidence)
         if self._kind == "difference":

@@ -76,12 +76,7 @@ def positive_share(
 
 
 def interval_of_means(
-    numbers: Array,
-    groups: NDArray[np.number],
-    *,
-    images: int = 1,
-    confidence: float = 0.95,
-    beside: float = 0.0,
+    numbers: Array, groups: NDArray[np.number], *, images: int = 1, confidence: float = 0.95, beside: float = 0.0
 ) -> tuple[float, float]:
     """Interval that contains the true means of so many of the groups; NaN if fewer than `FEWEST` groups have two
     numbers.

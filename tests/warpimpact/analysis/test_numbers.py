@@ -12,12 +12,7 @@ NAN = math.nan
 
 @pytest.mark.parametrize(
     ("low", "high", "text"),
-    [
-        (1.0, 2.0, "1.000 to 2.000"),
-        (NAN, NAN, "-"),
-        (NAN, 2.0, "at most 2.000"),
-        (1.0, NAN, "at least 1.000"),
-    ],
+    [(1.0, 2.0, "1.000 to 2.000"), (NAN, NAN, "-"), (NAN, 2.0, "at most 2.000"), (1.0, NAN, "at least 1.000")],
 )
 def test_an_interval_names_the_ends_that_it_has(low: float, high: float, text: str) -> None:
     assert interval_text(low, high) == text

@@ -11,7 +11,7 @@ import xarray
 from warpimpact import Campaign, run
 from warpimpact.campaign.plates import read_plates
 from warpimpact.campaign.text import CampaignError
-from warpimpact.kernels.status import LayerStatus
+from warpimpact.kernels.status import Status
 from warpimpact.runs.replay import replay
 from warpimpact.scene import Layer
 
@@ -122,12 +122,12 @@ def test_a_result_tells_of_every_layer(result: xarray.Dataset) -> None:
     assert result.sizes["layer"] == 3
     assert result["layer_status"].attrs["flag_meanings"].split()[-1] == "not_reached"
     status = result["layer_status"].values
-    left = (status == LayerStatus.PERFORATED) | (status == LayerStatus.MISSED)
+    left = (status == Status.PERFORATED) | (status == Status.MISSED)
     for name in ("layer_residual_velocity", "layer_tilt", "layer_time"):
         np.testing.assert_array_equal(np.isfinite(result[name].values), left, err_msg=name)
     rests = result["stopped_in"].values >= 0
     np.testing.assert_array_equal(np.isfinite(result["depth"]), rests)
-    assert (status[rests, result["stopped_in"].values[rests]] == LayerStatus.ARRESTED).all()
+    assert (status[rests, result["stopped_in"].values[rests]] == Status.ARRESTED).all()
     np.testing.assert_allclose(result["layer_front"], [0.0, 54e-3, 62e-3])
     told = json.loads(result.attrs["layers"])
     assert told["1"]["offset_y"]["distribution"] == "uniform"

@@ -15,13 +15,6 @@ from warpimpact.results import files
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 @pytest.mark.parametrize(
     "command", [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"], ["plate"], ["identify"]]
 )
@@ -70,20 +63,20 @@ def _refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     return shown.err.removeprefix("warpimpact: error: ").rstrip("\n")
 
 
-def test_a_bad_campaign_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_campaign_is_refused(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("wrong.toml").write_text(SLOTTED_PLATE.read_text().replace("= 0.8 ", "= 1.8 "))
     sentence = _refusal(["run", "wrong.toml"], capsys)
     assert sentence == "wrong.toml: plate.degradation: got 1.8, but it must be less than or equal to 1"
-    assert [path.name for path in folder.iterdir()] == ["wrong.toml"]
+    assert [path.name for path in in_tmp_path.iterdir()] == ["wrong.toml"]
 
 
-def test_a_count_of_0_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_count_of_0_is_refused(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sentence = _refusal(["run", str(SLOTTED_PLATE), "--count", "0"], capsys)
     assert sentence == f"{SLOTTED_PLATE}: hits.count: got 0, but it must be greater than or equal to 1"
-    assert not list(folder.iterdir())
+    assert not list(in_tmp_path.iterdir())
 
 
-def test_an_existing_output_is_kept(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_existing_output_is_kept(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("slotted_plate.nc").write_text("precious")
     sentence = _refusal(["run", str(SLOTTED_PLATE)], capsys)
     assert sentence == "slotted_plate.nc: exists already; name another file or give --overwrite"
@@ -99,38 +92,38 @@ def test_an_existing_output_is_kept(folder: Path, capsys: pytest.CaptureFixture[
     ],
 )
 def test_an_output_that_cannot_be_written_is_refused_before_computing(
-    folder: Path, capsys: pytest.CaptureFixture[str], output: str, sentence: str
+    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], output: str, sentence: str
 ) -> None:
     Path("file").touch()
     assert _refusal(["run", str(SLOTTED_PLATE), "-o", output, "--overwrite"], capsys) == sentence
-    assert [path.name for path in folder.iterdir()] == ["file"]
+    assert [path.name for path in in_tmp_path.iterdir()] == ["file"]
 
 
-def test_an_absent_device_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_absent_device_is_refused(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sentence = _refusal(["run", str(SLOTTED_PLATE), "--count", "4", "--device", "cuda:99"], capsys)
     assert 'got "cuda:99"' in sentence
-    assert not list(folder.iterdir())
+    assert not list(in_tmp_path.iterdir())
 
 
 def test_memory_that_cannot_be_had_is_told(
-    folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def no_memory(*_: object, **__: object) -> None:
         raise MemoryError("Unable to allocate 8 TiB")
 
     monkeypatch.setattr("warpimpact.runs.run.run_to_file", no_memory)
     assert _refusal(["run", str(SLOTTED_PLATE)], capsys) == f"{SLOTTED_PLATE}: Unable to allocate 8 TiB"
-    assert not list(folder.iterdir())
+    assert not list(in_tmp_path.iterdir())
 
 
-def test_what_is_no_result_is_not_plotted(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_result_is_not_plotted(in_tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.nc").write_text("no netCDF")
     assert _refusal(["plot", "a.nc"], capsys).startswith("a.nc: cannot be read as a netCDF file")
-    assert [path.name for path in folder.iterdir()] == ["a.nc"]
+    assert [path.name for path in in_tmp_path.iterdir()] == ["a.nc"]
 
 
 def test_results_are_drawn_beside_each_other(
-    folder: Path, capsys: pytest.CaptureFixture[str], make_result: Callable[..., xarray.Dataset]
+    in_tmp_path: Path, capsys: pytest.CaptureFixture[str], make_result: Callable[..., xarray.Dataset]
 ) -> None:
     Path("b").mkdir()
     for path in ("a.nc", "b/a.nc"):

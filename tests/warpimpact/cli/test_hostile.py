@@ -322,11 +322,7 @@ def written(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> bytes
 @SMALL
 @given(st.integers(0, 10**9), st.integers(1, 40), st.booleans())
 def test_a_result_file_with_flipped_bits_is_read_or_refused(
-    written: bytes,
-    tmp_path_factory: pytest.TempPathFactory,
-    seed: int,
-    flips: int,
-    cut: bool,
+    written: bytes, tmp_path_factory: pytest.TempPathFactory, seed: int, flips: int, cut: bool
 ) -> None:
     data, path, draw = bytearray(written), tmp_path_factory.mktemp("flipped") / "a.nc", random.Random(seed)
     for _ in range(flips):

@@ -17,11 +17,7 @@ from warpimpact.identification.schema import fit_schema
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty working folder."""
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
+pytestmark = pytest.mark.usefixtures("in_tmp_path")
 
 
 def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:

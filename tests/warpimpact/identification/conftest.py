@@ -6,11 +6,14 @@ from pathlib import Path
 import pytest
 
 from warpimpact.identification.fit import Fit
+from warpimpact.identification.identify import identify_to_file
 from warpimpact.identification.reading import fit_from
 
 TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
 
 FitMaker = Callable[..., Fit]
+SMALL = ("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 100\neffective = 60\nhits = 32")
+"""What makes the fit one of a second."""
 
 
 @pytest.fixture
@@ -30,3 +33,17 @@ def make_fit() -> FitMaker:
         return fit_from(changed, "fit.toml", Path())
 
     return make
+
+
+@pytest.fixture
+def small() -> tuple[str, str]:
+    return SMALL
+
+
+@pytest.fixture(scope="session")
+def posterior(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The file of a small fit."""
+    assert SMALL[0] in TEXT
+    path = tmp_path_factory.mktemp("fit") / "posterior.nc"
+    identify_to_file(fit_from(TEXT.replace(*SMALL), "fit.toml", Path()), path, device="cpu")
+    return path

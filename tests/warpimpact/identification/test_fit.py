@@ -91,10 +91,7 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
             ("title =", 'selection = ["tilt@20mm < 3 deg"]\ntitle ='),
             "selection: got 20 mm, but the stand-offs are 50 mm;",
         ),
-        (
-            (RESISTANCE, "resistance = 2e9"),
-            "but a prior is a distribution such as",
-        ),
+        ((RESISTANCE, "resistance = 2e9"), "but a prior is a distribution such as"),
         (("[[shot]]", "[discrepancy]\nvelocity = -1\n[[shot]]"), "discrepancy"),
         (('pattern]\nshape = "circle"\ndiameter = "8 mm"\nspacing = ["12 mm", "12 mm"]', "pattern]"), "shape"),
     ],

@@ -11,7 +11,6 @@ import xarray
 
 from warpimpact.cli import main
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.identify import identify_to_file
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.reading import fit_from
 from warpimpact.results import posterior as files
@@ -74,14 +73,6 @@ def test_many_shots_are_checked_in_proportion(monkeypatch: pytest.MonkeyPatch) -
 def test_half_a_character_is_refused() -> None:
     with pytest.raises(ValueError, match=r"is not valid TOML: .* can.t encode character"):
         fit_from(json.dumps(tomllib.loads(TEXT) | {"title": "\ud800"}), "fit.json", Path())
-
-
-@pytest.fixture(scope="module")
-def posterior(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    text = TEXT.replace("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 100\neffective = 60\nhits = 32")
-    path = tmp_path_factory.mktemp("fit") / "posterior.nc"
-    identify_to_file(fit_from(text, "fit.toml", Path()), path, device="cpu")
-    return path
 
 
 ALTERATIONS: dict[str, tuple[str, Callable[[xarray.Dataset], xarray.Dataset]]] = {

@@ -12,7 +12,6 @@ from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
 from warpimpact.identification.posterior import learnt, parameters_of
-from warpimpact.identification.reading import fit_from
 from warpimpact.identification.text import posterior_text
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior as files
@@ -20,16 +19,6 @@ from warpimpact.results.files import OutputError, ResultError
 from warpimpact.runs.run import Interrupted
 
 FitMaker = Callable[..., Fit]
-SMALL = ("[sampling]\nhits = 64", "[sampling]\nsets = 128\ndraws = 100\neffective = 60\nhits = 32")
-
-
-@pytest.fixture(scope="module")
-def posterior(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    text = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
-    assert SMALL[0] in text
-    path = tmp_path_factory.mktemp("fit") / "posterior.nc"
-    identify_to_file(fit_from(text.replace(*SMALL), "fit.toml", Path()), path, device="cpu")
-    return path
 
 
 def test_the_file_has_the_groups_that_arviz_reads(posterior: Path) -> None:
@@ -81,8 +70,10 @@ def test_figures_are_drawn(posterior: Path) -> None:
     assert len(hits_figure(tree).axes) == 2
 
 
-def test_a_resumed_fit_equals_an_undisturbed_one(posterior: Path, make_fit: FitMaker, tmp_path: Path) -> None:
-    fit, path = make_fit(SMALL), tmp_path / "posterior.nc"
+def test_a_resumed_fit_equals_an_undisturbed_one(
+    posterior: Path, make_fit: FitMaker, small: tuple[str, str], tmp_path: Path
+) -> None:
+    fit, path = make_fit(small), tmp_path / "posterior.nc"
 
     def stop(standing: FitProgress) -> None:
         if standing.done >= 64 and not standing.resumed:
@@ -93,7 +84,7 @@ def test_a_resumed_fit_equals_an_undisturbed_one(posterior: Path, make_fit: FitM
     with pytest.raises(OutputError, match="continue it with --resume"):
         identify_to_file(fit, path, device="cpu")
     with pytest.raises(OutputError, match="cannot be resumed: fit was"):
-        identify_to_file(make_fit(SMALL, ("600 m/s", "601 m/s")), path, device="cpu", resume=True)
+        identify_to_file(make_fit(small, ("600 m/s", "601 m/s")), path, device="cpu", resume=True)
     standings: list[FitProgress] = []
     identify_to_file(fit, path, device="cpu", resume=True, progress=standings.append)
     assert standings[-1].resumed >= 64
@@ -103,8 +94,8 @@ def test_a_resumed_fit_equals_an_undisturbed_one(posterior: Path, make_fit: FitM
     assert not path.with_name("posterior.nc.parts").exists()
 
 
-def test_rounds_are_whole_blocks(make_fit: FitMaker) -> None:
-    plan = make_fit(SMALL).sampling
+def test_rounds_are_whole_blocks(make_fit: FitMaker, small: tuple[str, str]) -> None:
+    plan = make_fit(small).sampling
     assert sum(rounds(plan)) <= plan.sets * identify.DISCREPANCIES
     assert all(count % (plan.shared * identify.DISCREPANCIES) == 0 for count in rounds(plan))
 
@@ -117,11 +108,16 @@ def test_another_file_is_no_posterior(tmp_path: Path) -> None:
     assert not files.is_posterior(path)
 
 
+@pytest.mark.usefixtures("in_tmp_path")
 def test_the_command(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    text: str,
+    small: tuple[str, str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("fit.toml").write_text(text.replace(*SMALL), encoding="utf-8")
+    Path("fit.toml").write_text(text.replace(*small), encoding="utf-8")
     assert main(["identify", "fit.toml", "--device", "cpu"]) == 0
     shown = capsys.readouterr()
     assert "written to fit.nc" in shown.out

@@ -10,7 +10,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from warpimpact.kernels.status import LayerStatus, Status
+from warpimpact.kernels.status import Status
 from warpimpact.plotting import cell, hit_map, hit_maps, overview, save_beside, save_maps, status_map
 from warpimpact.results.outlines import outlines
 from warpimpact.scene import NoPattern
@@ -217,9 +217,7 @@ def test_status_map_has_a_colour_and_a_share_for_each_status_that_occurs(covered
     points = clear_points(covered, 60)
     matches = [
         np.allclose(
-            picture.colour(y * 1e3, z * 1e3),
-            colours[covered["status"].values[nearest_hit(covered, y, z)]],
-            atol=0.01,
+            picture.colour(y * 1e3, z * 1e3), colours[covered["status"].values[nearest_hit(covered, y, z)]], atol=0.01
         )
         for y, z in points
     ]
@@ -240,7 +238,7 @@ def test_hits_of_bursts_are_folded_into_the_cell(make_result):
 
 
 def test_every_status_has_its_own_colour():
-    assert len({to_rgb(colour) for colour in cell.STATUS_COLOURS}) == len(LayerStatus)
+    assert len({to_rgb(colour) for colour in cell.STATUS_COLOURS}) == len(Status)
 
 
 def test_overview_shows_four_aligned_maps(covered):

@@ -231,10 +231,7 @@ def test_what_is_missing_is_told_and_nothing_written(
         (["-o", page, "--study", result], 'not a study of warpimpact, it has no variable "'),
         (["-o", str(folder / "a.html")], "a.html: exists already"),
         ([result, "-o", page], "got this result 2 times, but each result counts once"),
-        (
-            ["-o", page],
-            "hits.csv; give the folder of the campaign's files with --campaign-folder, or --trajectories 0",
-        ),
+        (["-o", page], "hits.csv; give the folder of the campaign's files with --campaign-folder, or --trajectories 0"),
     ):
         assert main(["report", result, *command]) == 2
         assert sentence in capsys.readouterr().err

@@ -137,9 +137,8 @@ def test_a_study_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path: Path) -> None:
-    other = run(
-        Campaign.from_text(TEXT.replace("staggered = true", "staggered = false"), name="b", folder=Path()), device="cpu"
-    )
+    text = TEXT.replace("staggered = true", "staggered = false").replace('"12 mm"', '"11 mm"')
+    other = run(Campaign.from_text(text, name="b", folder=Path()), device="cpu")
     for name, one in (("a", result), ("b", other)):
         files.write(one, tmp_path / f"{name}.nc")
     with open_result(tmp_path / "a.nc") as a, open_result(tmp_path / "b.nc") as b:
@@ -148,6 +147,8 @@ def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path
         by_plate = xarray.concat([a, b], "plate")
     assert lengths[0] != lengths[1]
     assert along_hits["tilt"].shape == (256, 2)
+    assert solid_reference(along_hits) is None  # each plate has its own
+    assert len(effectiveness(along_hits)) == len(effectiveness(result))
     assert by_plate["residual_velocity"].shape == (2, 128)
     np.testing.assert_array_equal(by_plate["residual_velocity"][1], other["residual_velocity"])
 

@@ -96,10 +96,10 @@ def test_behind_a_plate_of_no_resistance_it_is_the_plate_alone() -> None:
 
 
 def test_an_image_of_a_hit_is_mirrored() -> None:
-    home, image = (fields_behind(history(number, irreducible="true"))[0] for number in (0, 1))
+    first, second = (history(number, irreducible="true") for number in (0, 1))
+    home, image = (fields_behind(found)[0] for found in (first, second))
     assert taken(home).sum() == pytest.approx(taken(image).sum(), rel=1e-12)
     assert (np.diff(image.cell_y) > 0.0).all()
-    first, second = (history(number, irreducible="true") for number in (0, 1))
     for field, found in ((home, first), (image, second)):
         path = found["plate_position"].values
         np.testing.assert_allclose(centre(field), path[np.argmax(path[:, 0] > 0.0655), 1:], atol=2e-3)

@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 from warpimpact import Campaign, hit_map, run, to_dataframe
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.campaign.text import CampaignError
-from warpimpact.kernels.status import LayerStatus
+from warpimpact.kernels.status import Status
 from warpimpact.plotting import poses, trajectory
 from warpimpact.plotting.cell import GREY, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
@@ -113,14 +113,14 @@ def test_the_figure_of_layers_has_a_row_for_each(result: xarray.Dataset) -> None
 
 def test_the_legend_of_layers_names_each_colour_once(result: xarray.Dataset) -> None:
     stopped = result.copy(deep=True)
-    stopped["layer_status"][:, 2] = LayerStatus.ARRESTED
+    stopped["layer_status"][:, 2] = Status.ARRESTED
     stopped["layer_standoff_tilt"][:, 2] = stopped["layer_tilt"][:, 2] = np.nan
     stopped["layer_residual_velocity"][:, 2] = np.nan
     (legend,) = layers_figure(stopped).legends
     texts = [text.get_text() for text in legend.get_texts()]
     assert sorted(texts) == ["arrested", "edge of hole", "no value: arrested", "perforated"]
     colours = {patch.get_label(): to_hex(patch.get_facecolor()).upper() for patch in legend.get_patches()}
-    assert colours["arrested"] == STATUS_COLOURS[LayerStatus.ARRESTED]
+    assert colours["arrested"] == STATUS_COLOURS[Status.ARRESTED]
     assert colours["no value: arrested"] == to_hex(GREY).upper()
 
 

@@ -79,11 +79,7 @@ def _cut_png(path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "write", "complaint"),
     [
-        (
-            "a.png",
-            lambda p: _png(p, np.arange(9, dtype=np.uint8).reshape(3, 3)),
-            "is not a mask: a mask has two",
-        ),
+        ("a.png", lambda p: _png(p, np.arange(9, dtype=np.uint8).reshape(3, 3)), "is not a mask: a mask has two"),
         ("a.png", lambda p: _png(p, np.zeros((3, 3), dtype=np.uint8)), "is not a mask: a mask has two"),
         ("a.png", lambda p: _png(p, np.zeros((3, 3, 4), dtype=np.uint8)), "grey or 1-bit image, not RGBA"),
         ("a.png", lambda p: p.write_text("no image at all, but long"), "is not a PNG image"),
