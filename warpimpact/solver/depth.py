@@ -19,6 +19,10 @@ SPARE = 4
 """Planes beyond those within a laminate: one on each side, the one behind the last whole spacing, and its neighbour."""
 
 
+ROUNDING = 1e-9
+"""Of a thickness, which may be a sum."""
+
+
 class Planes(NamedTuple):
     """Planes of a window through the thickness: their number, the `spacing` between two [m], and how many of them a
     degradation depth has. One stands for the whole thickness."""
@@ -50,7 +54,8 @@ def thicknesses_of(laminates: Sequence[int], materials: Sequence[Materials]) -> 
 
 def is_deep(target: Target, thicknesses: Sequence[float]) -> bool:
     """Whether a laminate is thicker than the depth over which it weakens together."""
-    return any(h > layer.degradation_depth for h, layer in zip(thicknesses, target.layers, strict=True))
+    most = 1.0 + ROUNDING
+    return any(h > most * layer.degradation_depth for h, layer in zip(thicknesses, target.layers, strict=True))
 
 
 def planes_of(target: Target, thicknesses: Sequence[float], resolution: Resolution) -> list[Planes]:
