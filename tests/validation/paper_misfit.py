@@ -43,10 +43,10 @@ def refined(fit: Fit, points: np.ndarray, misfit: np.ndarray, seed: int = 0) -> 
         chosen = np.argsort(all_values)[:KEPT]
         best, values = every[chosen], all_values[chosen]
         print(f"round {place + 1}: {values.round(2)}", flush=True)
-    for fidelity in ("draft", "standard", "reference"):
-        settings = replace(finer, numerics=fit.numerics.model_copy(update={"fidelity": fidelity}))
+    for level in (0, 2, 6):
+        settings = replace(finer, numerics=fit.numerics.model_copy(update={"level": level}))
         scores = evaluate(settings, best[:1], seed=0)
-        print(f"{fidelity}: misfit {sum(float(one.misfit[0]) for one in scores):.2f}")
+        print(f"level {level}: misfit {sum(float(one.misfit[0]) for one in scores):.2f}")
         for shot, one in zip(fit.shots, scores, strict=True):
             told = [f"{o.label} {o.shown(x):.1f}" for o, x in zip(shot.observations, one.best[0], strict=True)]
             print(f"  {shot.name}: {float(one.misfit[0]):.2f} at {1e3 * one.best_hit[0]} mm: {', '.join(told)}")

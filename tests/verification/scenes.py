@@ -69,7 +69,7 @@ def shots_at(
     return Shots(*(np.array(column, dtype=float) for column in columns))
 
 
-REFERENCE: dict[str, Any] = {"level": 7, "patches_axial": 64, "patches_around": 56, "travel": 0.05}
+REFERENCE: dict[str, Any] = {"level": 7, "patches_axial": 64, "travel": 0.05}
 """Numerics that are far finer than those of most runs."""
 
 

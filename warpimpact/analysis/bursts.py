@@ -80,7 +80,7 @@ def bursts(dataset: Result) -> Bursts:
     """Analyse a result of bursts; of an open file one number per hit is in memory."""
     members = shots_at_a_plate(dataset)
     velocity, *tilts = means_of((v.RESIDUAL_VELOCITY, v.TILT), dataset[v.STANDOFF].values.tolist())
-    measures = (velocity, tilts[-1], Measure.parse("P(perforated)"))
+    measures = (velocity, *tilts[-1:], Measure.parse("P(perforated)"))
     needed = dataset[[v.STATUS, v.RESIDUAL_VELOCITY, v.TILT, v.NEAREST_EARLIER_HIT]]
     parts = [(part[v.NEAREST_EARLIER_HIT].values, *(one.values(part) for one in measures)) for part in slices(needed)]
     nearest, *columns = (np.concatenate(some).reshape(-1, members) for some in zip(*parts, strict=True))

@@ -17,6 +17,7 @@ import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from html import escape
 from itertools import combinations, pairwise
 from typing import Any, NamedTuple
 
@@ -116,6 +117,12 @@ class Comparison:
     at_equal_weight: frozenset[str] | None
     confidence: float
     notes: tuple[str, ...]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from warpimpact.analysis.comparison_text import comparison_text  # it knows this class
+
+        return f"<pre>{escape(comparison_text(self))}</pre>"
 
     def ranks(self, measure: str) -> dict[str, int]:
         """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;

@@ -78,8 +78,6 @@ def effects(dataset: xarray.Dataset, *, angle: float | str, standoff: float | st
         return
     if base.has_base(dataset):
         yield from _of_base()
-    standoff, degrees = _at_standoff(dataset, standoff), math.degrees(_read("angle", Obliquity, angle))
-    at = f"{standoff * 1e3:g} mm"
     yield Effect(
         name="residual_energy_fraction",
         label="residual energy fraction",
@@ -91,34 +89,9 @@ def effects(dataset: xarray.Dataset, *, angle: float | str, standoff: float | st
         kind="mean",
         values=_energy_fraction,
     )
-    if attr.CORE in dataset.attrs:
-        yield Effect(
-            name="residual_energy_density",
-            label=f"proxy: energy per presented area at {at}",
-            units="J mm-2",
-            definition="Kinetic energy of translation behind the plate over the area of the core's silhouette along "
-            f"the line of fire {at} behind it, nose or base first alike; 0 for a core that was arrested or "
-            "ricocheted. A proxy of how deep the core goes into what follows, which takes resistance times area from "
-            "it per depth.",
-            source="G. Ben-Dor, A. Dubinsky, T. Elperin, Applied Mechanics Reviews 58 (2005) 355; the silhouette of "
-            "a convex body is Cauchy's",
-            higher_is_better=False,
-            kind="mean",
-            values=_energy_density(TypeAdapter[Core](AnyCore).validate_json(dataset.attrs[attr.CORE]), standoff),
-        )
-    yield Effect(
-        name="tilted_share",
-        label=f"P(inclined > {degrees:g}° at {at}, either end first, or stopped)",
-        units="1",
-        definition=f"Share of the shots that {at} behind the plate are inclined to the line of fire by more than "
-        f"{degrees:g}°, tilt beyond 90° counted back from 180°, or that do not get there because they were arrested "
-        "or ricocheted.",
-        source="Numerical and experimental investigation of asymmetrical contact between a steel plate and "
-        "armour-piercing projectiles: what protects is mostly the distortion of the trajectory",
-        higher_is_better=True,
-        kind="share",
-        values=_is_tilted(degrees, standoff),
-    )
+    if standoff is not None or dataset.sizes["standoff"]:
+        degrees = math.degrees(_read("angle", Obliquity, angle))
+        yield from _at_a_standoff(dataset, degrees, _at_standoff(dataset, standoff))
     yield Effect(
         name="stopped_share",
         label="P(stopped)",
@@ -150,6 +123,39 @@ def effects(dataset: xarray.Dataset, *, angle: float | str, standoff: float | st
         higher_is_better=True,
         kind="share",
         values=lambda part: np.where(passed(part), _is_broken(part), np.where(failed(part), np.nan, 1.0)),
+    )
+
+
+def _at_a_standoff(dataset: xarray.Dataset, degrees: float, standoff: float) -> Iterator[Effect]:
+    """Of where and how the core is at a stand-off [m]; it is tilted beyond so many degrees."""
+    at = f"{standoff * 1e3:g} mm"
+    if attr.CORE in dataset.attrs:
+        yield Effect(
+            name="residual_energy_density",
+            label=f"proxy: energy per presented area at {at}",
+            units="J mm-2",
+            definition="Kinetic energy of translation behind the plate over the area of the core's silhouette along "
+            f"the line of fire {at} behind it, nose or base first alike; 0 for a core that was arrested or "
+            "ricocheted. A proxy of how deep the core goes into what follows, which takes resistance times area from "
+            "it per depth.",
+            source="G. Ben-Dor, A. Dubinsky, T. Elperin, Applied Mechanics Reviews 58 (2005) 355; the silhouette of "
+            "a convex body is Cauchy's",
+            higher_is_better=False,
+            kind="mean",
+            values=_energy_density(TypeAdapter[Core](AnyCore).validate_json(dataset.attrs[attr.CORE]), standoff),
+        )
+    yield Effect(
+        name="tilted_share",
+        label=f"P(inclined > {degrees:g}° at {at}, either end first, or stopped)",
+        units="1",
+        definition=f"Share of the shots that {at} behind the plate are inclined to the line of fire by more than "
+        f"{degrees:g}°, tilt beyond 90° counted back from 180°, or that do not get there because they were arrested "
+        "or ricocheted.",
+        source="Numerical and experimental investigation of asymmetrical contact between a steel plate and "
+        "armour-piercing projectiles: what protects is mostly the distortion of the trajectory",
+        higher_is_better=True,
+        kind="share",
+        values=_is_tilted(degrees, standoff),
     )
 
 

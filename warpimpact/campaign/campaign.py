@@ -63,7 +63,7 @@ class Output(Record):
         exit_state: store velocity, axis and position of every core at the end of contact.
     """
 
-    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, min_length=1, max_length=64)] = (0.05, 0.13)
+    standoffs: Annotated[tuple[PositiveLength, ...], Field(fail_fast=True, max_length=64)] = (0.05, 0.13)
     failed_share: Annotated[Number, Field(ge=0, le=1)] = 0.01
     solid_reference: Annotated[bool, Field(strict=True)] = True
     exit_state: Annotated[bool, Field(strict=True)] = True

@@ -7,6 +7,7 @@ shots that the posterior was found from.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
 from warpimpact.results import posterior as files
 from warpimpact.scene import Interaction, Plate, Sampler, Scene, Shots
@@ -160,4 +162,18 @@ def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
     if not values:
         known = ", ".join(".".join(map(str, one)) for one in OF_THE_MATERIAL)
         raise ValueError(f"{path.name}: has none of the parameters that a run can take from a posterior: {known}")
+    for (table, key), column in values.items():
+        for value in (column.min(), column.max()) if np.isfinite(column).all() else (math.nan,):
+            _check_value(str(table), str(key), float(value), path.name)
     return Posterior(values, json.loads(str(tree.attrs[files.MATERIAL])))
+
+
+def _check_value(table: str, key: str, value: float, name: str) -> None:
+    """Refuse a value that no campaign may have."""
+    try:
+        if table == "plate":
+            Plate(**{"thickness": 1e-3, "resistance": 1e9} | {key: value})
+        else:
+            Interaction(**{key: value})
+    except ValidationError:
+        raise ValueError(f"{name}: has {table}.{key} = {value:g}, which is not allowed there") from None

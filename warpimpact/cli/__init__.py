@@ -56,6 +56,10 @@ def command() -> NoReturn:
     Nothing is left to do when the command has ended, and the process ends at once. To free all that it has loaded would
     take as long as a small run computes. A thread that is still computing, after Ctrl-C, has nothing to save.
     """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # closed; its number would go to the next file that is opened
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, it stays open
+    os.environ["MPLBACKEND"] = "agg"  # figures go to files, whatever is set
     code = main()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # who reads it has gone

@@ -17,6 +17,8 @@ def told(error: Exception) -> str | None:
     """What a person is told of an error that they can put right; None of a bug."""
     if isinstance(error, mistakes()):
         return str(error)
+    if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
+        return f"{ascii(error.object)[1:200]}: a name holds bytes that are no UTF-8; rename it"
     if isinstance(error, MemoryError):
         return f"not enough memory: {error}" if str(error) else "not enough memory"
     if isinstance(error, OSError):  # of the system: a name that is too long, a disk that is full

@@ -120,7 +120,7 @@ def _plate(arguments: argparse.Namespace) -> None:
     check_picture(output, overwrite=arguments.overwrite)
     campaign = Campaign.from_toml(arguments.campaign)
     plate = campaign.plate
-    plate_figure(plate, campaign.core, campaign.title).savefig(output, dpi=150)
+    plate_figure(campaign.target, campaign.core, campaign.title).savefig(output, dpi=150)
     print(campaign.title)
     print(f"{'thickness':<18}  {1e3 * plate.thickness:g} mm")
     numbers = plate_numbers(plate.open_area, plate.ligament, plate.areal_density, plate.pattern.resolution)

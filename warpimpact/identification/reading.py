@@ -73,7 +73,10 @@ def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     parameters = read_priors(prior, tables, name)
     tables = with_medians(tables, prior, parameters)
     record = _model(Record, data.get("record", {}), f"{name}: record")
-    numerics = _model(Numerics, {"level": 0} | _table(data, "numerics", name), f"{name}: numerics")
+    settings = _table(data, "numerics", name)
+    if named := next((key for key in ("fidelity", "accuracy") if key in settings), None):
+        raise FitError(f"{name}: numerics.{named}: a fit has no pilot; give level = 0 to 9, or single settings")
+    numerics = _model(Numerics, {"level": 0} | settings, f"{name}: numerics")
     shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
     selection = tuple(_condition(one, record, f"{name}: selection") for one in _selection(data, name))
     if any(one.variable == "bending_stress" for one in selection):

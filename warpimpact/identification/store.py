@@ -11,7 +11,6 @@ import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,13 +61,14 @@ class Store:
 
     def _begun(self) -> Any:
         """What was begun here, None if nothing was; a damaged manifest is nothing."""
+        manifest = self.folder / _MANIFEST
         try:
-            return json.loads((self.folder / _MANIFEST).read_bytes())
+            return json.loads(manifest.read_bytes()) if manifest.is_file() else None
         except (OSError, ValueError):
             return None
 
     def _batches(self) -> list[Path]:
-        return sorted(self.folder.glob("batch_*.npz"))
+        return sorted(path for path in self.folder.glob("batch_*.npz") if not path.is_fifo())
 
     def _path(self, batch: int) -> Path:
         return self.folder / f"batch_{batch:06d}.npz"
@@ -76,9 +76,11 @@ class Store:
     def load(self, batch: int) -> dict[str, NDArray[Any]] | None:
         """A batch that was computed; None if it is not there, is damaged or is of another fit."""
         try:
+            if not self._path(batch).is_file():  # a pipe would be waited for
+                return None
             with np.load(self._path(batch), allow_pickle=False) as file:
                 arrays = dict(file)
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        except Exception:  # a bit that was flipped leads zipfile into errors of many classes
             return None
         return arrays if str(arrays.pop("seal", "")) == self._seal else None
 

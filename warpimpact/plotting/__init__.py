@@ -15,6 +15,7 @@ from warpimpact.plotting.study import study_figure
 from warpimpact.plotting.trajectory import course, flight, largest_load, passage
 from warpimpact.plotting.weight import weight_figure
 
+mpl.rcParams["text.usetex"] = False  # a matplotlibrc may ask for it, and titles are no TeX
 mpl.rcParams["text.parse_math"] = False  # a title is text: "$" is a character of it, and broken mathtext an error
 
 __all__ = [

@@ -89,7 +89,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
     they ended.
     """
     statuses, standoffs = np.unique(dataset[v.STATUS].values), dataset[v.STANDOFF].values
-    columns = [shown(dataset, variable) for variable in _MAIN]
+    columns = [shown(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
     if len(statuses) == 1 and len(standoffs) > 1:
         columns.insert(2, shown(dataset, v.TILT, float(standoffs[0])))
     names = {code: words(name) for name, code in status_codes(dataset).items()}
@@ -145,7 +145,9 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoffs else [None]:
             name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
             figures[name] = hit_map(dataset, variable, standoff)
-    figures |= {"marginals": marginals(dataset, v.RESIDUAL_VELOCITY), "dispersion": dispersion(dataset)}
+    figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
+    if dataset.sizes["standoff"]:
+        figures["dispersion"] = dispersion(dataset)
     if is_uncertain(dataset):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
     if v.LAYER_STATUS in dataset:
@@ -163,7 +165,10 @@ def save_beside(
     Raises:
         OutputError: one of them exists, and must not be replaced.
     """
-    figures: dict[str, Figure] = {variable: hit_maps(datasets, variable) for variable in _MAIN}
+    there = all(dataset.sizes["standoff"] for dataset in datasets.values())
+    figures: dict[str, Figure] = {
+        variable: hit_maps(datasets, variable) for variable in _MAIN if variable != v.TILT or there
+    }
     return _saved(figures, folder, stem, overwrite=overwrite)
 
 

@@ -17,7 +17,7 @@ from matplotlib.path import Path
 
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.plotting.dimensions import draw_dimensions
-from warpimpact.scene import NoPattern
+from warpimpact.scene import NoPattern, Target
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,18 +30,25 @@ _CELLS = 3  # of an unbounded plate, along each side
 _LONGER_SIDE = 5.0  # of the plate on paper [inch], without axes, title and legend
 _ROOM_ACROSS, _BELOW, _ABOVE = 1.5, 1.7, 0.85
 _NARROWEST = 6.0
+_SECTION = 4.2  # of a target on paper [inch]
+_SECTION_POINTS = 2001
 _STEEL, _CORE = "0.72", "#D55E00"
 
 
-def plate_figure(plate: Plate, core: Core | None = None, title: str = "") -> Figure:
-    """Draw a finite plate as a whole, another one as three by three cells, with its numbers.
+def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "") -> Figure:
+    """Draw a finite plate as a whole, another one as three by three cells, with its numbers; beside it a section of the
+    target, if layers stand behind the plate.
 
     Args:
-        plate: the plate.
+        plate: the plate, or the target whose first layer it is.
         core: its largest section is drawn in the middle of the plate.
         title: title of the figure.
     """
-    figure, axes = _sheet(_extent(plate, core) * _MM)
+    target = plate if isinstance(plate, Target) else Target(layers=(plate,))
+    plate, layered = target.layers[0], len(target.layers) > 1
+    figure, axes = _sheet(_extent(plate, core) * _MM, beside=_SECTION if layered else 0.0)
+    if layered:
+        _draw_section(figure, axes, target)
     patches = [*_holes(plate, axes), *_frames(plate), *([] if core is None else [_section(core)])]
     for patch in patches:
         axes.add_patch(patch)
@@ -72,13 +79,32 @@ def _extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
     return np.asarray(np.maximum(_CELLS * np.array(plate.pattern.unit_cell), least))
 
 
-def _sheet(extent: NDArray[np.float64]) -> tuple[Figure, Axes]:
-    """Figure with axes to scale, centred on the origin; extent in mm."""
+def _draw_section(figure: Figure, plane: Axes, target: Target) -> None:
+    """The layers in the section y = 0, beside the view of the plate and as high: x to scale, z to another one."""
+    width, place = figure.get_figwidth(), plane.get_position()
+    box = (1.0 - (_SECTION - 0.3) / width, place.y0, (_SECTION - 0.6) / width, place.height)
+    axes = figure.add_axes(box, sharey=plane, facecolor="white", xlabel="x [mm]")
+    z = np.linspace(*plane.get_ylim(), _SECTION_POINTS) / _MM
+    for number, (layer, (front, rear)) in enumerate(zip(target.layers, target.faces * _MM, strict=True)):
+        at_y, at_z = (target.value(f"offset_{axis}", number) for axis in "yz")
+        solid = layer.is_solid(np.array(-at_y), z - at_z)
+        axes.fill_betweenx(z * _MM, front, rear, where=solid, color=_STEEL, step="mid")
+        label = f"{'plate' if number == 0 else f'layer {number}'}, {layer.thickness * _MM:g} mm"
+        at, side, ha = (front, -3.0, "right") if number else (rear, 3.0, "left")
+        style: dict[str, Any] = {"textcoords": "offset points", "rotation": 90.0, "ha": ha, "va": "center"}
+        axes.annotate(label, (at, 0.0), (side, 0.0), fontsize="small", **style)
+    axes.margins(x=0.08)
+    axes.set_title("section at y = 0", fontsize="medium")
+    axes.tick_params(labelleft=False)
+
+
+def _sheet(extent: NDArray[np.float64], beside: float) -> tuple[Figure, Axes]:
+    """Figure with axes to scale, centred on the origin; extent in mm, and room beside it [inch]."""
     across, up = _LONGER_SIDE * extent / extent.max()
-    width, height = max(across + _ROOM_ACROSS, _NARROWEST), up + _BELOW + _ABOVE
+    width, height = max(across + _ROOM_ACROSS, _NARROWEST) + beside, up + _BELOW + _ABOVE
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes(
-        ((width - across) / 2 / width, _BELOW / height, across / width, up / height),
+        ((width - beside - across) / 2 / width, _BELOW / height, across / width, up / height),
         xlim=(-extent[0] / 2, extent[0] / 2),
         ylim=(-extent[1] / 2, extent[1] / 2),
         aspect="equal",

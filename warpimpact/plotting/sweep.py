@@ -44,12 +44,14 @@ def sweep_figure(sweep: xarray.Dataset) -> Figure:
     panels = figure.subplots(2, 2, sharex=True)
     for number, (label, line) in enumerate(lines):
         found = [estimated(point, measures) for point in points_along(line, along)]
-        for axes, measure in zip(panels.flat, measures, strict=True):
+        for axes, measure in zip(panels.flat, measures, strict=False):
             colour, estimates = _COLOURS[number % len(_COLOURS)], [one[measure] for one in found]
             _draw(axes, line[along], estimates, colour, label)
             if not measure.is_binary:
                 _tell_shares(axes, line[along], estimates, [one[measures[-1]].count for one in found], colour)
-    for axes, measure in zip(panels.flat, measures, strict=True):
+    for axes in panels.flat[len(measures) :]:
+        axes.set_axis_off()
+    for axes, measure in zip(panels.flat, measures, strict=False):
         axes.set_ylabel(_label(measure))
         axes.grid(color="0.9")
         if measure.is_binary:
@@ -79,8 +81,8 @@ def _product(sizes: Any) -> int:
 
 
 def _measures(sweep: xarray.Dataset) -> list[Measure]:
-    last = float(sweep[v.STANDOFF].values[-1])
-    means = [f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", f"mean({v.TILT}@{last!r}m)"]
+    tilts = [f"mean({v.TILT}@{last!r}m)" for last in sweep[v.STANDOFF].values[-1:].tolist()]
+    means = [f"mean({v.RESIDUAL_VELOCITY})", f"mean({v.DEFLECTION})", *tilts]
     return [Measure.parse(text) for text in (*means, "P(perforated)")]
 
 

@@ -102,8 +102,8 @@ def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]]
 
 def telling(dataset: xarray.Dataset, hits: Sequence[int]) -> int | None:
     """The one of some hits whose trajectory shows most: the largest tilt at the largest stand-off."""
-    if not hits:
-        return None
+    if not hits or not dataset.sizes["standoff"]:
+        return hits[0] if hits else None
     chosen = dataset[[v.TILT]].isel(hit=np.isin(hit_numbers(dataset), hits), standoff=-1).load()
     tilt = chosen[v.TILT].values
     return int(hit_numbers(chosen)[np.nanargmax(tilt)]) if np.isfinite(tilt).any() else hits[0]

@@ -169,11 +169,12 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
         there = [name for name in names if name in dataset.variables]
         if there and (missing := [name for name in names if name not in there]):
             return f'it has no variable "{missing[0]}" beside "{there[0]}"'
-    if dataset.sizes.get("standoff", 1) == 0:
-        return "it has no stand-offs"
     status, codes = dataset[v.STATUS], [*Status]
     if not all(np.isin(status[at : at + _SLICE].values, codes).all() for at in range(0, len(status), _SLICE)):
         return f'its variable "{v.STATUS}" has codes that mean nothing'
+    for place in (dataset[name] for name in (v.HIT_Y, v.HIT_Z) if name in dataset.variables):
+        if not all(np.isfinite(place[at : at + _SLICE].values).all() for at in range(0, place.size, _SLICE)):
+            return f'its variable "{place.name}" has places that are no numbers'
     return None
 
 

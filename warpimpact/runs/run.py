@@ -58,7 +58,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
     with local_team(campaign, device) as team:
         shards = Shards(extent(total, campaign.at_a_plate))
         end = _fill(campaign, shards, team, progress or (lambda now: None))
-    table = joined(shards.load(index) for index in range(end.shards))
+    table = joined(shards.shard(index) for index in range(end.shards))
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
 
 
@@ -132,10 +132,10 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
     watch = _Watch(campaign, len(sampler), shards, computation.measures)
     there = sorted(shards.there())
     for index in there:
-        watch.add(index, shards.load(index))
+        watch.add(index, shards.shard(index))
     watch.resumed = watch.done
     if there:
-        watch.found = computation.found_in(shards.load(there[0]))
+        watch.found = computation.found_in(shards.shard(there[0]))
     else:
 
         def tick() -> None:
@@ -214,10 +214,10 @@ class _Watch:
     """
 
     def __init__(self, campaign: Campaign, total: int, shards: Shards, measures: Sequence[str] = ()) -> None:
-        self._total, self._shards, self._load = total, -(-total // shards.extent), shards.load
+        self._total, self._shards, self._load = total, -(-total // shards.extent), shards.shard
         self._rule = campaign.stop
-        last = campaign.output.standoffs[-1]
-        measures = measures or ("mean(residual_velocity)", f"mean(tilt@{last * 1e3:.10g}mm)")
+        tilts = [f"mean(tilt@{last * 1e3:.10g}mm)" for last in campaign.output.standoffs[-1:]]
+        measures = measures or ("mean(residual_velocity)", *tilts)
         dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
         self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
         if self._rule is not None:

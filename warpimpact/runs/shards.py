@@ -140,7 +140,7 @@ class Shards:
         """Take in a shard."""
         self._held[index] = table
 
-    def load(self, index: int) -> Table:
+    def shard(self, index: int) -> Table:
         """A shard that is there."""
         return self._held[index]
 
@@ -209,6 +209,8 @@ class ShardsOnDisk(Shards):
 
     def _read_manifest(self) -> dict[str, Any] | None:
         """What was begun here; None if nothing was, which a missing manifest means; empty if that cannot be known."""
+        if (self.folder / _MANIFEST).is_fifo():  # it would be waited for
+            return {}
         try:
             begun = json.loads((self.folder / _MANIFEST).read_bytes())
             replaces, known = begun.pop("replaces"), begun.pop("fingerprint")
@@ -280,7 +282,7 @@ class ShardsOnDisk(Shards):
             file.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
     def _shards(self) -> list[Path]:
-        return sorted(self.folder.glob(_SHARDS))
+        return sorted(path for path in self.folder.glob(_SHARDS) if not path.is_fifo())
 
     def _stem(self, index: int) -> str:
         return f"hits_{index * self.extent:010d}"
@@ -352,13 +354,13 @@ class ShardsOnDisk(Shards):
             self.flush()
         return len(self._shards())
 
-    def load(self, index: int) -> Table:
+    def shard(self, index: int) -> Table:
         """A shard that is there.
 
         Raises:
             OutputError: it is gone or damaged meanwhile.
         """
-        return super().load(index) if index in self._held else read_table(self._path(index))
+        return super().shard(index) if index in self._held else read_table(self._path(index))
 
     def _grow(self, count: int | None = None) -> None:
         """Add the shards to the result file that are there and follow those in it, or the first `count` shards."""
@@ -367,7 +369,7 @@ class ShardsOnDisk(Shards):
             self._growing = IncrementalFile(self.output, self.folder / _GROWING, hits)
         there = self.there()
         while self._grown in there if count is None else self._grown < count:
-            self._growing.add(self.load(self._grown))
+            self._growing.add(self.shard(self._grown))
             self._grown += 1
 
     def _stop_growing(self) -> None:
@@ -386,7 +388,7 @@ class ShardsOnDisk(Shards):
         Raises:
             OutputError: the file cannot be written, or a shard is damaged meanwhile; the others are still there.
         """
-        told = {**attributes(self.load(0)), attr.FINGERPRINT: self._fingerprint}
+        told = {**attributes(self.shard(0)), attr.FINGERPRINT: self._fingerprint}
         self._grow(count)
         assert self._growing is not None  # there are hits
         self._growing.complete(told)
@@ -396,7 +398,7 @@ class ShardsOnDisk(Shards):
 
     def discard(self) -> None:
         """Empty the folder: first of its manifest, without which the rest means nothing."""
-        for path in (self.folder / _MANIFEST, *self._shards(), *self.folder.glob(".*.part")):
+        for path in (self.folder / _MANIFEST, *self.folder.glob(_SHARDS), *self.folder.glob(".*.part")):
             _remove(path)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from .distributions import EDGE, AnyDistribution, Distribution
-from .exclusions import BURST, IMAGES, check_together
+from .exclusions import BURST, HIT_SCATTER, IMAGES, OFFSETS, SPACING, check_together
 from .model import Array
 from .plate import Plate
 from .quantities import DRAWN, QUANTITIES, Quantity, drawn_column
@@ -73,9 +73,8 @@ class Burst(Scattering):
     def _lie_somewhere(self) -> Self:
         if self.spacing is None and self.offsets is None and self.scatter is None:
             raise ValueError("got neither spacing, offsets nor scatter, but one of them must say how the hits lie")
-        if self.spacing is not None and (self.offsets is not None or self.scatter is not None):
-            other = "offsets" if self.offsets is not None else "scatter"
-            raise ValueError(f"got spacing beside {other}, but a burst takes one of them")
+        given = {SPACING: self.spacing is not None, OFFSETS: self.offsets is not None}
+        check_together(given | {HIT_SCATTER: self.scatter is not None})
         if self.offsets is not None and len(self.offsets) != self.count:
             raise ValueError(f"got count = {self.count} and {len(self.offsets)} offsets, but each shot needs its own")
         return self

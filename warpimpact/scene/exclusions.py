@@ -21,7 +21,10 @@ ONE_SCRAMBLING = "hits.replicates = 1"
 LISTED_STRENGTH = "a column strength in hits.file"
 LAYER_STANDOFFS = "output.layer_standoffs"
 STOP_BENDING, STOP_BROKEN = "stop.quantity of a bending moment or stress", "stop.quantity of broken cores"
-WHOLE_PLATE, SIZE = 'hits.area = "plate"', "plate.size"
+WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
+BY_TIME, MASK, STAGGERED, HOLES = "plate.degradation_interval", 'shape = "mask"', "staggered", "holes"
+SPACING, OFFSETS, HIT_SCATTER = "burst.spacing", "burst.offsets", "burst.scatter"
+LIMIT = "warpimpact limit"
 
 
 class Rule(NamedTuple):
@@ -37,6 +40,13 @@ EXCLUDED = (
     Rule(BURST, IMAGES, "the hits of a burst have no images"),
     Rule(BURST, NODAL, "the nodal scheme does not know earlier hits"),
     Rule(BURST, POSTERIOR, "the shots of a burst share one plate, not their draws"),
+    Rule(SPACING, OFFSETS, "each says how the hits of a burst lie"),
+    Rule(SPACING, HIT_SCATTER, "each says how the hits of a burst lie"),
+    Rule(LIMIT, STOP, "limits are searched for every hit; leave out the table [stop]"),
+    Rule(LIMIT, BURST, "limits are searched for every hit alone; leave out the table [burst]"),
+    Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
+    Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
+    Rule(MARGIN, MASK, "a mask has no single holes to leave out; draw it as large as the plate"),
     Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),
     Rule(BY_PATH, NODAL, "the nodal scheme weakens the plate once per time step"),
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
@@ -56,6 +66,7 @@ NEEDED = (
     Rule(STOP_BENDING, BENDING, "it is not recorded otherwise"),
     Rule(STOP_BROKEN, STRENGTH, "other cores do not break"),
     Rule(WHOLE_PLATE, SIZE, "only a finite plate can be covered"),
+    Rule(MARGIN, SIZE, "only a finite plate has a rim"),
 )
 
 

@@ -81,7 +81,7 @@ class Numerics(_AsGiven):
     level: Annotated[int, Field(strict=True, ge=0, le=9)] | None = None
     scheme: Literal["consistent", "nodal"] = "consistent"
     time_step: PositiveTime | None = None
-    travel: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    travel: Annotated[float, Field(gt=0.0, le=2.0)] | None = None
     patches_axial: Annotated[int, Field(strict=True, ge=4, le=4096)] | None = None
     patches_around: Annotated[int, Field(strict=True, ge=8, le=4096, multiple_of=4)] | None = None
     grid_spacing: PositiveLength | None = None

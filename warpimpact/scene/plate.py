@@ -5,6 +5,7 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator, model_validator
 
+from .exclusions import BY_PATH, BY_TIME, MARGIN, SIZE, check_together
 from .model import Array, Model
 from .patterns import AnyPattern, BoolArray, NoPattern, Pattern
 from .units import (
@@ -67,11 +68,7 @@ class Plate(Model):
         if not isinstance(values, dict):
             return values
         interval, distance = (values.get(f"degradation_{name}") for name in ("interval", "distance"))
-        if interval is not None and distance is not None:
-            raise ValueError(
-                f"got degradation_interval = {interval} beside degradation_distance = {distance}, but exposure counts "
-                "either time or path: give one of them"
-            )
+        check_together({BY_TIME: interval is not None, BY_PATH: distance is not None})
         by_time = distance is None and interval is None
         return values | {"degradation_interval": INTERVAL} if by_time else values
 
@@ -84,8 +81,7 @@ class Plate(Model):
 
     @model_validator(mode="after")
     def _margin_has_a_rim(self) -> Self:
-        if self.margin is not None and self.size is None:
-            raise ValueError(f"got margin = {1e3 * self.margin:g} mm without size, but only a finite plate has a rim")
+        check_together({MARGIN: self.margin is not None, SIZE: self.size is not None})
         return self
 
     @property

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.kernels import free_flight
-from warpimpact.kernels import march as marching
+from warpimpact.kernels import free_flight, march
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, load
@@ -114,7 +113,7 @@ def spread(shots: Shots, most: int) -> Shots:
 
 def build(prepared: Prepared, device: str = "auto") -> None:
     """Compile the kernels that `computed` needs, once per version and machine."""
-    for stage in (marching, free_flight):
+    for stage in (march, free_flight):
         load(stage.build(prepared.variant).kernel, find_device(device))
 
 

@@ -27,6 +27,7 @@ from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, 
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots, Target
+from warpimpact.scene import exclusions as asked
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -50,6 +51,7 @@ from warpimpact.statistics.intervals import Estimate, estimate_of
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
 
+_UNITS_OF = {quantity: names.value.units for quantity, names in v.LIMITS.items()}
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
 
@@ -70,11 +72,9 @@ class LimitMap:
         Raises:
             CampaignError: the campaign has no limits, or this search cannot find them.
         """
-        if campaign.stop is not None:
-            raise CampaignError("got a stop rule, but limits are searched for every hit: leave out the table [stop]")
-        if campaign.burst is not None:
-            raise CampaignError("got a burst, but limits are searched for every hit alone: leave out the table [burst]")
         try:
+            given = {asked.STOP: campaign.stop is not None, asked.BURST: campaign.burst is not None}
+            asked.check_together({asked.LIMIT: True} | given)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None
@@ -225,7 +225,7 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     for name, share in QUANTILES.items():
         estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
         ends = (estimate.value, estimate.low, estimate.high)
-        estimate = over_draws(dataset, estimate, counted, units="m s-1", kind="quantile")
+        estimate = over_draws(dataset, estimate, counted, units=_UNITS_OF[quantity], kind="quantile")
         value_, low, high = (math.inf if end >= highest else end for end in ends)
         found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
     return found

@@ -9,6 +9,7 @@ from warpimpact import Campaign, run
 from warpimpact.analysis.inspect import failures, inspect_text
 from warpimpact.cli import main
 from warpimpact.kernels.status import Status
+from warpimpact.plotting import save_maps
 from warpimpact.results import files
 from warpimpact.runs.run import run_to_file
 
@@ -114,3 +115,15 @@ def test_it_says_that_no_core_passed() -> None:
     told = inspect_text(run(Campaign.from_text(text, name="t", folder=Path()), device="cpu"))
     assert "\nno core passed the plate\n" in told
     assert "\npassed the plate" not in told
+
+
+def test_a_run_without_standoffs_is_told_and_drawn(tmp_path: Path) -> None:
+    text = DRAFT.replace('["50 mm", "130 mm"]', "[]")
+    campaign = Campaign.from_text(text, name="a", folder=tmp_path, count=64)
+    dataset = run(campaign, device="cpu")
+    assert dataset.sizes["standoff"] == 0
+    files.write(dataset, tmp_path / "a.nc")
+    told = inspect_text(files.read(tmp_path / "a.nc"))
+    assert "deflection" in told
+    assert "tilt" not in told
+    assert len(save_maps(dataset, tmp_path, "a")) == 5

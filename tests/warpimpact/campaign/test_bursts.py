@@ -91,7 +91,7 @@ def test_an_interval_counts_bursts(result: xarray.Dataset) -> None:
     assert dealing(result) == {"replicates": 16, "images": 5}
     rng = np.random.default_rng(0)
     tally = Tally(Measure.parse("mean(residual_velocity)"), replicates=1, images=5)
-    tally.add(result.assign(residual_velocity=("hit", np.repeat(rng.normal(0.0, 1.0, 60), 5))))
+    tally.add(result.assign(residual_velocity=("hit", np.repeat(rng.normal(700.0, 1.0, 60), 5))))
     assert tally.estimate().half_width == pytest.approx(2.0 / np.sqrt(60.0), rel=0.3)
 
 

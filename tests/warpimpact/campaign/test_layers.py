@@ -150,11 +150,11 @@ def test_solid_reference_is_as_heavy_as_all_layers(monkeypatch: pytest.MonkeyPat
     from warpimpact.runs import compute
 
     seen: list[Any] = []
-    simulate = compute.simulate
-    monkeypatch.setattr(compute, "simulate", lambda *args, **rest: seen.append(args) or simulate(*args, **rest))
+    prepare = compute.prepare
+    monkeypatch.setattr(compute, "prepare", lambda scene, *rest: seen.append(scene) or prepare(scene, *rest))
     made = campaign()
     run(made, device="cpu")
-    (reference,) = [scene for scene, shots in seen if not scene.target.layers[1:]]
+    (reference,) = [scene for scene in seen if len(scene.target.layers) == 1]
     assert reference.target.areal_density == pytest.approx(made.target.areal_density, rel=1e-12)
 
 

@@ -1,9 +1,11 @@
 """Campaigns with a posterior: every shot draws its parameters from it, all together."""
 
 import json
+import math
 import re
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray
@@ -207,6 +209,15 @@ def test_another_material_is_refused(tmp_path: Path, change: tuple[str, str], se
     with pytest.raises(CampaignError) as caught:
         campaign(posterior(tmp_path), change)
     assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -1.0, 0.0])
+def test_values_that_no_campaign_may_have_are_refused(tmp_path: Path, value: float) -> None:
+    path = posterior(tmp_path, degradation_length=3e-4)
+    with netCDF4.Dataset(path, "a") as file:
+        file["posterior"]["degradation_length"][0, 7] = value
+    with pytest.raises(CampaignError, match=r"plate\.degradation_length = \S+, which is not allowed|infinite"):
+        campaign(path)
 
 
 def test_the_option(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

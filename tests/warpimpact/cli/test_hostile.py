@@ -1,8 +1,10 @@
 """Hostile input: one sentence and exit code 2, whatever is in a file; no traceback, no hang, nothing unbounded."""
 
 import io
+import os
 import random
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -23,11 +25,14 @@ from warpimpact.cli import main
 from warpimpact.cli.plain import Plain, say
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
+from warpimpact.runs.run import run_to_file
+from warpimpact.runs.shards import folder_of
 from warpimpact.scene.patterns.mask_files import read_mask
 from warpimpact.scene.units import Length, quantity, quoted
 from warpimpact.solver.tile import tile_of
 
-BASE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+SHIPPED = Path(__file__).parents[3] / "campaigns"
+BASE = (SHIPPED / "slotted_plate.toml").read_text(encoding="utf-8")
 BEFORE_PATTERN, AFTER_PATTERN = BASE.split("[plate.pattern]")[0], "[impact]" + BASE.split("[impact]")[1]
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="16mm" height="8mm" viewBox="0 0 16 8">{}</svg>'
 
@@ -364,3 +369,35 @@ def test_sizes_beyond_all_plates_are_refused() -> None:
     text = BASE.replace('length = "12 mm"', 'length = "1e300 m"', 1)
     with pytest.raises(CampaignError, match="which is more than 1e\\+30"):
         Campaign.from_text(text, name="a.toml", folder=Path())
+
+
+def test_a_closed_stream_a_backend_and_a_name_end_in_no_bug(tmp_path: Path) -> None:
+    def ended(shell: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "warpimpact"]
+        return subprocess.run(
+            ["sh", "-c", f'"$0" "$@" {shell}', *command, *arguments],
+            capture_output=True, text=True, check=False, cwd=tmp_path, env=os.environ | environment,
+        )  # fmt: skip
+
+    arguments = ["examples"]
+    assert ended(">&-").returncode == 0
+    arguments = ["plate", str(SHIPPED / "slotted_plate.toml")]
+    (tmp_path / "matplotlibrc").write_text("text.usetex: True")
+    assert ended("", MPLBACKEND="nonsense").returncode == 0
+    name = os.fsdecode(b"a\xff.toml")
+    shutil.copyfile(SHIPPED / "slotted_plate.toml", tmp_path / name)
+    arguments = ["run", name, "--count", "64", "--device", "cpu"]
+    done = ended("")
+    assert done.returncode == 2
+    assert "a name holds bytes that are no UTF-8; rename it" in done.stderr
+
+
+def test_a_pipe_in_the_folder_of_a_run_blocks_nothing(tmp_path: Path) -> None:
+    campaign = Campaign.from_toml(SHIPPED / "slotted_plate.toml", count=64)
+    folder = folder_of(tmp_path / "a.nc")
+    folder.mkdir()
+    for name in ("manifest.json", "hits_0000000000_0123456789abcdef.nc"):
+        os.mkfifo(folder / name)
+    with pytest.warns(UserWarning, match="is damaged; it is written again"):
+        run_to_file(campaign, tmp_path / "a.nc", device="cpu", resume=True)
+    assert not folder.exists()

@@ -121,7 +121,7 @@ def test_the_command(
     assert main(["identify", "fit.toml", "--device", "cpu"]) == 0
     shown = capsys.readouterr()
     assert "written to fit.nc" in shown.out
-    assert "sets; " in shown.err
+    assert "of 128 sets, " in shown.err
     assert sorted(path.name for path in tmp_path.glob("*.png")) == ["fit_hits.png", "fit_measured.png", "fit_pairs.png"]
     assert main(["report", "fit.nc"]) == 0
     page = Path("fit.html").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ from warpimpact.campaign.plates import read_plates
 from warpimpact.cli import main
 from warpimpact.plotting import plate_figure
 from warpimpact.plotting.dimensions import hole_dimensions, smallest_ligament
-from warpimpact.scene import ConeCore, MaskPattern, NoPattern, Plate, SlotPattern
+from warpimpact.scene import ConeCore, Layer, MaskPattern, NoPattern, Plate, SlotPattern, Target
 from warpimpact.studies.sweep import read_sweep
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -44,6 +44,17 @@ def test_holes_are_where_they_are_and_to_scale() -> None:
     assert axes.get_xlim() == pytest.approx((-24, 24))
     box = axes.get_window_extent()
     assert box.width / 48 == pytest.approx(box.height / np.ptp(axes.get_ylim()), rel=1e-3)
+
+
+def test_a_target_is_drawn_with_its_layers() -> None:
+    base = Layer(thickness="10 mm", gap="20 mm", resistance="2 GPa")
+    figure = plate_figure(Target(layers=(plate(), base)))
+    _, section = figure.axes
+    assert [text.get_text() for text in section.texts] == ["plate, 4 mm", "layer 1, 10 mm"]
+    holed, solid = (collection.get_paths() for collection in section.collections)
+    assert len(holed) > len(solid) == 1
+    np.testing.assert_allclose(solid[0].get_extents().get_points(), [[24, -24], [34, 24]])
+    assert len(plate_figure(plate()).axes) == 1
 
 
 def test_the_core_is_drawn_as_wide_as_it_is() -> None:

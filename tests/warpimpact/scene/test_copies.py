@@ -96,7 +96,7 @@ def thinner(campaign: Campaign) -> Campaign:
     [
         (PLATE, {"thicknes": 1.0}, 'got the unknown key "thicknes"; did you mean "thickness"?'),
         (PLATE, {"thickness": -1.0}, "greater than 0"),
-        (PLATE, {"margin": 1e-3}, "got margin = 1 mm without size"),
+        (PLATE, {"margin": 1e-3}, "margin needs size of the plate: only a finite plate has a rim"),
         (CORE, {"density": 7850.0}, "got both of mass and density"),
         (ROUND, {"diameter": 9e-3}, "overlap or touch"),
         (Impact(velocity=825.0), {"velocity": "825 m"}, "not a speed"),

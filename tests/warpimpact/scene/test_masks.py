@@ -14,6 +14,7 @@ from PIL import Image
 from pydantic import ValidationError
 
 from warpimpact.scene import CirclePattern, MaskPattern, SlotPattern
+from warpimpact.scene.patterns import mask_files
 from warpimpact.scene.patterns.roundings import smallest_gap
 
 MM = 1e-3
@@ -158,7 +159,7 @@ def test_a_mask_of_one_hole_on_a_small_plate_has_the_rim_alone(tmp_path: Path) -
     mask = MaskPattern(file=tmp_path / "a.npy", cell_size="1 mm")
     assert mask.ligament((6 * MM, 8 * MM)) == pytest.approx(2 * MM)
     assert mask.ligament() == pytest.approx(8 * MM)
-    with pytest.raises(ValueError, match="got a mask beside margin, but a mask has no single holes to leave out"):
+    with pytest.raises(ValueError, match='margin cannot be combined with shape = "mask": a mask has no single holes'):
         mask.bounded((6 * MM, 8 * MM), 1 * MM)
 
 
@@ -185,3 +186,10 @@ def test_the_ligament_of_noise_takes_no_longer_than_its_outline_is_long(tmp_path
     begin = time.process_time()
     assert mask.ligament() == pytest.approx(math.sqrt(0.5) * 0.05 * MM)  # from corner to corner
     assert time.process_time() - begin < 5.0
+
+
+def test_a_drawing_that_takes_too_long_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = drawing(tmp_path / "a.svg", 9, 9, '<rect width="40" height="40"/>')
+    monkeypatch.setattr(mask_files, "_LONGEST", 0.01)
+    with pytest.raises(ValidationError, match=r"takes more than 0\.01 s to draw; give fewer or simpler shapes"):
+        MaskPattern(file=path, cell_size="1 mm")

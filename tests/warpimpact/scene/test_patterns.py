@@ -128,7 +128,7 @@ def test_holes_without_a_ligament_are_refused(make: object, complaint: str) -> N
 
 
 def test_what_belongs_to_two_kinds_of_lattice_is_refused() -> None:
-    with pytest.raises(ValidationError, match="got staggered beside holes, but it stands for two holes"):
+    with pytest.raises(ValidationError, match="staggered cannot be combined with holes: it stands for two holes"):
         SLOT.model_validate(SLOT.model_dump() | {"holes": [[0, 0]]})
     with pytest.raises(ValidationError, match=r"the holes at \(0, 0\) mm and \(3, 0\) mm overlap or touch"):
         CirclePattern(diameter="5 mm", spacing=["20 mm", "20 mm"], holes=[["0 mm", "0 mm"], ["3 mm", "0 mm"]])

@@ -81,7 +81,7 @@ def test_a_plate_with_a_margin_is_read_back_as_it_was() -> None:
 
 
 def test_a_margin_needs_a_rim() -> None:
-    with pytest.raises(ValidationError, match="got margin = 3 mm without size, but only a finite plate has a rim"):
+    with pytest.raises(ValidationError, match="margin needs size of the plate: only a finite plate has a rim"):
         Plate(**STEEL, pattern=SLOTS, margin="3 mm")
     with pytest.raises(ValidationError, match="greater than 0"):
         Plate(**STEEL, pattern=SLOTS, size=[1, 1], margin=0)
@@ -101,5 +101,5 @@ def test_hits_cover_the_cell_or_all_of_a_finite_plate() -> None:
         assert (np.ptp(shots.hit_y), np.ptp(shots.hit_z)) == pytest.approx(extent, rel=2e-3)
     solid = plate.is_solid(shots.hit_y, shots.hit_z)
     assert solid.mean() == pytest.approx(1 - plate.open_area, abs=5e-3)
-    with pytest.raises(ValueError, match=r'hits.area = "plate" needs plate.size: only a'):
+    with pytest.raises(ValueError, match=r'hits.area = "plate" needs size of the plate: only a'):
         make_shots(impact, Hits(count=4, area="plate"), Plate(**STEEL, pattern=SLOTS))

@@ -248,11 +248,11 @@ def test_report_holds_the_study(
 
 
 def test_figure_shows_front_fidelities_literal_scheme_and_floor(small: xarray.Dataset) -> None:
-    renamed = small.assign_coords(setting=["draft", "standard", "reference", "nodal"])
+    renamed = small.assign_coords(setting=["level 0", "level 2", "level 4", "nodal"])
     figure = study_figure(renamed)
     for axes, quantity in zip(figure.axes, ("residual_velocity", "tilt"), strict=True):
         assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
-        assert {text.get_text() for text in axes.texts} == {"draft", "standard", "reference", "nodal"}
+        assert {text.get_text() for text in axes.texts} == {"level 0", "level 2", "level 4", "nodal"}
         chosen = renamed.isel(setting=renamed[f"{quantity}_front"].values == 1).sortby("hits_per_second")
         np.testing.assert_array_equal(axes.lines[0].get_xdata(), chosen["hits_per_second"])
         floor = axes.patches[0].get_extents().transformed(axes.transData.inverted())

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, model_validator
 
+from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array
 from ..units import Angle, Length, PositiveLength
 from .pattern import BoolArray, Pattern, Range, half_sides
@@ -83,8 +84,7 @@ class LatticePattern(Pattern):
 
     @model_validator(mode="after")
     def _leaves_ligaments(self) -> Self:
-        if self.staggered and self.holes is not None:
-            raise ValueError("got staggered beside holes, but it stands for two holes; list all holes of the cell")
+        check_together({STAGGERED: self.staggered, HOLES: self.holes is not None})
         self._check_shape()
         if self.open_area >= 1:
             raise ValueError(f"got spacing = {_millimetres(self.spacing)}, but the cell must be larger than its holes")

@@ -8,6 +8,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from pydantic import model_validator
 
+from ..exclusions import MARGIN, MASK, check_together
 from ..files import InputFile
 from ..model import Array
 from ..units import PositiveLength
@@ -111,9 +112,8 @@ class MaskPattern(Pattern):
 
     def bounded(self, size: tuple[float, float], margin: float) -> Self:
         """Raise a ValueError: a mask does not say which cells make one hole."""
-        raise ValueError(
-            "got a mask beside margin, but a mask has no single holes to leave out; draw it as large as the plate"
-        )
+        check_together({MARGIN: True, MASK: True})
+        return self
 
     def _contours(self, y_range: Range, z_range: Range) -> Any:
         """Generator of contours between holes, which are 1, and material, which is 0, in a rectangle."""

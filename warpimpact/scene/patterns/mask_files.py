@@ -1,6 +1,10 @@
 """Files that masks come from: images, arrays and drawings."""
 
+import subprocess
+import sys
 import xml.etree.ElementTree as xml
+from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +20,10 @@ from .pattern import BoolArray
 _MOST_CELLS = 4096  # along one side; 16 million in all
 _CHORDS = 64  # of a curve of a drawing
 _MOST_BYTES = 2**28
+_LONGEST, _MOST_MEMORY = 20.0, 2**32
+"""Time [s] and memory [bytes] that a drawing may take."""
+_CHILD = "import sys; from warpimpact.scene.patterns.mask_files import draw; draw(*sys.argv[1:])"
+_REFUSED = 3
 _MOST_CROSSING = 500
 """Corners of an outline that crosses itself."""
 _MOST_HOLES = 10_000
@@ -87,10 +95,38 @@ def _read_npy(path: Path) -> NDArray[Any]:
 
 
 def _read_svg(path: Path, cell_size: float) -> BoolArray:
+    """`_cells_of` in a process of its own: what a drawing costs shows when it is drawn."""
+    check_drawing(path)
+    command = [sys.executable, "-P", "-c", _CHILD, str(path), repr(cell_size)]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=_LONGEST, check=False)
+    except subprocess.TimeoutExpired:
+        raise ValueError(f"{path.name} takes more than {_LONGEST:g} s to draw; give fewer or simpler shapes") from None
+    if done.returncode == _REFUSED:
+        raise ValueError(done.stderr.decode())
+    if done.returncode:
+        raise ValueError(f"{path.name} cannot be drawn within {_MOST_MEMORY >> 30} GiB; give fewer or simpler shapes")
+    cells: BoolArray = np.load(BytesIO(done.stdout), allow_pickle=False)
+    return cells
+
+
+def draw(path: str, cell_size: str) -> None:
+    """What the process does: it writes the cells of a drawing, or why there are none."""
+    with suppress(ImportError):  # a system without such limits
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
+    try:
+        np.save(sys.stdout.buffer, _cells_of(Path(path), float(cell_size)))
+    except ValueError as error:
+        sys.stderr.write(str(error))
+        sys.exit(_REFUSED)
+
+
+def _cells_of(path: Path, cell_size: float) -> BoolArray:
     """Where the middle of a cell lies in a filled shape of a drawing; where shapes of one path overlap is none."""
     import shapely
 
-    check_drawing(path)
     extent = np.array([_svg_extent(path, side) for side in ("width", "height")])
     counts = np.round(extent / cell_size).astype(int)
     if not np.allclose(counts * cell_size, extent, rtol=1e-6):
