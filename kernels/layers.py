@@ -2,6 +2,8 @@
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. So the load of one
 layer is the load of one plate, and loads of layers add. The interface is that of kernels/one_plate.py.
+
+Long because all of them read the same layers of the same slot.
 """
 
 from functools import cache
