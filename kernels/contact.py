@@ -35,7 +35,8 @@ def build(variant: Variant) -> SimpleNamespace:
 
         `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
         that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
-        of the tile and of the grid; `y` and `z` are its place in the grid's cell. `ring_area` is the area of all
+        of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
+        planes. `ring_area` is the area of all
         patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
         `total_area` is the area of a ring in all layers of the target.
         """
@@ -46,6 +47,7 @@ def build(variant: Variant) -> SimpleNamespace:
         gain: wp.array(dtype=real)
         tile: wp.array(dtype=wp.int32)
         cell: wp.array(dtype=wp.int32)
+        x: wp.array(dtype=real)
         y: wp.array(dtype=real)
         z: wp.array(dtype=real)
         ring_area: wp.array(dtype=real)
@@ -90,7 +92,12 @@ def build(variant: Variant) -> SimpleNamespace:
             write(touches.gain, base + j, per_node * area * wp.abs(use.grip.normal_along_x(pose, patch, face)))
             write_index(touches.tile, base + j, use.plate_grid.tile_at(plate, window, patch.y, patch.z))
             cell = use.plate_grid.cell_at(window, patch.y, patch.z)
-            write_index(touches.cell, base + j, wp.clamp(cell.index, window.first, last_cell))
+            index = wp.clamp(cell.index, window.first, last_cell)
+            if wp.static(variant.deep):
+                plane = use.plate_grid.planes_at(window, patch.x)
+                write(touches.x, base + j, plane - wp.floor(plane))
+                index += wp.int32(wp.floor(plane)) * window.nodes
+            write_index(touches.cell, base + j, index)
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
             if wp.static(variant.window > 0):
@@ -114,7 +121,12 @@ def build(variant: Variant) -> SimpleNamespace:
             for k in range(4):
                 i = j + k * quarter
                 cell, y, z = read_index(touches.cell, i), read(touches.y, i), read(touches.z, i)
-                use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, read(touches.gain, i))
+                gain = read(touches.gain, i)
+                if wp.static(variant.deep):
+                    ahead = read(touches.x, i) * gain
+                    use.exposure.scatter(fields.gain, window.cells_z, cell + window.nodes, y, z, ahead)
+                    gain -= ahead
+                use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, gain)
             j += 1
 
     def summing(weakened: bool) -> Any:
@@ -152,9 +164,11 @@ def build(variant: Variant) -> SimpleNamespace:
                 if wp.static(weakened):
                     cell = read_index(touches.cell, base + j)
                     y, z = read(touches.y, base + j), read(touches.z, base + j)
-                    left = use.interaction.remaining(
-                        law, use.exposure.gather(fields.exposure, window.cells_z, cell, y, z)
-                    )
+                    exposed = use.exposure.gather(fields.exposure, window.cells_z, cell, y, z)
+                    if wp.static(variant.deep):
+                        ahead = use.exposure.gather(fields.exposure, window.cells_z, cell + window.nodes, y, z)
+                        exposed = wp.max(zero, exposed + read(touches.x, base + j) * (ahead - exposed))
+                    left = use.interaction.remaining(law, exposed)
                 area = left * read(touches.area, base + j)
                 stress = use.interaction.normal_stress(law, face.closing)
                 slope = left * read(touches.slope, base + j) * stress

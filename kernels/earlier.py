@@ -120,7 +120,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Fill a shot's blank window about (y, z) [m] with what the earlier shots have added to this layer."""
         order = shot % earlier.count
         row = row_of(earlier, window, slot, order)
-        nodes = window.cells_y * window.cells_z
+        nodes = window.planes * window.nodes
         use.exposure.clear(earlier.exposure, row, nodes)
         for before in range(order):
             other = (slot * earlier.count + before) * earlier.layers + layer
@@ -131,17 +131,18 @@ def build(variant: Variant) -> SimpleNamespace:
                 near_z = wp.abs(along) < wp.float64(window.cells_z)
                 if near_y and near_z:
                     rows, columns = wp.floor(across), wp.floor(along)
-                    add_shifted(
-                        earlier.exposure,
-                        row,
-                        row_of(earlier, window, slot, before),
-                        window.cells_y,
-                        window.cells_z,
-                        wp.int32(rows),
-                        wp.int32(columns),
-                        real(across - rows),
-                        real(along - columns),
-                    )
+                    for plane in range(window.planes):
+                        add_shifted(
+                            earlier.exposure,
+                            row + plane * window.nodes,
+                            row_of(earlier, window, slot, before) + plane * window.nodes,
+                            window.cells_y,
+                            window.cells_z,
+                            wp.int32(rows),
+                            wp.int32(columns),
+                            real(across - rows),
+                            real(along - columns),
+                        )
         copy(fields.exposure, window.first, earlier.exposure, row, nodes)
         mine = (slot * earlier.count + order) * earlier.layers + layer
         earlier.y[mine] = y
@@ -153,7 +154,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Keep what a shot has added to a layer: what there is in the end less what it found, which is exact to the
         rounding of the sum, and never negative."""
         row = row_of(earlier, window, slot, shot % earlier.count)
-        nodes = window.cells_y * window.cells_z
+        nodes = window.planes * window.nodes
         subtract_from(earlier.exposure, row, fields.exposure, window.first, nodes)
 
     return SimpleNamespace(**locals())

@@ -1,4 +1,8 @@
-"""The exposure T [s] that each node of a window remembers, and the tent filter that spreads it (docs/model.md §4)."""
+"""The exposure T [s] that each node of a window remembers, and how a contact spreads it (docs/model.md §4): over the
+degradation length in the plane of the plate, by the tent filter, and over the degradation depth through its thickness.
+
+A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth.
+"""
 
 from functools import cache
 from types import SimpleNamespace
@@ -22,8 +26,8 @@ def build(variant: Variant) -> SimpleNamespace:
     class Fields:
         """Scratch of all slots, or of one: exposure [s], exposure gained in the step [s], and room for the filter.
 
-        A slot has `nodes` of each. The window of a layer has cells_y × cells_z of them, from number `first` on; shape
-        [layers].
+        A slot has `nodes` of each. The window of a layer has planes of cells_y × cells_z of them, from number `first`
+        on; shape [layers].
         """
 
         exposure: wp.array(dtype=real)
@@ -178,8 +182,8 @@ def build(variant: Variant) -> SimpleNamespace:
         cells_y, cells_z = fields.cells_y[layer], fields.cells_z[layer]
         window = use.plate_grid.window_at(plate, thickness, fields.first[layer], cells_y, cells_z, hit_y, hit_z)
         if wp.static(variant.degrades):
-            clear(fields.exposure, window.first, cells_y * cells_z)
-            clear(fields.gain, window.first, cells_y * cells_z)
+            clear(fields.exposure, window.first, window.planes * window.nodes)
+            clear(fields.gain, window.first, window.planes * window.nodes)
         return window
 
     @wp.func
@@ -197,9 +201,99 @@ def build(variant: Variant) -> SimpleNamespace:
             filter_far(target, source, start, count, k * step, plate.taps[k])
 
     @wp.func
+    def filter_plane(plate: Plate, fields: Fields, start: wp.int32, count: wp.int32, stride: wp.int32):
+        """Filter the gained exposure of some rows, whose first node is `start`, one direction after the other."""
+        above = plate.reach * stride
+        filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
+        if wp.static(variant.window > 0):
+            use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
+        filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
+
+    # Σ over |i − plane| < reach, and half of the planes at ± reach: the trapezoidal rule over twice the depth. From one
+    # plane to the next two planes come in by halves, and two go.
+    @wp.func_native("""
+    const int first = low - reach - 2 > 0 ? low - reach - 2 : 0;
+    const int last = high + reach + 2 < planes ? high + reach + 2 : planes - 1;
+    assert(start + first * nodes >= 0 && start + last * nodes + count <= sum.shape[0]);
+    for (int plane = first; plane <= last; ++plane) {
+        auto* __restrict__ into = sum.data + start + plane * nodes;
+        for (int j = 0; j < count; ++j) into[j] = plane > first ? into[j - nodes] : 0;
+        const auto add = [&](int from, decltype(0 * sum.data[0]) share) {
+            if (from < low || from > high) return;
+            const auto* __restrict__ gained = gain.data + start + from * nodes;
+            for (int j = 0; j < count; ++j) into[j] += share * gained[j];
+        };
+        if (plane == first)
+            for (int from = low; from < first + reach && from <= high; ++from) add(from, 1);
+        add(plane + reach, 0.5f);
+        if (plane > first) {
+            add(plane + reach - 1, 0.5f);
+            add(plane - reach, -0.5f);
+            add(plane - reach - 1, -0.5f);
+        }
+    }
+    """)
+    def sum_planes(
+        sum: wp.array(dtype=real),
+        gain: wp.array(dtype=real),
+        start: wp.int32,
+        count: wp.int32,
+        nodes: wp.int32,
+        planes: wp.int32,
+        low: wp.int32,
+        high: wp.int32,
+        reach: wp.int32,
+    ):
+        """Sum a gain over the planes up to `reach` away, of `nodes` each, for `count` nodes from `start` on in each.
+        Only the planes from `low` to `high` have gained."""
+        ...
+
+    # The sums are those of a kernel with ends that three linear interpolations blur (of what is scattered, of the
+    # trapezoidal rule, and of what is gathered), each with the variance 1/6 of a spacing squared. What a quarter of the
+    # second difference takes off makes up for that: the error is of fourth order.
+    @wp.func_native("""
+    const int first = low - reach - 1 > 1 ? low - reach - 1 : 1;
+    const int last = high + reach + 1 < planes - 1 ? high + reach + 1 : planes - 2;
+    for (int plane = first; plane <= last; ++plane) {
+        auto* __restrict__ into = exposure.data + start + plane * nodes;
+        const auto* __restrict__ from = sum.data + start + plane * nodes;
+        for (int j = 0; j < count; ++j) into[j] += 0.75f * from[j] - 0.125f * (from[j - nodes] + from[j + nodes]);
+    }
+    """)
+    def add_half_sharpened(
+        exposure: wp.array(dtype=real),
+        sum: wp.array(dtype=real),
+        start: wp.int32,
+        count: wp.int32,
+        nodes: wp.int32,
+        planes: wp.int32,
+        low: wp.int32,
+        high: wp.int32,
+        reach: wp.int32,
+    ):
+        """Add half of what `sum_planes` found to the exposure."""
+        ...
+
+    @wp.func
+    def add_half(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+        """Add half of the sums over planes to the exposure."""
+        low, high = box.plane_low, box.plane_high
+        add_half_sharpened(
+            fields.exposure,
+            fields.filtered,
+            start,
+            count,
+            window.nodes,
+            window.planes,
+            low,
+            high,
+            plate.plane_reach,
+        )
+
+    @wp.func
     def spread(plate: Plate, fields: Fields, window: Window, box: Box):
-        """Filter the gained exposure with the tent K of the law, one direction after the other, and add half of it to
-        the exposure. The sum is the exposure at mid-step.
+        """Spread the gained exposure by the tent K of the law and over the degradation depth, and add half of it to the
+        exposure. The sum is the exposure at mid-step.
 
         Whole rows are filtered at once. Values that wrap from one row to the next are zero, because the box keeps the
         filter's reach away from the window's edge.
@@ -208,17 +302,37 @@ def build(variant: Variant) -> SimpleNamespace:
         above = plate.reach * stride
         start = window.first + box.y_low * stride
         count = (box.y_high - box.y_low + 1) * stride
-        filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
-        if wp.static(variant.window > 0):
-            use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
-        filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
-        add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
+        if wp.static(variant.deep):
+            for plane in range(box.plane_low, box.plane_high + 1):
+                filter_plane(plate, fields, start + plane * window.nodes, count, stride)
+            low, high = box.plane_low, box.plane_high
+            start, count = start - above, count + 2 * above
+            sum_planes(
+                fields.filtered,
+                fields.gain,
+                start,
+                count,
+                window.nodes,
+                window.planes,
+                low,
+                high,
+                plate.plane_reach,
+            )
+            add_half(plate, fields, window, box, start, count)
+        else:
+            filter_plane(plate, fields, start, count, stride)
+            add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
 
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
         """Add the other half of the gained exposure and clear it for the next step."""
         start = window.first + (box.y_low - plate.reach) * window.cells_z
         count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * window.cells_z
-        take_scaled(fields.exposure, fields.gain, start, count, half)
+        if wp.static(variant.deep):
+            add_half(plate, fields, window, box, start, count)
+            for plane in range(box.plane_low, box.plane_high + 1):
+                clear(fields.gain, start + plane * window.nodes, count)
+        else:
+            take_scaled(fields.exposure, fields.gain, start, count, half)
 
     return SimpleNamespace(**locals())

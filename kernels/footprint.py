@@ -52,6 +52,7 @@ def build(variant: Variant) -> SimpleNamespace:
         first_ring, last_ring, not_through, not_back = int(surface.rings), int(-1), int(0), int(0)
         first_closing, last_closing = int(surface.rings), int(-1)
         y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
+        plane_low, plane_high = int(far), int(-far)
         index = int(0)
         if wp.static(variant.window > 0):
             index = use.lanes.lane()
@@ -72,6 +73,10 @@ def build(variant: Variant) -> SimpleNamespace:
             z_low = wp.min(z_low, wp.where(within, node_below(window, ring.centre[2] - wide_z), far))
             y_high = wp.max(y_high, wp.where(within, node_below(window, ring.centre[1] + wide_y), -far))
             z_high = wp.max(z_high, wp.where(within, node_below(window, ring.centre[2] + wide_z), -far))
+            if wp.static(variant.deep):
+                behind, ahead = use.plate_grid.planes_at(window, rearmost), use.plate_grid.planes_at(window, foremost)
+                plane_low = wp.min(plane_low, wp.where(within, wp.int32(behind), far))
+                plane_high = wp.max(plane_high, wp.where(within, wp.int32(ahead) + 1, -far))
             if wp.static(variant.window > 0):
                 index += use.lanes.count()
             else:
@@ -97,6 +102,8 @@ def build(variant: Variant) -> SimpleNamespace:
             found.box.y_high = home_y + y_high + 2
             found.box.z_low = home_z + z_low - 1
             found.box.z_high = home_z + z_high + 2
+            found.box.plane_low = plane_low
+            found.box.plane_high = plane_high
             # The filter's first pass covers rows up to twice its reach away and reads slightly beyond them.
             rows = 2 * plate.reach + 1
             found.inside = (

@@ -2,6 +2,8 @@
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. So the load of one
 layer is the load of one plate, and loads of layers add. The interface is that of kernels/one_plate.py.
+
+Long because all of them read the same layers of the same slot.
 """
 
 from functools import cache
@@ -112,13 +114,25 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         pose: Pose,
         ahead: vec3,
     ):
-        """Open the window of a layer where the core will reach it, at first that of the plate about the hit."""
-        here, home = slot * target.count + layer, vec3()
-        if layer > 0 or stack.open[here]:
+        """Open the windows of a layer and its laminate where the core will reach it, at first that of the plate about
+        the hit."""
+        home = vec3()
+        if layer > 0 or stack.open[slot * target.count + layer]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
-        stack.window[here] = plates.open_window(target, fields, earlier, shots, slot, layer, shot, home)
-        stack.home[here] = home
-        stack.open[here] = True
+        for k in range(target.laminate[layer], target.count):
+            if target.laminate[k] == target.laminate[layer]:
+                here = slot * target.count + k
+                stack.window[here] = plates.open_window(target, fields, earlier, shots, slot, k, shot, home)
+                stack.home[here] = home
+                stack.open[here] = True
+
+    @wp.func
+    def was_near(target: Target, stack: Stack, slot: wp.int32, layer: wp.int32):
+        """Whether the core was near a layer, or another one of its laminate, in the last step."""
+        near = bool(False)
+        for k in range(target.laminate[layer], target.count):
+            near = near or (target.laminate[k] == target.laminate[layer] and stack.near[slot * target.count + k])
+        return near
 
     @wp.func
     def touch_of(
@@ -145,7 +159,11 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
             open_layer(target, stack, earlier, fields, shots, slot, layer, shot, pose, ahead)
         seen = in_layer(target, stack, slot, layer, shot, pose)
         touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
-        if not touch.inside and not stack.near[here] and use.footprint.is_beside(stack.window[here], touch):
+        if (
+            not touch.inside
+            and not was_near(target, stack, slot, layer)
+            and use.footprint.is_beside(stack.window[here], touch)
+        ):
             open_layer(target, stack, earlier, fields, shots, slot, layer, shot, pose, vec3())
             seen = in_layer(target, stack, slot, layer, shot, pose)
             touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
@@ -333,7 +351,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
             front, rear = faces_of(target, k, shot)
             inside = reached.foremost > front and reached.rearmost < rear
             use.passage.conclude(passage, shot, k, status, inside, reached.deepest - front)
-            if stack.open[here]:
+            if stack.open[here] and target.laminate[k] == k:
                 plates.keep(fields, earlier, stack.window[here], slot, shot)
 
     return SimpleNamespace(**locals())

@@ -28,7 +28,9 @@ def build(variant: Variant) -> SimpleNamespace:
         is a lower bound of each cell's distance from material [m]. `period_y` and `period_z` are the period [m].
         `half_y` and `half_z` are half the sides of a finite plate [m], infinite if there is no rim. `spacing` is that
         of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach in nodes,
-        at least 1.
+        at least 1. A
+        window has `planes` of the grid through the thickness, `per_plane` of them per metre, of which a contact weakens
+        those up to `plane_reach` planes away; one plane stands for the whole thickness.
         """
 
         tile: wp.array(dtype=real)
@@ -42,6 +44,9 @@ def build(variant: Variant) -> SimpleNamespace:
         spacing: real
         taps: wp.array(dtype=real)
         reach: wp.int32
+        planes: wp.int32
+        per_plane: real
+        plane_reach: wp.int32
 
     @wp.struct
     class Window:
@@ -50,8 +55,9 @@ def build(variant: Variant) -> SimpleNamespace:
         `first` is the index of the first node. `home` is that of the node at the hit, so a shot computes the same bits
         in a window of any size. `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds
         the hit, `tile_y` and `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the
-        tile per metre. `thickness` is that of the plate; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative
-        to the hit [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the
+        tile per metre. `thickness` is that of the plate; its front face is `behind` [m] the first of
+        `planes` planes of `nodes` nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit
+        [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the
         fields hold this window.
         """
 
@@ -59,7 +65,11 @@ def build(variant: Variant) -> SimpleNamespace:
         home: wp.int32
         cells_y: wp.int32
         cells_z: wp.int32
+        nodes: wp.int32
+        planes: wp.int32
         per_cell: real
+        per_plane: real
+        behind: real
         row: wp.int32
         column: wp.int32
         tile_y: real
@@ -85,12 +95,14 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Box:
-        """Rows and columns of nodes, ends included, that a step may touch."""
+        """Rows, columns and planes of nodes, ends included, that a step may touch."""
 
         y_low: wp.int32
         y_high: wp.int32
         z_low: wp.int32
         z_high: wp.int32
+        plane_low: wp.int32
+        plane_high: wp.int32
 
     @wp.func
     def window_at(
@@ -106,11 +118,14 @@ def build(variant: Variant) -> SimpleNamespace:
         origin loses no accuracy."""
         window = Window()
         window.first = first
+        window.nodes = cells_y * cells_z
+        window.planes = plate.planes
         window.home = window.first + (cells_y // 2) * cells_z + cells_z // 2
         window.cells_y = cells_y
         window.cells_z = cells_z
         window.thickness = thickness
         window.per_cell = one / plate.spacing
+        window.per_plane = plate.per_plane
         # Whole cells of the tile are separate from the rest. So two hits that differ by a lattice vector of whole cells
         # compute the same bits.
         across = hit_y * wp.float64(plate.tile_y) / plate.period_y
@@ -195,5 +210,10 @@ def build(variant: Variant) -> SimpleNamespace:
         cell.y = across - row
         cell.z = along - column
         return cell
+
+    @wp.func
+    def planes_at(window: Window, x: real):
+        """Where a depth behind the front face lies among the planes, in planes; a point outside counts at the face."""
+        return (wp.clamp(x, zero, window.thickness) + window.behind) * window.per_plane
 
     return SimpleNamespace(**locals())

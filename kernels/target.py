@@ -14,6 +14,7 @@ from .variant import Variant
 def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     """Device functions of the target for one variant, whose windows a scheme opens."""
     real, vec3 = variant.real, variant.vec3
+    one = real(1.0)
     use = variant.use(earlier, interaction, plate_grid, shots)
     Plate, Window, Law = use.plate_grid.Plate, use.plate_grid.Window, use.interaction.Law
     Shots, Earlier, own = use.shots.Shots, use.earlier.Earlier, use.shots.own
@@ -30,6 +31,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         origin in the plane of the plate [m]. These, `thickness` [m] and the members of Law have one value for all shots
         or one per shot: shape [layers, 1] or [layers, shots]. Those layers that a step can touch add their
         `onset_jump`, up to `most_jump`, as if they were one plate. `weakens` says whether the layer keeps a field.
+        Layers that touch each other and remember alike are one laminate: a contact in one weakens the others, and they
+        share a field. `laminate` is the number of the first of them.
         `standoffs` are distances behind the rear face of every layer [m], which the point `ahead` of the centre of mass
         passes [m].
         """
@@ -37,6 +40,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         count: wp.int32
         plates: Plates
         weakens: wp.array(dtype=wp.bool)
+        laminate: wp.array(dtype=wp.int32)
         by_path: wp.array(dtype=wp.bool)
         a2: wp.array(dtype=real)
         standoffs: wp.array(dtype=real)
@@ -116,6 +120,9 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         plate = plate_of(target, layer)
         window = open_blank(plate, real(own_of(target.thickness, layer, shot)), fields, layer, y, z)
         window.weakens = target.weakens[layer]
+        if wp.static(variant.deep):
+            within = own_of(target.front, layer, shot) - own_of(target.front, target.laminate[layer], shot)
+            window.behind = real(within) + one / plate.per_plane  # a plane to spare
         if wp.static(variant.burst):
             if window.weakens:
                 use.earlier.recall(earlier, fields, plate, window, slot, layer, shot, y, z)

@@ -9,11 +9,12 @@ from typing import Any
 import warp as wp
 
 CPU_FLAGS = (
-    "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign "
+    "-march=native -mprefer-vector-width=512 -mllvm=-inline-threshold=9000 -mstackrealign -fno-slp-vectorize "
     "-mreassociate -fno-signed-zeros -freciprocal-math -ffp-contract=fast"
 )
 """Flags that let the compiler vectorise sums and divisions, as wide as the processor can; its default for Intel is half
-of that. NaN and infinity keep their meaning."""
+of that. NaN and infinity keep their meaning. Straight-line code stays scalar: on some processors the compiler breaks a
+large kernel there (LLVM: "Instruction does not dominate all uses"), and loops are what counts."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,7 @@ class Variant:
         bends: the core's largest bending moment is recorded.
         layered: the target has several layers.
         burst: several shots hit one and the same plate.
+        deep: a plate is thicker than the depth over which its material weakens together.
         window: nodes of a shot's window in shared memory, at most, in the block layout: one block of CUDA threads per
             shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
     """
@@ -43,6 +45,7 @@ class Variant:
     bends: bool = False
     layered: bool = False
     burst: bool = False
+    deep: bool = False
     window: int = 0
 
     @property

@@ -115,6 +115,7 @@ def test_shots_at_one_place_pay_a_geometric_series(thickness: float, device: str
     # some exposure beyond R: the ratio is off by a share that goes with ℓ.
     beta, unit, resistance = 0.8, 3e-3, 1.5e9
     law = {"degradation": beta, "degradation_distance": unit, "degradation_interval": None, "shear_coefficient": 0.0}
+    law["degradation_depth"] = thickness
     left, off = beta ** (thickness / unit), []
     first = resistance * pi * references.PAPER_LARGEST_RADIUS**2 * unit / -log(beta) * (1.0 - left)
     for length in (0.2e-3, 0.1e-3):
@@ -131,7 +132,8 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
     # Bilinear reading keeps the sum of a field: what the second window holds is what both shots gave. Both cores sweep
     # a solid plate once, each at its own speed.
     shots = burst(shots_at([0.0, offset], [0.0, 0.6 * offset]), 2)
-    march = March(scene_of(solid_plate()), Numerics(precision="double"), shots, wp.get_device("cpu"))
+    prepared = prepare(scene_of(solid_plate()), shots, Numerics(precision="double", patches_axial=23))
+    march = March(prepared, wp.get_device("cpu"))
     scratch = march._scratch(1, *march.cells)
     order, outcomes = march.inputs.put(np.arange(2), wp.int32), march._empty(march.stage.Outcomes, (2,))
     march._launch(order, outcomes, scratch, 1, 0, 2)

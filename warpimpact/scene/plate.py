@@ -33,7 +33,9 @@ class Plate(Model):
         degradation_interval: Δt_β [s], 1 us unless one of both is given; None where exposure counts the path.
         degradation_distance: Δs_β, a path of the centre of mass [m]; None where exposure counts the time. By path, the
             law has no rate: outcomes depend on Y/v² alone.
-        degradation_length: ℓ, how far around a contact the material weakens [m].
+        degradation_length: ℓ, how far around a contact the material weakens in the plane of the plate [m].
+        degradation_depth: d, how far from a contact it weakens along the thickness [m]. A plate no thicker than that
+            weakens as a whole, as in the paper; every depth of a thicker one loses the same share of its resistance.
         density: of the material [kg/m³].
         size: extent along y and z of a finite plate centred on the origin [m]; a plate without it is unbounded.
         margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out.
@@ -48,6 +50,7 @@ class Plate(Model):
     degradation_interval: PositiveTime | None = None
     degradation_distance: PositiveLength | None = None
     degradation_length: PositiveLength = 0.5e-3
+    degradation_depth: PositiveLength = 4.0e-3
     density: PositiveDensity = 7850.0
     size: tuple[PositiveLength, PositiveLength] | None = None
     margin: PositiveLength | None = None

@@ -14,18 +14,19 @@ from warpimpact.kernels.status import Status
 Numbers = NDArray[np.int64]
 
 
-def earlier_hits(stage: Any, count: int, slots: int, cells: list[tuple[int, int]], device: Any) -> Any:
+def earlier_hits(stage: Any, count: int, slots: int, nodes: list[int], device: Any) -> Any:
     """Scratch of earlier hits (kernels/earlier.py).
 
     Args:
         stage: the build of the march.
         count: shots at a plate; 1 needs no scratch.
-        cells: of the windows of all layers of a slot.
+        nodes: of a slot in the windows of all layers.
     """
-    earlier, nodes = stage.Earlier(), sum(y * z for y, z in cells)
+    earlier = stage.Earlier()
     if count > 1:
-        earlier.count, earlier.nodes, earlier.layers = count, nodes, len(cells)
-        sizes = {"exposure": slots * count * nodes} | dict.fromkeys(("y", "z", "open"), slots * count * len(cells))
+        earlier.count, earlier.nodes, earlier.layers = count, sum(nodes), len(nodes)
+        places = slots * count * len(nodes)
+        sizes = {"exposure": slots * count * sum(nodes)} | dict.fromkeys(("y", "z", "open"), places)
         for name, size in sizes.items():
             kind = stage.Earlier.vars[name].type.dtype
             setattr(earlier, name, wp.empty(size, dtype=kind, device=device))

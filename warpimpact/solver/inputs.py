@@ -73,6 +73,7 @@ class Inputs:
         else:
             target.plates = self.plates[0]
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
+        target.laminate = self.put(np.array(arrays.laminates), wp.int32)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
         target.a2 = self.put(np.array([one.a2 for one in materials]))
         target.standoffs, target.ahead = self.put(arrays.layer_standoffs), arrays.ahead
@@ -138,6 +139,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
     plate.taps, plate.reach = put(grid.taps), grid.reach
+    plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
     return plate
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+THROUGH = 16
+"""Depths at which the mean through a layer is taken."""
 DEEP = 0.6
 """Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
 the core's surface from its centre of mass: the core arrives turned."""
@@ -32,13 +34,27 @@ def deep_cells(arrays: Prepared, layer: int, cells: int) -> tuple[int, int]:
     return count, count
 
 
+def nodes_of(arrays: Prepared, cells: Sequence[tuple[int, int]]) -> list[int]:
+    """Nodes in the windows of all layers, if they have so many cells; 0 for those that share the field of another."""
+    return [
+        grid.planes.number * y * z if first == layer else 0
+        for layer, (first, grid, (y, z)) in enumerate(zip(arrays.laminates, arrays.grids, cells, strict=True))
+    ]
+
+
+def firsts_of(arrays: Prepared, nodes: Sequence[int]) -> NDArray[np.int64]:
+    """The first node of every layer's field among those of its slot, if the layers have so many of their own."""
+    before = np.cumsum([0, *nodes[:-1]])
+    return np.asarray(before[arrays.laminates])
+
+
 class Weakened(NamedTuple):
     """What is left of a layer behind the plate, in the window where a core reached it.
 
     Attributes:
         cell_y, cell_z: centres of the cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
         material: share of material in each cell, shape [cells_y, cells_z].
-        share: resistance left, as a share of Y; 0 in holes.
+        share: resistance left, as a share of Y, the mean through the thickness; 0 in holes.
     """
 
     cell_y: Array
@@ -59,19 +75,35 @@ def weakened(
         cells: of the windows of all layers.
     """
     fields, _, stack, *_ = scratch
-    is_open, homes = stack.open.numpy(), stack.home.numpy()
-    first, found = 0, {}
+    is_open, homes, exposure = stack.open.numpy(), stack.home.numpy(), fields.exposure.numpy()
+    found = {}
     for k, (size, material) in enumerate(zip(cells, arrays.materials, strict=True)):
-        nodes = math.prod(size)
-        if k > 0 and nodes and is_open[k]:
-            exposure = fields.exposure.numpy()[first : first + nodes].astype(np.float64).reshape(size)
+        if k > 0 and math.prod(size) and is_open[k]:
             spacing, place = arrays.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
             y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), size, spacing)
             offset = float(material.offset_y[-1]), float(material.offset_z[-1])
             solid = material_about(plates[k], y - offset[0], z - offset[1], spacing)
-            found[k] = Weakened(y, z, solid, solid * np.exp(material.decay_rate[-1] * exposure))
-        first += nodes
+            found[k] = Weakened(y, z, solid, solid * share_left(arrays, k, exposure, cells))
     return found
+
+
+def share_left(arrays: Prepared, layer: int, exposure: NDArray[Any], cells: Sequence[tuple[int, int]]) -> Array:
+    """Share of the resistance that is left of a layer in its window, the mean through its thickness, of the last shot.
+
+    Args:
+        exposure: of one slot.
+        cells: of the windows of all layers.
+    """
+    planes, materials, leader = arrays.grids[layer].planes, arrays.materials, arrays.laminates[layer]
+    first = firsts_of(arrays, nodes_of(arrays, cells))[layer]
+    field = exposure[first : first + planes.number * math.prod(cells[layer])].reshape(planes.number, *cells[layer])
+    depth = materials[layer].front[-1] - materials[leader].front[-1]
+    depth = depth + materials[layer].thickness[-1] * (np.arange(THROUGH) + 0.5) / THROUGH
+    place = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
+    below = np.floor(place).astype(int)
+    share = (place - below)[:, None, None]
+    exposed = (1.0 - share) * field[below] + share * field[np.minimum(below + 1, planes.number - 1)]
+    return np.asarray(np.exp(materials[layer].decay_rate[-1] * np.maximum(exposed, 0.0)).mean(axis=0))
 
 
 def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:

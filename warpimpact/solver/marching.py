@@ -35,7 +35,17 @@ from warpimpact.solver.bursts import (
 )
 from warpimpact.solver.device import cores, free_memory, halving, load
 from warpimpact.solver.inputs import Inputs
-from warpimpact.solver.layering import Passages, Weakened, deep_cells, material_about, nodes_about, weakened
+from warpimpact.solver.layering import (
+    Passages,
+    Weakened,
+    deep_cells,
+    firsts_of,
+    material_about,
+    nodes_about,
+    nodes_of,
+    share_left,
+    weakened,
+)
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.worker import NEVER, Cancel
 
@@ -124,11 +134,10 @@ class March:
         self._launch(order, outcomes, scratch, 1, before, 1)
         if self.variant.nodal:
             return _host(scratch[0].share).reshape(self.cells), {}
-        exposure = np.zeros(math.prod(self.cells))
+        left = np.ones(self.cells)
         if self.variant.degrades and self.arrays.materials[0].weakens:
-            exposure = _host(scratch[0].exposure)[: exposure.size]
-        decayed = np.exp(self.arrays.materials[0].decay_rate[-1] * exposure.reshape(self.cells))
-        return np.asarray(self._material * decayed), self._behind(scratch)
+            left = share_left(self.arrays, 0, scratch[0].exposure.numpy(), self._windows(*self.cells))
+        return np.asarray(self._material * left), self._behind(scratch)
 
     def _behind(self, scratch: tuple[Any, ...]) -> dict[int, Weakened]:
         if not (self.variant.layered and self.variant.degrades):
@@ -192,21 +201,22 @@ class March:
 
     def _windows(self, cells_y: int, cells_z: int) -> list[tuple[int, int]]:
         """Cells of the windows of all layers, if the plate's has this many."""
-        return [(cells_y, cells_z)] + [
+        own = [(cells_y, cells_z)] + [
             deep_cells(self.arrays, layer, cells_y) for layer in range(1, len(self.inputs.plates))
         ]
+        return [own[first] for first in self.arrays.laminates]
 
-    def _nodes(self, cells_y: int, cells_z: int) -> int:
-        """Nodes of a slot in all its windows."""
-        return sum(y * z for y, z in self._windows(cells_y, cells_z))
+    def _nodes(self, cells_y: int, cells_z: int) -> list[int]:
+        """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""
+        return nodes_of(self.arrays, self._windows(cells_y, cells_z))
 
     def _slot_bytes(self, cells_y: int, cells_z: int) -> int:
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         rings: int = self.inputs.surface.rings * per_ring
-        nodes = self._nodes(cells_y, cells_z)
+        nodes = sum(self._nodes(cells_y, cells_z))
         earlier = bytes_of(self.at_a_plate, nodes, len(self.inputs.plates), size)
-        return len(self._fields()) * nodes * size + earlier + self._patches() * (6 * size + 2 * 4) + rings
+        return len(self._fields()) * nodes * size + earlier + self._patches() * (7 * size + 2 * 4) + rings
 
     def _fields(self) -> list[str]:
         """Names of the fields that a slot needs."""
@@ -228,7 +238,7 @@ class March:
         free = free_memory() if self.device.is_cpu else self.device.free_memory
         wanted = self.threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.shots) // self.at_a_plate)
         affordable = int(MEMORY_SHARE * free / self._slot_bytes(cells_y, cells_z))
-        return min(wanted, affordable, (2**31 - 1) // (self.at_a_plate * self._nodes(cells_y, cells_z)))
+        return min(wanted, affordable, (2**31 - 1) // (self.at_a_plate * sum(self._nodes(cells_y, cells_z))))
 
     def _fits(self, cells_y: int, cells_z: int) -> bool:
         return self._slots(cells_y, cells_z) > 0
@@ -237,14 +247,14 @@ class March:
         """Fields, touches, layers and earlier hits of some slots."""
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         fields, touches, put = self.stage.Fields(), self.stage.Touches(), self.inputs.put
-        sizes = np.array(self._windows(cells_y, cells_z))
-        ends = np.cumsum(sizes.prod(axis=1))
-        fields.nodes, fields.first = int(ends[-1]), put(ends - sizes.prod(axis=1), wp.int32)
-        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in sizes.T)
+        nodes = self._nodes(cells_y, cells_z)
+        fields.nodes, fields.first = sum(nodes), put(firsts_of(self.arrays, nodes), wp.int32)
+        cells = np.array(self._windows(cells_y, cells_z)).T
+        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in cells)
         for name in self._fields():
             setattr(fields, name, empty(slots * fields.nodes))
         patches = slots * self._patches()
-        for name in ("area", "slope", "shift", "gain", "y", "z"):
+        for name in ("area", "slope", "shift", "gain", "y", "z", *(["x"] if self.variant.deep else [])):
             setattr(touches, name, empty(patches))
         for name in ("tile", "cell"):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
@@ -253,7 +263,7 @@ class March:
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=self.stage.Sums, device=self.device)
             touches.total_area = empty(rings)
-        earlier = earlier_hits(self.stage, self.at_a_plate, slots, self._windows(cells_y, cells_z), self.device)
+        earlier = earlier_hits(self.stage, self.at_a_plate, slots, nodes, self.device)
         return fields, touches, self.passages.stack(slots), earlier
 
     def _launch(

@@ -17,6 +17,7 @@ from warpimpact.scene import exclusions as asked
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.bending import Sections, sections_of
 from warpimpact.solver.blocks import block_window, first_window
+from warpimpact.solver.depth import WHOLE, Planes, is_deep, laminates_of, planes_of, thicknesses_of
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, resolve, weakens
 from warpimpact.solver.rings import Rings, azimuths_of, rings_of
@@ -44,6 +45,7 @@ class Grid:
         period, half_size: extents (y, z) of the period, and half of those of the plate [m]; infinite without a rim.
         spacing: of the window's grid [m].
         taps: the tent's filter from its middle on, and one 0.
+        planes: of the window's grid through the thickness.
     """
 
     tile: Tile
@@ -51,6 +53,7 @@ class Grid:
     half_size: tuple[float, float]
     spacing: float
     taps: Array
+    planes: Planes = WHOLE
 
     @property
     def reach(self) -> int:
@@ -71,6 +74,7 @@ class Prepared:
         sections: of the core behind the rings; None where it does not bend.
         grids: the plate, and the layers behind it.
         materials: of the plate, and of the layers behind it.
+        laminates: for every layer, the first one of those with which it shares the memory of contact.
         onset: κ of the law.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         cells: nodes of a first window, in each direction.
@@ -89,6 +93,7 @@ class Prepared:
     sections: Sections | None
     grids: list[Grid]
     materials: list[Materials]
+    laminates: list[int]
     onset: float
     conditions: dict[str, Array]
     cells: int
@@ -120,6 +125,10 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     weakening = weakens(target, shots)
     resolution = resolve(scene, numerics, weakening)
     nodal, around = resolution.nodal, resolution.patches_around
+    materials = materials_of(scene, shots)
+    laminates = laminates_of(target, materials)
+    thicknesses = thicknesses_of(laminates, materials)
+    deep = is_deep(target, thicknesses)
     asked.check_together(
         {
             asked.NODAL: nodal,
@@ -128,15 +137,15 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
             asked.BENDING: record.bending,
             asked.LAYERS: len(target.layers) > 1,
             asked.BURST: shots.at_a_plate > 1,
+            asked.DEEP: deep,
         }
     )
     rings = rings_of(core, resolution.patches_axial, around, resolution.patch_width, discs=not nodal)
-    materials = materials_of(scene, shots)
     conditions = _conditions(scene, resolution, shots, materials)
-    variant = _variant(resolution, scene, shots, degrades=any(weakening))
+    variant = _variant(resolution, scene, shots, degrades=any(weakening), deep=deep)
     grids = [
-        _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length)
-        for plate in target.layers
+        _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length, planes)
+        for plate, planes in zip(target.layers, planes_of(target, thicknesses, resolution), strict=True)
     ]
     deepest = float((materials[-1].front + materials[-1].thickness).max())
     cells = first_window(core, shots, deepest, grids[0].spacing, grids[0].reach, nodal=nodal)
@@ -153,6 +162,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
         sections=sections_of(core, rings) if record.bending else None,
         grids=grids,
         materials=materials,
+        laminates=laminates,
         onset=scene.interaction.onset,
         conditions=conditions,
         cells=cells,
@@ -162,7 +172,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     )
 
 
-def _variant(resolution: Resolution, scene: Scene, shots: Shots, *, degrades: bool) -> Variant:
+def _variant(resolution: Resolution, scene: Scene, shots: Shots, *, degrades: bool, deep: bool) -> Variant:
     """The build of the kernels that a scene needs."""
     plates, interaction = scene.target.layers, scene.interaction
     return Variant(
@@ -174,11 +184,12 @@ def _variant(resolution: Resolution, scene: Scene, shots: Shots, *, degrades: bo
         rimmed=any(plate.size is not None for plate in plates),
         bends=scene.record.bending,
         layered=len(plates) > 1,
+        deep=deep,
         burst=degrades and shots.at_a_plate > 1,
     )
 
 
-def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:
+def _grid(plate: Plate, resolution: Resolution, wider: float, planes: Planes) -> Grid:
     """The grid of a layer, whose cells are so many times as wide as those of the plate."""
     nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
     tile = tile_of(plate, spacing if nodal else min(spacing / FINER, plate.degradation_length / FINEST), sharp=nodal)
@@ -191,6 +202,7 @@ def _grid(plate: Plate, resolution: Resolution, wider: float) -> Grid:
         half_size=(0.5 * size_y, 0.5 * size_z),
         spacing=spacing,
         taps=half_taps(0.0 if nodal else plate.degradation_length, spacing),
+        planes=planes,
     )
 
 
