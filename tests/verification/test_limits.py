@@ -16,6 +16,7 @@ from . import references, scenes
 from .scenes import PAPER_CORE, paper_plate, scattered_hits, shots_at, solid_plate
 
 REFERENCE = Numerics(**scenes.REFERENCE)
+MIDDLE = Numerics(level=2)
 AP_CORE = OgiveCore(diameter=6.248e-3, length=27.5e-3, crh=3.0, mass=5.3e-3)
 
 
@@ -83,7 +84,7 @@ def test_limit_velocity_grows_about_as_the_way_through_an_oblique_plate() -> Non
     obliquity = np.array([0.0, 15.0, 30.0, 45.0])
     plate = Plate(thickness=20e-3, resistance=0.93e9, shear_coefficient=0.05)
     shots = shots_at(obliquity=obliquity, velocity=600.0)
-    value = found(plate, shots, core=AP_CORE, numerics=None, tolerance=1.0).value
+    value = found(plate, shots, core=AP_CORE, numerics=MIDDLE, tolerance=1.0).value
     assert value / value[0] == pytest.approx(1.0 / np.cos(np.deg2rad(obliquity)), rel=0.07)
     assert (np.diff(value) > 0.0).all()
 
@@ -93,9 +94,9 @@ def test_limit_velocity_follows_the_root_of_the_resistance_without_a_rate() -> N
     hit_y, hit_z = scattered_hits(12)
     plate = paper_plate(degradation_interval=None, degradation_distance=0.825e-3)
     shots = shots_at(hit_y, hit_z, velocity=300.0, obliquity=20.0)
-    one = found(plate, replace(shots, resistance=np.full(12, 2.0e9)), numerics=None, tolerance=0.5)
+    one = found(plate, replace(shots, resistance=np.full(12, 2.0e9)), numerics=MIDDLE, tolerance=0.5)
     faster = replace(shots, resistance=np.full(12, 8.0e9), velocity=2.0 * shots.velocity)
-    four = found(plate, faster, numerics=None, tolerance=1.0)
+    four = found(plate, faster, numerics=MIDDLE, tolerance=1.0)
     assert four.value == pytest.approx(2.0 * one.value, rel=1e-6)
     assert np.array_equal(four.runs, one.runs)
     assert np.ptp(one.value) > 20.0  # hits of their own
@@ -105,10 +106,10 @@ def test_a_core_passes_at_the_upper_end_and_is_stopped_at_the_lower_one() -> Non
     hit_y, hit_z = scattered_hits(24)
     plate = paper_plate(degradation_interval=None, degradation_distance=0.825e-3)
     shots = shots_at(hit_y, hit_z, obliquity=30.0, yaw=2.0)
-    limits = found(plate, shots, numerics=None, tolerance=1.0)
+    limits = found(plate, shots, numerics=MIDDLE, tolerance=1.0)
     assert (limits.upper - limits.lower <= 1.0).all()
     assert (limits.outcomes.status == Status.PERFORATED).all()
     assert (limits.shots.velocity == limits.upper).all()
     below = replace(shots, velocity=limits.lower)
-    again = found(plate, below, numerics=None, tolerance=1.0, highest=float(limits.lower.max()))
+    again = found(plate, below, numerics=MIDDLE, tolerance=1.0, highest=float(limits.lower.max()))
     assert (again.outcomes.status[again.runs == 1] != Status.PERFORATED).all()
