@@ -121,7 +121,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     """
     core, target, record = scene.core, scene.target, scene.record
     if numerics.explicit is None:
-        raise ValueError("got numerics that name an accuracy, for which a pilot finds the resolution, but no pilot did")
+        raise ValueError("got numerics with an accuracy, but this needs a resolution: give a level or single settings")
     weakening = weakens(target, shots)
     resolution = resolve(scene, numerics, weakening)
     nodal, around = resolution.nodal, resolution.patches_around
