@@ -52,7 +52,7 @@ def test_each_line_works_after_those_above_it(
             text = Path(name).read_text(encoding="utf-8")
             assert SMALLER[name][0] in text
             Path(name).write_text(text.replace(*SMALLER[name]), encoding="utf-8")
-        code = main([command, *rest, *FEWER.get(command, "").split()])
+        code = main([command, *rest, *FEWER.get(command, [])])
         assert not code, f"{command} {shlex.join(rest)}: {capsys.readouterr().err}"
     made = {path.name for path in tmp_path.iterdir()}
     assert {"slotted.toml", "slotted.nc", "slotted.csv", "slots.nc", "slots.html", "slotted_hit34.nc"} <= made
