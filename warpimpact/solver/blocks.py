@@ -18,18 +18,18 @@ WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
 its fine grid, large windows cost more time than the repetition of some shots."""
 
 
-def first_window(core: Core, shots: Shots, depth: float, spacing: float, reach: int, *, nodal: bool) -> int:
+def first_window(core: Core, shots: Shots, thickness: float, spacing: float, reach: int, *, nodal: bool) -> int:
     """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
-    target.
+    plate.
 
     Args:
-        depth: of the target [m].
+        thickness: of the plate, or of the laminate that it begins [m]. Layers farther away have windows of their own.
         spacing, reach: of the plate's grid [m] and of its filter [nodes].
     """
     slack = NODAL_SLACK if nodal else WINDOW_SLACK
     steepest = float(shots.obliquity.max())
     turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
-    half = slack * core.max_radius / math.cos(steepest) + depth * math.tan(steepest) + core.bounding_radius * turned
+    half = slack * core.max_radius / math.cos(steepest) + thickness * math.tan(steepest) + core.bounding_radius * turned
     return 2 * (math.ceil(half / spacing) + 2 * reach + 3)
 
 

@@ -10,6 +10,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.solver.depth import thicknesses_of
+
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
     from warpimpact.scene import Plate
@@ -29,7 +31,9 @@ def deep_cells(arrays: Prepared, layer: int, cells: int) -> tuple[int, int]:
     if not arrays.materials[layer].weakens:
         return 0, 0
     grid = arrays.grids[layer]
-    half = 0.5 * cells * arrays.grid.spacing + DEEP * arrays.core.bounding_radius
+    thicknesses = thicknesses_of(arrays.laminates, arrays.materials)
+    thicker = max(0.0, thicknesses[layer] - thicknesses[0]) * math.tan(float(arrays.shots.obliquity.max()))
+    half = 0.5 * cells * arrays.grid.spacing + DEEP * arrays.core.bounding_radius + thicker
     count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3)
     return count, count
 

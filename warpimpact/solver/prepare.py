@@ -121,7 +121,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     """
     core, target, record = scene.core, scene.target, scene.record
     if numerics.explicit is None:
-        raise ValueError("got numerics that name an accuracy, for which a pilot finds the resolution, but no pilot did")
+        raise ValueError("got numerics with an accuracy, but this needs a resolution: give a level or single settings")
     weakening = weakens(target, shots)
     resolution = resolve(scene, numerics, weakening)
     nodal, around = resolution.nodal, resolution.patches_around
@@ -147,8 +147,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
         _grid(plate, resolution, plate.degradation_length / target.layers[0].degradation_length, planes)
         for plate, planes in zip(target.layers, planes_of(target, thicknesses, resolution), strict=True)
     ]
-    deepest = float((materials[-1].front + materials[-1].thickness).max())
-    cells = first_window(core, shots, deepest, grids[0].spacing, grids[0].reach, nodal=nodal)
+    thickness = thicknesses[0] or float(materials[0].thickness.max())
+    cells = first_window(core, shots, thickness, grids[0].spacing, grids[0].reach, nodal=nodal)
     if resolution.block:
         variant = replace(variant, window=block_window(cells))
     return Prepared(
