@@ -8,7 +8,7 @@ import argparse
 import os
 import sys
 from collections.abc import Sequence
-from contextlib import redirect_stdout, suppress
+from contextlib import redirect_stderr, redirect_stdout, suppress
 from typing import NoReturn
 
 from warpimpact import __version__
@@ -74,7 +74,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     This is the one boundary for errors: each of them ends here in one sentence, never in a traceback.
     """
-    arguments = parser().parse_args(argv)
+    with redirect_stderr(Plain(sys.stderr)):  # argparse quotes what was typed
+        arguments = parser().parse_args(argv)
     try:
         loud = verbosity(verbose=arguments.verbose, quiet=arguments.quiet)
         with terminated_as_interrupted(), redirect_stdout(Plain(sys.stdout)), implausible_told(), loud:

@@ -371,6 +371,12 @@ def test_sizes_beyond_all_plates_are_refused() -> None:
         Campaign.from_text(text, name="a.toml", folder=Path())
 
 
+def test_an_escape_sequence_in_an_argument_reaches_no_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["run", "a.toml", "--nonsense", "\x1b[31m"])
+    assert capsys.readouterr().err.endswith("unrecognized arguments: --nonsense \\x1b[31m\n")
+
+
 def test_a_closed_stream_a_backend_and_a_name_end_in_no_bug(tmp_path: Path) -> None:
     def ended(shell: str, **environment: str) -> subprocess.CompletedProcess[str]:
         command = [sys.executable, "-m", "warpimpact"]
