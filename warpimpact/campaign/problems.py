@@ -49,11 +49,13 @@ def complaint(problem: ErrorDetails) -> str:
             return str(context["error"])
         case "union_tag_invalid":
             return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
-        case "model_type" | "model_attributes_type":
+        case "model_type" | "model_attributes_type" | "dict_type":
             return f"got {quoted(problem['input'])}, but it must be a table"
+        case "too_short":
+            return f"got {quoted(problem['input'])}, but it must have at least {context['min_length']} items"
         case "too_long":
             return f"got {quoted(problem['input'])}, but it must have at most {context['max_length']} items"
-        case "tuple_type":
+        case "tuple_type" | "list_type":
             return f"got {quoted(problem['input'])}, but it must be a list"
     allowed = problem["msg"].replace("Input should", "it must")
     return f"got {quoted(problem['input'])}, but {allowed}"
