@@ -130,7 +130,6 @@ class DrawnSampler(Sampler):
         self._posterior, self._plate, self._seed, self._images = posterior, plate, seed, images
 
     def shots(self, first: int, count: int) -> Shots:
-        """As those of a `Sampler`."""
         shots = super().shots(first, count)
         numbers = np.arange(first, first + len(shots)) // self._images
         chosen = self._posterior.which(self._seed, int(numbers[0]), int(np.ptp(numbers)) + 1)[numbers - numbers[0]]

@@ -48,5 +48,4 @@ def _table(description: str, properties: Schema) -> Schema:
 
 
 def _keys(model: Any) -> Schema:
-    """Names of the keys of a model; warpimpact checks their values."""
     return {name: {} for name in model.model_fields}

@@ -22,7 +22,6 @@ def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
 
 
 def posterior_text(tree: xarray.DataTree) -> str:
-    """The whole of it."""
     return "\n".join([*_parameters(tree), "", *_rows(tree), "", *_best(tree), "", *_worth(tree)])
 
 

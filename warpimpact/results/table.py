@@ -43,7 +43,6 @@ class Column:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Extents along `dims`."""
         if _HIT not in self.dims:
             return tuple(self.data.shape)
         return len(range(self.data.shape[0])[self.first : self.stop]), *self.data.shape[1:]
@@ -91,7 +90,6 @@ class Table:
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Extents of the dimensions."""
         return {name: size for one in self.variables.values() for name, size in zip(one.dims, one.shape, strict=True)}
 
     def __contains__(self, name: str) -> bool:

@@ -163,7 +163,6 @@ class Sampler:
         return raw
 
     def weighed(self) -> Weights:
-        """The weights of all points."""
         return Weights.of(self._raw())
 
 
