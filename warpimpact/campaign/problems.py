@@ -7,22 +7,22 @@ from pydantic_core import ErrorDetails
 
 from ..scene.units import brief, quoted
 
-MOST_TOLD = 8
-"""Problems that are told of one file."""
+_MOST = 8
+"""Problems of one file that a sentence names."""
 
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
     problems = error.errors(include_url=False)
-    told = [_told(problem, data) for problem in problems[:MOST_TOLD]]
-    if (more := len(problems) - len(told)) > 0:
-        told.append(f"{more} more problem{'s' if more > 1 else ''}")
-    return "; also ".join(told)
+    described = [_described(problem, data) for problem in problems[:_MOST]]
+    if (more := len(problems) - len(described)) > 0:
+        described.append(f"{more} more problem{'s' if more > 1 else ''}")
+    return "; also ".join(described)
 
 
-def _told(problem: ErrorDetails, data: dict[str, Any]) -> str:
-    place, told = _place(problem, data), complaint(problem)
-    return f"{place}: {told}" if place else told
+def _described(problem: ErrorDetails, data: dict[str, Any]) -> str:
+    place, text = _place(problem, data), complaint(problem)
+    return f"{place}: {text}" if place else text
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:

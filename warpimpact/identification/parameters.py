@@ -94,10 +94,10 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
     try:
         return _DISTRIBUTION.validate_python(in_si(read, given))
     except ValidationError as error:
-        told = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in told["loc"] if part != given.get("distribution"))
-        said = complaint(told)
-        said = f"got {quoted(dict(given))}, but: {said}" if told["type"] == "value_error" else said
+        problem = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in problem["loc"] if part != given.get("distribution"))
+        said = complaint(problem)
+        said = f"got {quoted(dict(given))}, but: {said}" if problem["type"] == "value_error" else said
         raise FitError(f"{place}{'.' if where else ''}{where}: {said}") from None
     except ValueError as error:
         raise FitError(f"{place}.{error}") from None

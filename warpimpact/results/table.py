@@ -84,9 +84,9 @@ class Table:
     @classmethod
     def from_xarray(cls, dataset: xarray.Dataset) -> Table:
         """That of a Dataset, in memory."""
-        told = {str(name): (one.dims, one.values, one.attrs) for name, one in dataset.variables.items()}
-        coordinates = {name: one for name, one in told.items() if name in dataset.coords}
-        return cls.of({name: one for name, one in told.items() if name not in coordinates}, coordinates, dataset.attrs)
+        columns = {str(name): (one.dims, one.values, one.attrs) for name, one in dataset.variables.items()}
+        data = {name: one for name, one in columns.items() if name not in dataset.coords}
+        return cls.of(data, {name: columns[name] for name in columns if name not in data}, dataset.attrs)
 
     @property
     def sizes(self) -> dict[str, int]:
@@ -138,9 +138,9 @@ class Table:
         """The Dataset, in memory."""
         import xarray
 
-        told = {name: (one.dims, one.values, dict(one.attrs)) for name, one in self.variables.items()}
-        data = {name: one for name, one in told.items() if name not in self.coords}
-        return xarray.Dataset(data, {name: one for name, one in told.items() if name in self.coords}, self.attrs)
+        columns = {name: (one.dims, one.values, dict(one.attrs)) for name, one in self.variables.items()}
+        data = {name: one for name, one in columns.items() if name not in self.coords}
+        return xarray.Dataset(data, {name: one for name, one in columns.items() if name in self.coords}, self.attrs)
 
 
 def joined(tables: Iterable[Table]) -> Table:

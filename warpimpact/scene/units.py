@@ -236,11 +236,11 @@ def _part(value: object, depth: int = 3) -> object:
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
     """The reader of a quantity, and what the JSON schema of a campaign says of it."""
-    told = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
+    schema = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
     if unit:
-        told["unit"] = "deg" if unit == "rad" else unit
+        schema["unit"] = "deg" if unit == "rad" else unit
     return BeforeValidator(
-        _Quantity(name, unit, example), json_schema_input_type=Annotated[float | str, WithJsonSchema(told)]
+        _Quantity(name, unit, example), json_schema_input_type=Annotated[float | str, WithJsonSchema(schema)]
     )
 
 

@@ -88,7 +88,7 @@ def log_prior(points: Array) -> Array:
 
 
 @dataclass
-class Sampler:
+class ImportanceSampler:
     """Draws of a posterior in rounds: `propose` points, compute their likelihood, `tell` it.
 
     Args:

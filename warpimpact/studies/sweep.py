@@ -121,12 +121,12 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
         data, labels = json.loads(json.dumps(shared, default=str)), [label for label, _ in combination]
         for one, (_, value) in zip(inputs, combination, strict=True):
             _place(data, one.key, value, str(path))
-        told = ", ".join(f"{one.name} = {label}" for one, label in zip(inputs, labels, strict=True))
+        inputs_text = ", ".join(f"{one.name} = {label}" for one, label in zip(inputs, labels, strict=True))
         if isinstance(data.get("title"), str):
-            data["title"] = f"{data['title']}: {told}"[:200]
+            data["title"] = f"{data['title']}: {inputs_text}"[:200]
         content = json.dumps(data, indent=1, ensure_ascii=False)
-        name = f"{number:04d}_{'_'.join(re.findall(r'[A-Za-z0-9.+-]+', told))}"[:100]
-        campaigns[name] = Campaign.from_text(content, name=f"{path}, {told}", folder=path.parent, count=count)
+        name = f"{number:04d}_{'_'.join(re.findall(r'[A-Za-z0-9.+-]+', inputs_text))}"[:100]
+        campaigns[name] = Campaign.from_text(content, name=f"{path}, {inputs_text}", folder=path.parent, count=count)
     return Sweep(str(shared.get("title", "")), text, inputs, campaigns)
 
 
