@@ -97,7 +97,7 @@ def test_an_interrupted_sweep_continues_with_the_points_that_are_there(
     before = first.stat().st_mtime_ns
     run_sweep(sweep, tmp_path / "a.nc", device="cpu", resume=True)
     assert first.stat().st_mtime_ns == before
-    one, other = files.read_sweep_result(tmp_path / "a.nc"), files.read_sweep(folder / "a.nc")
+    one, other = files.read_sweep_result(tmp_path / "a.nc"), files.read_sweep_result(folder / "a.nc")
     xarray.testing.assert_equal(one, other)
 
 
