@@ -102,16 +102,18 @@ def load(kernel: Any, device: Any) -> None:
         DeviceError: the cached files are damaged and cannot be removed.
     """
     begin, block = time.perf_counter(), block_size(kernel, device)
-    if (device.context, block) in kernel.module.execs:  # loaded
+    module = kernel.module
+    loaded = module.execs.get((device.context, block))
+    if loaded is not None and loaded.module_hash == module.get_module_hash(block):
         return
-    folder = Path(wp.config.kernel_cache_dir, kernel.module.get_module_identifier(block))
+    folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
     if not _is_whole(folder):
         _remove(folder)
     try:
-        kernel.module.load(device, block)
+        module.load(device, block)
     except Exception:  # another process has removed it meanwhile; a kernel that cannot be compiled fails again
         _remove(folder)
-        kernel.module.load(device, block)
+        module.load(device, block)
     if not _is_whole(folder):
         _seal(folder)
     _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)

@@ -219,7 +219,10 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
     """
     core, target, body = scene.core, scene.target, scene.core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
-    passage = _least(resolution.passage(one.thickness) for one in materials)
+    passage = _least(
+        resolution.passage(material.thickness, layer, weakens=material.weakens)
+        for material, layer in zip(materials, target.layers, strict=True)
+    )
     times = (
         resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
         for material, layer in zip(materials, target.layers, strict=True)
