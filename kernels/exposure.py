@@ -2,6 +2,8 @@
 degradation length in the plane of the plate, by the tent filter, and over the degradation depth through its thickness.
 
 A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth.
+
+Long because all that is spread goes over the same strips of a window.
 """
 
 from functools import cache
