@@ -96,7 +96,9 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
-    way = 800.0 * resolved(level=2).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
+    resolution = resolved(level=2)
+    passage = resolution.passage(np.array([1e-3, 1.0]), PLATE, weakens=False)
+    way = 800.0 * resolution.step_at(800.0, 0.0, passage, np.inf)
     standard = LADDER[2].travel
     np.testing.assert_allclose(way, [standard * 1e-3, standard * SLENDER * PAPER.length])
 
