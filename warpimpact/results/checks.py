@@ -150,6 +150,10 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
     for place in (dataset[name] for name in (v.HIT_Y, v.HIT_Z) if name in dataset.variables):
         if not all(np.isfinite(place[at : at + _SLICE].values).all() for at in range(0, place.size, _SLICE)):
             return f'its variable "{place.name}" has values that are not numbers'
+    if v.STANDOFF in dataset.coords:
+        standoffs = dataset[v.STANDOFF].values
+        if not (np.isfinite(standoffs).all() and np.unique(standoffs).size == standoffs.size):
+            return f'its variable "{v.STANDOFF}" has values that are not numbers, or one of them twice'
     return None
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -60,27 +61,30 @@ def cluster_team(
             seconds, or shots kill one worker after another.
         DeviceError: the workers lack the device, or compute other bits than the first one asked.
     """
-    try:
+    with _starting():
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
         from distributed.comm import CommClosedError
         from distributed.utils import silence_logging_cmgr
-    except ImportError:
-        raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
     with ExitStack() as stack:
         stack.enter_context(silence_logging_cmgr(logging.CRITICAL))  # a lost scheduler gets our sentence, no traceback
         threads = None
         if address is None:
             assert workers is not None
             threads = max(1, cores() // workers)
-            cluster = LocalCluster(
-                n_workers=workers, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=logging.CRITICAL
-            )
-            address = stack.enter_context(cluster).scheduler_address
-        try:
-            # Not the default of its process, of which xarray takes the locks of the files that are written here.
-            client = stack.enter_context(Client(address, timeout="20s", set_as_default=False))
-        except (OSError, ValueError) as error:
-            raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
+            with _starting():
+                cluster = LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    dashboard_address="127.0.0.1:0",
+                    silence_logs=logging.CRITICAL,
+                )
+                address = stack.enter_context(cluster).scheduler_address
+        with _starting():
+            try:
+                # Not the default of its process, of which xarray takes the locks of the files that are written here.
+                client = stack.enter_context(Client(address, timeout="20s", set_as_default=False))
+            except (OSError, ValueError) as error:
+                raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
         executor = client.get_executor(pure=False)
@@ -104,6 +108,27 @@ def cluster_team(
             raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+@contextmanager
+def _starting() -> Iterator[None]:
+    """Name the settings of Dask where it does not start.
+
+    Raises:
+        ClusterError: it is not installed, or does not start.
+    """
+    try:
+        yield
+    except ClusterError:
+        raise
+    except ImportError:
+        raise ClusterError("a cluster needs Dask: pip install 'warpimpact[cluster]'") from None
+    except Exception as error:  # of any class, as settings have no check of their own
+        given = ", ".join(sorted(name for name in os.environ if name.startswith("DASK_"))) or "none"
+        what = " ".join(f"{type(error).__name__}: {error}".split())[:300]
+        raise ClusterError(
+            f"Dask does not start ({what}); check its settings: variables {given}; files in ~/.config/dask"
+        ) from error
 
 
 class _Reached:

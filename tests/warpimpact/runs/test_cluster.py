@@ -86,10 +86,22 @@ def test_a_killed_worker_costs_nothing(
     assert killed_at
     assert killed_at[0] < 2500  # in mid-run
     with distributed.Client(cluster) as client:
-        client.wait_for_workers(2, timeout=30)
+        client.wait_for_workers(2, timeout=600)
         assert victim not in client.run(os.getpid).values()
     run_to_file(campaign, local, device="cpu")
     assert_same_bits(output, local)
+
+
+def test_settings_with_which_dask_does_not_start_are_named(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DASK_NONSENSE", "1")
+    with (
+        pytest.importorskip("dask").config.set({"distributed.comm.timeouts.connect": "nonsense"}),
+        pytest.raises(
+            ClusterError, match=r"Dask does not start \(KeyError: .*nonsense.* variables DASK_NONSENSE; files"
+        ),
+        cluster_team(campaign, workers=1),
+    ):
+        pass
 
 
 def test_the_command_starts_workers_and_a_local_run_resumes_them(

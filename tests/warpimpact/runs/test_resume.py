@@ -500,7 +500,7 @@ from warpimpact.cli import command
 
 def host_work(*_, **__):  # a ligament, or the compilation of a kernel: one call, which nothing can break off
     print("at work", flush=True)
-    time.sleep(120.0)
+    time.sleep(3600.0)
 
 HitMap.{name} = host_work
 command()
@@ -523,10 +523,8 @@ def test_a_first_signal_ends_a_run_that_is_at_work_on_the_host(
         assert process.stdout is not None
         while process.stdout.readline() != "at work\n":
             assert process.poll() is None
-        begin = time.monotonic()
         process.send_signal(by)
-        _, shown = process.communicate(timeout=PATIENCE)
-    assert time.monotonic() - begin < 60.0  # two seconds on an idle machine; half of the work in any case
+        _, shown = process.communicate(timeout=PATIENCE)  # two seconds on an idle machine; the work takes an hour
     assert process.returncode == 130
     assert shown.splitlines()[-1] == "warpimpact: interrupted; nothing is saved"
     assert not list(tmp_path.iterdir())

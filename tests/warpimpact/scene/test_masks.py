@@ -190,6 +190,16 @@ def test_the_ligament_of_noise_takes_no_longer_than_its_outline_is_long(tmp_path
 
 def test_a_drawing_that_takes_too_long_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = drawing(tmp_path / "a.svg", 9, 9, '<rect width="40" height="40"/>')
-    monkeypatch.setattr(mask_files, "_LONGEST", 0.01)
-    with pytest.raises(ValidationError, match=r"takes more than 0\.01 s to draw; give fewer or simpler shapes"):
+    monkeypatch.setattr(mask_files, "_LONGEST", 0.001)
+    with pytest.raises(ValidationError, match=r"takes more than 0\.001 s to draw; give fewer or simpler shapes"):
+        MaskPattern(file=path, cell_size="1 mm")
+
+
+def test_a_drawing_that_takes_too_much_of_the_processor_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = drawing(tmp_path / "a.svg", 9, 9, f"<style>{'a ' * 1_000_000}</style>")  # hours in a regular expression
+    monkeypatch.setattr(mask_files, "_LONGEST", 2.0)
+    monkeypatch.setattr(mask_files, "_PATIENCE", 300.0)
+    with pytest.raises(ValidationError, match="takes more than 2 s to draw; give fewer or simpler shapes"):
         MaskPattern(file=path, cell_size="1 mm")

@@ -1,5 +1,7 @@
 """Files that masks come from: images, arrays and drawings."""
 
+import math
+import signal
 import subprocess
 import sys
 import xml.etree.ElementTree as xml
@@ -21,9 +23,12 @@ _MOST_CELLS = 4096  # along one side; 16 million in all
 _CHORDS = 64  # of a curve of a drawing
 _MOST_BYTES = 2**28
 _LONGEST, _MOST_MEMORY = 20.0, 2**32
-"""Time [s] and memory [bytes] that a drawing may take."""
+"""Processor time [s] and memory [bytes] that a drawing may take."""
+_PATIENCE = 10.0
+"""Times as long as that a loaded machine may take."""
 _CHILD = "import sys; from warpimpact.scene.patterns.mask_files import draw; draw(*sys.argv[1:])"
 _REFUSED = 3
+_OUT_OF_TIME = [-getattr(signal, name) for name in ("SIGXCPU",) if hasattr(signal, name)]
 _MOST_CROSSING = 500
 """Corners of an outline that crosses itself."""
 _MOST_HOLES = 10_000
@@ -97,11 +102,13 @@ def _read_npy(path: Path) -> NDArray[Any]:
 def _read_svg(path: Path, cell_size: float) -> BoolArray:
     """`_cells_of` in a process of its own: what a drawing costs shows when it is drawn."""
     check_drawing(path)
-    command = [sys.executable, "-P", "-c", _CHILD, str(path), repr(cell_size)]
+    command = [sys.executable, "-P", "-c", _CHILD, str(path), repr(cell_size), repr(_LONGEST)]
     try:
-        done = subprocess.run(command, capture_output=True, timeout=_LONGEST, check=False)
+        done = subprocess.run(command, capture_output=True, timeout=_PATIENCE * _LONGEST, check=False)
     except subprocess.TimeoutExpired:
-        raise ValueError(f"{path.name} takes more than {_LONGEST:g} s to draw; give fewer or simpler shapes") from None
+        done = None
+    if done is None or done.returncode in _OUT_OF_TIME:
+        raise ValueError(f"{path.name} takes more than {_LONGEST:g} s to draw; give fewer or simpler shapes")
     if done.returncode == _REFUSED:
         raise ValueError(done.stderr.decode())
     if done.returncode:
@@ -110,12 +117,14 @@ def _read_svg(path: Path, cell_size: float) -> BoolArray:
     return cells
 
 
-def draw(path: str, cell_size: str) -> None:
+def draw(path: str, cell_size: str, longest: str) -> None:
     """What the process does: it writes the cells of a drawing, or why there are none."""
     with suppress(ImportError):  # a system without such limits
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY, _MOST_MEMORY))
+        seconds = math.ceil(float(longest))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + 1))
     try:
         np.save(sys.stdout.buffer, _cells_of(Path(path), float(cell_size)))
     except ValueError as error:
