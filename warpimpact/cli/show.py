@@ -25,7 +25,7 @@ def add_inspect(commands: Commands) -> None:
     parser.add_argument(
         "--discrepancy",
         action="store_true",
-        help="of a run with a posterior: count the discrepancy that the fit found in the intervals by parameters",
+        help="add the discrepancy of the fit to the intervals by parameters; for a result that draws from a posterior",
     )
 
 
@@ -43,10 +43,10 @@ def add_plot(commands: Commands) -> None:
         commands,
         "plot",
         _plot,
-        summary="draw maps of one result, or of several side by side",
+        summary="draw maps of a result, or of several results side by side",
         description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
-        "against tilt, and what is uncertain where shots scatter or an error was estimated. For several results: maps "
-        "side by side with one colour scale.",
+        "against tilt, and maps of uncertainty where shots scatter or an error was estimated. For several results: "
+        "maps side by side with the same colour scale.",
         example="plot slotted.nc -o maps",
     )
     add_results(parser)
