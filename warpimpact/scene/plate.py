@@ -109,6 +109,14 @@ class Plate(Model):
         off = np.hypot(np.maximum(beyond_y, 0.0), np.maximum(beyond_z, 0.0))
         return np.where(off > 0.0, -off, np.minimum(of_holes, -np.maximum(beyond_y, beyond_z)))
 
+    def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
+        """`Pattern.has_edge`, where the rim of the plate is an edge, too."""
+        near_y, near_z = (
+            np.abs(np.abs(along) - 0.5 * side) <= reach
+            for along, side in zip((y, z), self.size or (np.inf, np.inf), strict=True)
+        )
+        return self.pattern.has_edge(y, z, reach) | near_y | near_z
+
     @property
     def sampled_cell(self) -> tuple[float, float]:
         """Extent (y, z) of the cell over which hits are spread [m]: the unit cell, or a plate that is smaller."""

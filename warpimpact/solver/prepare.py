@@ -78,9 +78,9 @@ class Prepared:
         onset: κ of the law.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         cells: nodes of a first window, in each direction.
-        rows: of the trace of each shot; 0 for none.
         layer_standoffs: distances behind the rear face of every layer [m].
         ahead: of the centre of mass, the point that passes stand-offs [m].
+        rows: of the trace of each shot; 0 for none.
     """
 
     scene: Scene
@@ -97,9 +97,9 @@ class Prepared:
     onset: float
     conditions: dict[str, Array]
     cells: int
-    rows: int
     layer_standoffs: Array
     ahead: float
+    rows: int = 0
 
     @property
     def grid(self) -> Grid:
@@ -107,12 +107,11 @@ class Prepared:
         return self.grids[0]
 
 
-def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = False) -> Prepared:
+def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     """Make every choice for some shots.
 
     Args:
         numerics: those of a resolution; for an accuracy a pilot finds it first.
-        traced: leave room for the history of every shot.
 
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
@@ -166,7 +165,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
         onset=scene.interaction.onset,
         conditions=conditions,
         cells=cells,
-        rows=_most_steps(resolution, conditions) + 2 if traced else 0,  # the end, and a step that rounding may add
         layer_standoffs=np.array(record.layer_standoffs, dtype=np.float64),
         ahead=record.ahead(core),
     )
@@ -243,10 +241,3 @@ def _conditions(scene: Scene, resolution: Resolution, shots: Shots, materials: l
 
 def _least(values: Iterable[Array]) -> Array:
     return np.asarray(reduce(np.minimum, values))
-
-
-def _most_steps(resolution: Resolution, conditions: dict[str, Array]) -> int:
-    """Steps after which any of the shots is given up."""
-    names = ("velocity", "obliquity", "longest_step", "longest_time")
-    step = resolution.step_at(*(conditions[name] for name in names))
-    return math.ceil(float((conditions["longest_way"] / (conditions["velocity"] * step)).max()))
