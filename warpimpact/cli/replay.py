@@ -14,9 +14,9 @@ def add_replay(commands: Commands) -> None:
         "replay",
         _replay,
         summary="compute a hit of a result again, with its history",
-        description="Compute a hit of a result again on the CPU. Write its history as netCDF and PNG files. The end has "
-        "the same bits as the stored outcome if the same kind of CPU and the same version computed the result. If a GPU "
-        "computed it, both agree within rounding.",
+        description="Compute a hit of a result again on the CPU. Write its history as netCDF and PNG files. The end "
+        "has the bits of the stored outcome if the same kind of CPU and the same version computed the result. If a "
+        "GPU computed it, both agree within rounding.",
         example="replay slotted.nc --hit 34",
     )
     add_result(parser)
