@@ -1,7 +1,9 @@
 """The exposure T [s] that each node of a window remembers, and how a contact spreads it (docs/model.md §4): over the
 degradation length in the plane of the plate, by the tent filter, and over the degradation depth through its thickness.
 
-A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth.
+A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth. Where shots
+have thicknesses of their own, a window of several planes serves both: a shot at a plate that is no thicker than the
+depth uses the first.
 """
 
 from functools import cache
@@ -275,53 +277,54 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func
-    def add_half(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+    def add_half_through(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
         """Add half of the sums over planes to the exposure."""
-        low, high = box.plane_low, box.plane_high
+        low, high, reach = box.plane_low, box.plane_high, plate.plane_reach
         add_half_sharpened(
-            fields.exposure,
-            fields.filtered,
-            start,
-            count,
-            window.nodes,
-            window.planes,
-            low,
-            high,
-            plate.plane_reach,
+            fields.exposure, fields.filtered, start, count, window.nodes, window.planes, low, high, reach
         )
+
+    # In one plane, whole rows are filtered at once. Values that wrap from one row to the next are zero, because the box
+    # keeps the filter's reach away from the window's edge.
+    @wp.func
+    def spread_in_one(plate: Plate, fields: Fields, start: wp.int32, count: wp.int32, stride: wp.int32):
+        """`spread` for the whole thickness at once."""
+        above = plate.reach * stride
+        filter_plane(plate, fields, start, count, stride)
+        add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
+
+    @wp.func
+    def spread_through(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+        """`spread` over several planes."""
+        low, high, above = box.plane_low, box.plane_high, plate.reach * window.cells_z
+        for plane in range(low, high + 1):
+            filter_plane(plate, fields, start + plane * window.nodes, count, window.cells_z)
+        start, count = start - above, count + 2 * above
+        sum_planes(
+            fields.filtered, fields.gain, start, count, window.nodes, window.planes, low, high, plate.plane_reach
+        )
+        add_half_through(plate, fields, window, box, start, count)
+
+    @wp.func
+    def settle_through(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+        """`settle` over several planes."""
+        add_half_through(plate, fields, window, box, start, count)
+        for plane in range(box.plane_low, box.plane_high + 1):
+            clear(fields.gain, start + plane * window.nodes, count)
 
     @wp.func
     def spread(plate: Plate, fields: Fields, window: Window, box: Box):
         """Spread the gained exposure by the tent K of the law and over the degradation depth, and add half of it to the
-        exposure. The sum is the exposure at mid-step.
-
-        Whole rows are filtered at once. Values that wrap from one row to the next are zero, because the box keeps the
-        filter's reach away from the window's edge.
-        """
+        exposure. The sum is the exposure at mid-step."""
         stride = window.cells_z
-        above = plate.reach * stride
-        start = window.first + box.y_low * stride
-        count = (box.y_high - box.y_low + 1) * stride
+        start, count = window.first + box.y_low * stride, (box.y_high - box.y_low + 1) * stride
         if wp.static(variant.deep):
-            for plane in range(box.plane_low, box.plane_high + 1):
-                filter_plane(plate, fields, start + plane * window.nodes, count, stride)
-            low, high = box.plane_low, box.plane_high
-            start, count = start - above, count + 2 * above
-            sum_planes(
-                fields.filtered,
-                fields.gain,
-                start,
-                count,
-                window.nodes,
-                window.planes,
-                low,
-                high,
-                plate.plane_reach,
-            )
-            add_half(plate, fields, window, box, start, count)
+            if window.planes > 1:
+                spread_through(plate, fields, window, box, start, count)
+            else:
+                spread_in_one(plate, fields, start, count, stride)
         else:
-            filter_plane(plate, fields, start, count, stride)
-            add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
+            spread_in_one(plate, fields, start, count, stride)
 
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
@@ -329,9 +332,10 @@ def build(variant: Variant) -> SimpleNamespace:
         start = window.first + (box.y_low - plate.reach) * window.cells_z
         count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * window.cells_z
         if wp.static(variant.deep):
-            add_half(plate, fields, window, box, start, count)
-            for plane in range(box.plane_low, box.plane_high + 1):
-                clear(fields.gain, start + plane * window.nodes, count)
+            if window.planes > 1:
+                settle_through(plate, fields, window, box, start, count)
+            else:
+                take_scaled(fields.exposure, fields.gain, start, count, half)
         else:
             take_scaled(fields.exposure, fields.gain, start, count, half)
 

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from warpimpact.scene import Core
 from warpimpact.solver import inputs
-from warpimpact.solver.prepare import Grid, half_taps
+from warpimpact.solver.grid import Grid, Tile, half_taps
 from warpimpact.solver.rings import azimuths_of, rings_of
-from warpimpact.solver.tile import Tile
 
 
 def records(struct: Any, device: str, **columns: Any) -> wp.array:

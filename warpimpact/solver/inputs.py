@@ -11,14 +11,17 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels import march
-from warpimpact.solver.prepare import LARGEST_ONSET, Grid, Prepared
+from warpimpact.solver.grid import Grid, Tile
+from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.rings import Rings
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core
-    from warpimpact.solver.rings import Rings
-    from warpimpact.solver.tile import Tile
 
 Array = NDArray[np.float64]
+
+LARGEST_ONSET = 0.02
+"""Bound of the onset speed, as a share of the impact velocity."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +48,14 @@ class Inputs:
 
     def __init__(self, arrays: Prepared, device: Any) -> None:
         self.stage, self.put = march.build(arrays.variant), Put(device.alias, arrays.variant.real)
-        self.surface = surface_of(self.stage.Surface, arrays.core, arrays.rings, arrays.azimuths, self.put)
+        self.surface = surface_of(self.stage.Surface, arrays.scene.core, arrays.rings, arrays.azimuths, self.put)
         self.plates = [plate_of(self.stage.Plate, grid, self.put) for grid in arrays.grids]
         self.target = self._target(arrays)
         self.sections = self._sections(arrays)
         self.shots = self._shots(arrays)
         self.count = len(arrays.conditions["hit_y"])
         self.law = self.stage.Law()
-        self.law.onset_share, self.law.onset_limit = arrays.onset, LARGEST_ONSET
+        self.law.onset_share, self.law.onset_limit = arrays.scene.interaction.onset, LARGEST_ONSET
         self.pace = self.stage.Pace()
         self.pace.time_step, self.pace.way_along = arrays.resolution.time_step or 0.0, arrays.resolution.way_along
         self.pace.rows = arrays.rows
@@ -73,10 +76,11 @@ class Inputs:
         else:
             target.plates = self.plates[0]
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
-        target.laminate = self.put(np.array(arrays.laminates), wp.int32)
+        target.laminate = self.put(np.array([one.laminate for one in materials]), wp.int32)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
         target.a2 = self.put(np.array([one.a2 for one in materials]))
-        target.standoffs, target.ahead = self.put(arrays.layer_standoffs), arrays.ahead
+        record = arrays.scene.record
+        target.standoffs, target.ahead = self.put(np.array(record.layer_standoffs)), record.ahead(arrays.scene.core)
         for name, variable in self.stage.Target.vars.items():
             if getattr(variable.type, "ndim", 1) == 2:
                 rows = np.broadcast_arrays(*(getattr(one, name) for one in materials))

@@ -10,6 +10,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.solver.grid import WHOLE
+
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
     from warpimpact.scene import Plate
@@ -29,7 +31,7 @@ def deep_cells(arrays: Prepared, layer: int, cells: int) -> tuple[int, int]:
     if not arrays.materials[layer].weakens:
         return 0, 0
     grid = arrays.grids[layer]
-    half = 0.5 * cells * arrays.grid.spacing + DEEP * arrays.core.bounding_radius
+    half = 0.5 * cells * arrays.grid.spacing + DEEP * arrays.scene.core.bounding_radius
     count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3)
     return count, count
 
@@ -37,15 +39,15 @@ def deep_cells(arrays: Prepared, layer: int, cells: int) -> tuple[int, int]:
 def nodes_of(arrays: Prepared, cells: Sequence[tuple[int, int]]) -> list[int]:
     """Nodes in the windows of all layers, if they have so many cells; 0 for those that share the field of another."""
     return [
-        grid.planes.number * y * z if first == layer else 0
-        for layer, (first, grid, (y, z)) in enumerate(zip(arrays.laminates, arrays.grids, cells, strict=True))
+        grid.planes.number * y * z if material.laminate == layer else 0
+        for layer, (material, grid, (y, z)) in enumerate(zip(arrays.materials, arrays.grids, cells, strict=True))
     ]
 
 
 def firsts_of(arrays: Prepared, nodes: Sequence[int]) -> NDArray[np.int64]:
     """The first node of every layer's field among those of its slot, if the layers have so many of their own."""
     before = np.cumsum([0, *nodes[:-1]])
-    return np.asarray(before[arrays.laminates])
+    return np.asarray(before[[material.laminate for material in arrays.materials]])
 
 
 class Weakened(NamedTuple):
@@ -94,7 +96,8 @@ def share_left(arrays: Prepared, layer: int, exposure: NDArray[Any], cells: Sequ
         exposure: of one slot.
         cells: of the windows of all layers.
     """
-    planes, materials, leader = arrays.grids[layer].planes, arrays.materials, arrays.laminates[layer]
+    materials, leader = arrays.materials, arrays.materials[layer].laminate
+    planes = arrays.grids[layer].planes if materials[layer].deep[-1] else WHOLE
     first = firsts_of(arrays, nodes_of(arrays, cells))[layer]
     field = exposure[first : first + planes.number * math.prod(cells[layer])].reshape(planes.number, *cells[layer])
     depth = materials[layer].front[-1] - materials[leader].front[-1]

@@ -175,7 +175,7 @@ class March:
                 self.inputs.target,
                 contact,
                 self.inputs.put(standoffs, wp.float64),
-                self.arrays.ahead,
+                self.scene.record.ahead(self.scene.core),
             ],
             outputs=[report],
             device=self.device,
@@ -204,7 +204,7 @@ class March:
         own = [(cells_y, cells_z)] + [
             deep_cells(self.arrays, layer, cells_y) for layer in range(1, len(self.inputs.plates))
         ]
-        return [own[first] for first in self.arrays.laminates]
+        return [own[material.laminate] for material in self.arrays.materials]
 
     def _nodes(self, cells_y: int, cells_z: int) -> list[int]:
         """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import Core, Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene.quantities import BY_LAYER
+from warpimpact.solver.materials import Materials, decay_rate
 
 Array = NDArray[np.float64]
 
@@ -49,6 +51,16 @@ SLOWING = 0.25
 """Share of the core's energy that a step may take if the plate acts on the whole cross section of the core, per unit of
 `travel`: near the limit velocity a core would else lose most of its energy in one step. No step of the paper's shots is
 shortened by it."""
+
+SLOWEST_DECAY = 1.0e-30
+"""Below which nothing weakens [1/s]."""
+SMALLEST_STRESS = 1.0
+"""Below which nothing slows down [Pa]."""
+
+STEP_ALLOWANCE = 200
+"""How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+UNBREAKABLE = 1.0e30
+"""Strength of a core that has none [Pa], beyond any stress."""
 
 LADDER = (
     Level(14, 16, 1.0, 0.5),
@@ -177,8 +189,6 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     }
     if nodal:
         defaults = NODAL
-        by_path = plate.degradation_distance is not None
-        asked.check_together({asked.NODAL: True, asked.LAYERS: len(scene.target.layers) > 1, asked.BY_PATH: by_path})
     given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
     travel = level.travel if numerics.travel is None else numerics.travel
     return Resolution(
@@ -197,24 +207,40 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     )
 
 
-def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
-    """Whether each layer weakens; one that differs from shot to shot may."""
-    return [
-        layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
-        for k, layer in enumerate(target.layers)
-    ]
+def conditions_of(
+    core: Core, target: Target, shots: Shots, materials: Sequence[Materials], resolution: Resolution
+) -> dict[str, Array]:
+    """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
+
+    The layer that needs the shortest step sets the step.
+    """
+    body = core.mass_properties
+    mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
+    passage = _least(resolution.passage(one.thickness) for one in materials)
+    times = (
+        resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
+        for material, layer in zip(materials, target.layers, strict=True)
+    )
+    scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
+    gaps = sum(target.gaps)
+    return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
+        "mass": mass,
+        "inertia_axial": scale * body.inertia_axial,
+        "inertia_transverse": scale * body.inertia_transverse,
+        "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
+        "way": resolution.travel * passage,
+        "longest_time": _least(times),
+        "longest_step": passage,
+        "longest_way": STEP_ALLOWANCE * (depth - gaps + 2.0 * len(materials) * core.bounding_radius) + gaps,
+    }
 
 
-FASTEST_DECAY = 1.0e30
-"""Of the resistance [1/s]: β = 0 takes all of it at the first touch, a rate beyond any exposure, yet finite (0 × it
-is 0)."""
-SLOWEST_DECAY = 1.0e-30
-"""Below which nothing weakens [1/s]."""
-SMALLEST_STRESS = 1.0
-"""Below which nothing slows down [Pa]."""
+def _least(values: Iterable[Array]) -> Array:
+    return np.asarray(reduce(np.minimum, values))
 
 
-def decay_rate(degradation: Array, unit: float) -> Array:
-    """ln(β)/Δt_β [1/s], or ln(β)/Δs_β [1/m], for some β, of their shape."""
-    log = np.log(degradation, where=degradation > 0.0, out=np.full_like(degradation, -np.inf))
-    return np.maximum(log / unit, -FASTEST_DECAY)
+def most_steps(conditions: Mapping[str, Array], resolution: Resolution) -> int:
+    """Steps after which any of the shots is given up."""
+    names = ("velocity", "obliquity", "longest_step", "longest_time")
+    step = resolution.step_at(*(conditions[name] for name in names))
+    return math.ceil(float((conditions["longest_way"] / (conditions["velocity"] * step)).max()))
