@@ -79,7 +79,7 @@ def test_stand_offs_behind_layers_change_no_bit_of_anything_else(device: str) ->
     [
         (0.01, 0.1, "certain to be out of the target only from 0.018"),
         (0.09, 0.1, "got record.layer_standoffs of 0.09 m, but the widest gap is 0.1 m, and free flight is certain to"),
-        (0.02, 0.03, r"beside gaps of at most 0.03 m, but a core of this size flies free .* at least 0.036"),
+        (0.02, 0.03, r"and gaps of at most 0.03 m, but a core of this size is certain .* at least 0.036"),
     ],
 )
 def test_stand_offs_without_free_flight_are_refused(standoff: float, gap: float, message: str) -> None:

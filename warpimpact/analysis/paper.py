@@ -62,8 +62,8 @@ def check_scene(campaign: Campaign, name: str) -> None:
     if (found := first_difference(_scene(campaign), published)) is not None:
         place, here, there = found
         raise CampaignError(
-            f"{name}: is not the paper's scene, so its shots cannot be set beside the paper's: {place} is {here} here "
-            f"and {there} there; spacing, hit points and numerics may differ"
+            f"{name}: is not the paper's scene, so its shots cannot be compared with the paper's: {place} is {here} "
+            f"here and {there} there; spacing, hit points and numerics may differ"
         )
 
 

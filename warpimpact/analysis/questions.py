@@ -36,7 +36,7 @@ def _question(dataset: xarray.Dataset, name: str) -> dict[str, Any]:
     """What must be the same for plates to be compared."""
     told = dataset.attrs
     if not {attr.CORE, attr.IMPACT} <= told.keys():
-        raise ResultError(f"{name}: does not tell its core and impact, which a comparison needs; run it again")
+        raise ResultError(f"{name}: has no description of its core and impact, which a comparison needs; run it again")
     output = {"standoffs": dataset[v.STANDOFF].values.tolist(), "standoff_point": told[attr.STANDOFF_POINT]}
     told_of = {"burst": json.loads(told[attr.BURST])} if attr.BURST in told else {}
     told_of |= {"limit": told[attr.LIMIT]} if attr.LIMIT in told else {}

@@ -273,13 +273,13 @@ class Campaign(Model):
             return self
         if self.hits.count != self.stop.max_count:
             raise ValueError(
-                f"got hits.count = {self.hits.count} beside stop.max_count = {self.stop.max_count}, "
-                "which takes its place"
+                f"hits.count = {self.hits.count} and stop.max_count = {self.stop.max_count} cannot be combined: "
+                "[stop] sets the number of hits; leave out hits.count"
             )
         at = self.stop.measure.standoff
         if at is not None and not np.isclose(at, self.output.standoffs, rtol=1e-9, atol=0.0).any():
             standoffs = ", ".join(f"{standoff:g} m" for standoff in self.output.standoffs)
-            raise ValueError(f"got stop.quantity at {at:g} m, but output.standoffs are {standoffs}")
+            raise ValueError(f"got stop.quantity at {at:g} m, but it must be one of output.standoffs: {standoffs}")
         return self
 
     @model_validator(mode="after")
@@ -323,8 +323,8 @@ class Campaign(Model):
         for name, plate in self.target.named:
             if radius > _MOST_LENGTHS * plate.degradation_length:
                 raise ValueError(
-                    f"got {name}.degradation_length = {plate.degradation_length:g} m beside a core of radius "
-                    f"{radius:g} m, but it must be at least 1/{_MOST_LENGTHS} of that"
+                    f"got {name}.degradation_length = {plate.degradation_length:g} m, but a core of radius {radius:g} "
+                    f"m needs at least 1/{_MOST_LENGTHS} of its radius, {radius / _MOST_LENGTHS:.4g} m"
                 )
         return self
 

@@ -79,11 +79,11 @@ class Posterior:
             here = own[str(table)][str(key)]
             if (table, key) in self.values:
                 if here is None:
-                    raise ValueError(f"the posterior gives {table}.{key}, which this plate does not have")
+                    raise ValueError(f"the posterior gives {table}.{key}, but the plate of the campaign has none")
             elif (table, key) != ("plate", "resistance") and here != there:
                 raise ValueError(
-                    f"the posterior was found with {table}.{key} = {there}, but it is {here} here; its draws hold only "
-                    "beside that value"
+                    f"the posterior was found with {table}.{key} = {there}, but the campaign has {here}; its draws are "
+                    "valid only with the value of the fit"
                 )
 
     def which(self, seed: int, first: int, count: int) -> NDArray[np.int64]:
@@ -161,7 +161,7 @@ def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
             values[at] = array.values.ravel().astype(np.float64)
     if not values:
         known = ", ".join(".".join(map(str, one)) for one in OF_THE_MATERIAL)
-        raise ValueError(f"{path.name}: has none of the parameters that a run can take from a posterior: {known}")
+        raise ValueError(f"{path.name}: has none of the parameters that a run takes from a posterior: {known}")
     for (table, key), column in values.items():
         for value in (column.min(), column.max()) if np.isfinite(column).all() else (math.nan,):
             _check_value(str(table), str(key), float(value), path.name)

@@ -118,7 +118,7 @@ def _report_posterior(paths: list[Path], output: Path) -> None:
 
     if len(paths) > 1:
         raise files.ResultError(
-            f"got {len(paths)} files with a posterior among them, but a posterior is reported alone"
+            f"got {len(paths)} files, one of which is a posterior, but a posterior is reported alone"
         )
     write_posterior_report(posterior.read(paths[0]), output)
     print(output)

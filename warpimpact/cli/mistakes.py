@@ -18,7 +18,7 @@ def told(error: Exception) -> str | None:
     if isinstance(error, mistakes()):
         return str(error)
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":
-        return f"{ascii(error.object)[1:200]}: a name holds bytes that are no UTF-8; rename it"
+        return f"{ascii(error.object)[1:200]}: the name contains bytes that are not UTF-8; rename the file"
     if isinstance(error, MemoryError):
         return f"not enough memory: {error}" if str(error) else "not enough memory"
     if isinstance(error, OSError):  # of the system: a name that is too long, a disk that is full

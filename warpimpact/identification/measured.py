@@ -102,8 +102,8 @@ def read_measured(given: Any, standoffs: Sequence[float], place: str) -> tuple[t
         observations += _numbers(name, value, standoffs, f"{place}.{name}")
     if status not in (None, "perforated", "missed") and observations:
         raise FitError(
-            f'{place}.status: got "{status}" beside {observations[0].label}, but only a core that passed the plate has '
-            "that number"
+            f'{place}.status: "{status}" and {observations[0].label} cannot be combined: only a core that passed the '
+            "plate has that number"
         )
     return tuple(observations), status
 

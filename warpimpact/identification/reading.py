@@ -248,7 +248,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
         _check_hit(shot, scene, where)
         has_limit = any(one.is_limit for one in shot.observations)
         if has_limit and fit.record.bending:
-            raise FitError(f"{where}: got limit_velocity beside a selection by bending_stress, which it does not have")
+            raise FitError(f"{where}: limit_velocity and a selection by bending_stress cannot be combined")
         key = repr(shot.tables), shot.own, has_limit  # what the scenes below follow from
         if key in checked:
             continue

@@ -50,7 +50,7 @@ class Store:
             return
         if begun is not None and not overwrite:
             raise OutputError(
-                f"{self.folder}: holds a fit that has not ended ({len(list(self._batches()))} batches); continue it "
+                f"{self.folder}: contains an unfinished fit ({len(list(self._batches()))} batches); continue it "
                 "with --resume or begin anew with --overwrite"
             )
         if self._output.exists() and not overwrite:

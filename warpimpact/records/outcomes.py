@@ -50,7 +50,7 @@ class Outcomes:
         raise AttributeError(f'these outcomes have no "{name}"; {hint}')
 
     def __setattr__(self, name: str, value: object) -> None:
-        raise AttributeError(f"outcomes are immutable; assign({name}=...) gives others")
+        raise AttributeError(f"outcomes are immutable; assign({name}=...) gives a changed copy")
 
     def __contains__(self, name: str) -> bool:
         return name in vars(self)

@@ -168,13 +168,13 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
     for names in v.whole_groups():
         there = [name for name in names if name in dataset.variables]
         if there and (missing := [name for name in names if name not in there]):
-            return f'it has no variable "{missing[0]}" beside "{there[0]}"'
+            return f'it has "{there[0]}", but no variable "{missing[0]}"'
     status, codes = dataset[v.STATUS], [*Status]
     if not all(np.isin(status[at : at + _SLICE].values, codes).all() for at in range(0, len(status), _SLICE)):
-        return f'its variable "{v.STATUS}" has codes that mean nothing'
+        return f'its variable "{v.STATUS}" has unknown codes'
     for place in (dataset[name] for name in (v.HIT_Y, v.HIT_Z) if name in dataset.variables):
         if not all(np.isfinite(place[at : at + _SLICE].values).all() for at in range(0, place.size, _SLICE)):
-            return f'its variable "{place.name}" has places that are no numbers'
+            return f'its variable "{place.name}" has values that are not numbers'
     return None
 
 
@@ -212,7 +212,7 @@ def _attribute_fault(told: dict[str, Any]) -> str | None:
     for first, *others in _TOGETHER:
         missing = [name for name in others if name not in told]
         if first in told and missing:
-            return f'it has no attribute "{missing[0]}" beside "{first}"'
+            return f'it has "{first}", but no attribute "{missing[0]}"'
     return None
 
 

@@ -111,7 +111,7 @@ def claimed(output: Path) -> Iterator[None]:
         folder.mkdir(exist_ok=True)
         lock.acquire()
     except Timeout:
-        raise OutputError(f"{output}: another run is at work on it; wait for its end or name another file") from None
+        raise OutputError(f"{output}: another run is writing it; wait for its end or name another file") from None
     except OSError as error:
         raise OutputError(f"{folder}: cannot be written into ({error.strerror})") from None
     try:
@@ -196,7 +196,7 @@ class ShardsOnDisk(Shards):
             return True
         if begun is not None and not overwrite:
             raise OutputError(
-                f"{self.folder}: holds a run that has not ended ({len(self._shards())} of {self.count} shards); "
+                f"{self.folder}: contains an unfinished run ({len(self._shards())} of {self.count} shards); "
                 "continue it with --resume or begin anew with --overwrite"
             )
         if self.output.exists() and not overwrite:
@@ -295,7 +295,7 @@ class ShardsOnDisk(Shards):
         """
         path = self.saved[index]
         if not self._is_whole(index, path):
-            raise OutputError(f"{path}: this shard is gone or damaged")
+            raise OutputError(f"{path}: this shard is missing or damaged")
         return path
 
     def _named(self, index: int, written: Path) -> Path:

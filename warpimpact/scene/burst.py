@@ -72,7 +72,7 @@ class Burst(Scattering):
     @model_validator(mode="after")
     def _lie_somewhere(self) -> Self:
         if self.spacing is None and self.offsets is None and self.scatter is None:
-            raise ValueError("got neither spacing, offsets nor scatter, but one of them must say how the hits lie")
+            raise ValueError("needs spacing, offsets or scatter, which say how the hits lie")
         given = {SPACING: self.spacing is not None, OFFSETS: self.offsets is not None}
         check_together(given | {HIT_SCATTER: self.scatter is not None})
         if self.offsets is not None and len(self.offsets) != self.count:

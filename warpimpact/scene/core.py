@@ -298,7 +298,7 @@ class ProfileCore(Core):
         if not isinstance(values, dict) or "file" not in values:
             return values
         if "s" in values or "r" in values:
-            raise ValueError("got file beside s or r, but a profile is given either by file or by s and r")
+            raise ValueError("file and s or r cannot be combined: a profile is given either by file or by s and r")
         s, r = read_table(input_file(values["file"], info), ("s", "r")).T
         rest = {key: value for key, value in values.items() if key != "file"}
         return rest | {"s": s.tolist(), "r": r.tolist()}

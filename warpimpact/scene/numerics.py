@@ -35,7 +35,7 @@ class Accuracy(_AsGiven):
     @model_validator(mode="after")
     def _asks_for_something(self) -> Self:
         if self.model_fields_set.isdisjoint(("residual_velocity", "tilt", "limit")):
-            raise ValueError("got none of residual_velocity, tilt and limit, but at least one of them must be given")
+            raise ValueError("needs at least one of residual_velocity, tilt and limit")
         return self
 
     @property
@@ -104,10 +104,10 @@ class Numerics(_AsGiven):
     def _is_asked_for_once(self) -> Self:
         other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
         if "fidelity" in self.model_fields_set and other is not None:
-            raise ValueError(f"got fidelity beside {other}, but one of them sets the resolution")
+            raise ValueError(f"fidelity and {other} cannot be combined: each sets the resolution")
         if self.accuracy is not None and self.explicit is not None:
-            raise ValueError(f"got {self.explicit} beside accuracy, but one of them sets the resolution")
+            raise ValueError(f"{self.explicit} and accuracy cannot be combined: each sets the resolution")
         if self.travel is not None and (self.time_step is not None or self.scheme == "nodal"):
-            other = "time_step" if self.time_step is not None else 'scheme = "nodal", which takes a time_step'
-            raise ValueError(f"got travel beside {other}")
+            other = "time_step" if self.time_step is not None else 'scheme = "nodal"'
+            raise ValueError(f"travel and {other} cannot be combined: time_step sets the step")
         return self

@@ -81,9 +81,9 @@ class Record(Model):
         widest = max(target.gaps)
         if widest < 2.0 * needed:
             raise ValueError(
-                f"got {self._name}.layer_standoffs beside gaps of at most {widest:g} m, but a core of this size flies "
-                f"free with certainty only in gaps of at least {2.0 * needed:.4g} m; layer_tilt tells the tilt as it "
-                "leaves each layer"
+                f"got {self._name}.layer_standoffs and gaps of at most {widest:g} m, but a core of this size is "
+                f"certain to fly free only in gaps of at least {2.0 * needed:.4g} m; layer_tilt gives the tilt "
+                "as the core leaves each layer"
             )
         farthest = max(self.layer_standoffs)
         raise ValueError(

@@ -112,14 +112,14 @@ class Hits(Model):
     def _is_complete(self) -> Self:
         needed, foreign = ("file", {"count", "area", "irreducible"}) if self.sampling == "list" else ("count", {"file"})
         if getattr(self, needed) is None:
-            raise ValueError(f'got sampling = "{self.sampling}" without {needed}, which it needs')
+            raise ValueError(f'sampling = "{self.sampling}" needs {needed}')
         if self.sampling in ("sobol", "random"):
             foreign = foreign | {"repeats"}
         if self.sampling != "sobol":
             foreign = foreign | {"replicates"}
         for name in sorted(foreign):
             if getattr(self, name) != type(self).model_fields[name].default:
-                raise ValueError(f'got {name} beside sampling = "{self.sampling}", which takes none')
+                raise ValueError(f'{name} and sampling = "{self.sampling}" cannot be combined; leave out {name}')
         _ = self.listed
         return self
 

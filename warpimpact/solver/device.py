@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
+import shutil
 import tempfile
 import time
+import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -16,6 +19,8 @@ import warp as wp
 
 _logger = logging.getLogger(__name__)
 Scratch = TypeVar("Scratch")
+_SUMS = "checksums.json"
+"""In the folder of a compiled module: the checksum of each file there."""
 
 
 class DeviceError(RuntimeError):
@@ -88,14 +93,66 @@ def block_size(kernel: Any, device: Any) -> int:
 
 
 def load(kernel: Any, device: Any) -> None:
-    """Load a kernel on a device for launches with Warp's own block size; compile it if it is not cached.
+    """Load a kernel on a device for launches with Warp's own block size; compile it if it is not cached or damaged.
 
     A module is compiled for one block size. By default Warp loads with the block size of CUDA on a CPU, too, and
-    compiles again at the launch.
+    compiles again at the launch. Warp trusts the files of its cache, and one wrong bit in them can end the process.
+
+    Raises:
+        DeviceError: the cached files are damaged and cannot be removed.
     """
-    begin = time.perf_counter()
-    kernel.module.load(device, block_size(kernel, device))
+    begin, block = time.perf_counter(), block_size(kernel, device)
+    module = kernel.module
+    loaded = module.execs.get((device.context, block))
+    if loaded is not None and loaded.module_hash == module.get_module_hash(block):
+        return
+    folder = Path(wp.config.kernel_cache_dir, module.get_module_identifier(block))
+    if not _is_whole(folder):
+        _remove(folder)
+    try:
+        module.load(device, block)
+    except Exception:  # another process has removed it meanwhile; a kernel that cannot be compiled fails again
+        _remove(folder)
+        module.load(device, block)
+    if not _is_whole(folder):
+        _seal(folder)
     _logger.debug("%s on %s: loaded in %.2f s", kernel.key, device, time.perf_counter() - begin)
+
+
+def _sums(folder: Path) -> dict[str, int]:
+    files = (path for path in folder.iterdir() if path.is_file() and path.suffix != Path(_SUMS).suffix)
+    return {path.name: zlib.crc32(path.read_bytes()) for path in files}
+
+
+def _is_whole(folder: Path) -> bool:
+    """If the files of a compiled module are those that were sealed."""
+    sums = folder / _SUMS
+    try:
+        return sums.is_file() and json.loads(sums.read_bytes()) == _sums(folder)
+    except (OSError, ValueError):
+        return False
+
+
+def _seal(folder: Path) -> None:
+    """Write the checksums of a module that was compiled; where that fails, it is compiled again next time."""
+    part = folder / f"{os.getpid()}.json"
+    with suppress(OSError):
+        part.write_text(json.dumps(_sums(folder)), encoding="utf-8")
+        part.replace(folder / _SUMS)
+
+
+def _remove(folder: Path) -> None:
+    try:
+        if folder.is_dir() and not folder.is_symlink():
+            shutil.rmtree(folder)
+        else:
+            folder.unlink(missing_ok=True)
+    except FileNotFoundError:  # another process removes it, too
+        pass
+    except OSError as error:
+        raise DeviceError(
+            f"device: the compiled kernel in {folder} is damaged and cannot be removed ({error.strerror}); delete it"
+        ) from None
 
 
 def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:

@@ -161,22 +161,21 @@ def _planes(plate: Plate, material: Materials, resolution: Resolution) -> Planes
     """Those of a layer, about as far apart as a step goes in a plate as thick as the degradation depth."""
     depth = plate.degradation_depth
     reach = max(FEWEST_PLANES, math.ceil(depth / float(resolution.travel * resolution.passage(depth))))
-    most = float(material.depths.max()) if material.weakens else 0.0
+    most = float(material.together.max()) / depth if material.weakens else 0.0
     return Planes(math.floor(most * reach + ROUNDING) + SPARE, depth / reach, reach)
 
 
-def first_window(core: Core, shots: Shots, materials: Sequence[Materials], grid: Grid, *, nodal: bool) -> int:
+def first_window(core: Core, shots: Shots, material: Materials, grid: Grid, *, nodal: bool) -> int:
     """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
-    target.
+    plate, or the laminate that it begins. Layers farther away have windows of their own.
 
     Args:
-        grid: of the plate.
+        material, grid: of the plate.
     """
-    depth = float((materials[-1].front + materials[-1].thickness).max())
     slack = NODAL_SLACK if nodal else WINDOW_SLACK
-    steepest = float(shots.obliquity.max())
+    steepest, thickness = float(shots.obliquity.max()), float(material.together.max())
     turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
-    half = slack * core.max_radius / math.cos(steepest) + depth * math.tan(steepest) + core.bounding_radius * turned
+    half = slack * core.max_radius / math.cos(steepest) + thickness * math.tan(steepest) + core.bounding_radius * turned
     return 2 * (math.ceil(half / grid.spacing) + 2 * grid.reach + 3)
 
 

@@ -28,10 +28,13 @@ the core's surface from its centre of mass: the core arrives turned."""
 
 def deep_cells(arrays: Prepared, layer: int, cells: int) -> tuple[int, int]:
     """Cells of the window of a layer behind the plate, if the plate's has so many; 0 if the layer keeps no field."""
-    if not arrays.materials[layer].weakens:
+    plate, material = arrays.materials[0], arrays.materials[layer]
+    if not material.weakens:
         return 0, 0
     grid = arrays.grids[layer]
-    half = 0.5 * cells * arrays.grid.spacing + DEEP * arrays.scene.core.bounding_radius
+    thicker = max(0.0, float(material.together.max() - plate.together.max()))
+    aslant = thicker * math.tan(float(arrays.shots.obliquity.max()))
+    half = 0.5 * cells * arrays.grid.spacing + DEEP * arrays.scene.core.bounding_radius + aslant
     count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3)
     return count, count
 

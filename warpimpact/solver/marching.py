@@ -167,6 +167,7 @@ class March:
         count, standoffs = len(self.shots), np.array(self.scene.record.standoffs, dtype=np.float64)
         flight = free_flight.build(self.variant)
         report = self._empty(flight.Report, (count,), (count, len(standoffs)))
+        load(flight.kernel, self.device)
         wp.launch(
             flight.kernel,
             count,

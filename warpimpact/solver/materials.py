@@ -31,8 +31,8 @@ class Materials:
     Attributes:
         front: its front face behind that of the target.
         thickness: of the layer.
-        depths: thickness of its laminate, in degradation depths.
-        deep: 1 where that is more than one, so that the laminate remembers how deep a contact was, else 0.
+        together: thickness of its laminate.
+        deep: 1 where that is more than the degradation depth, so that it remembers how deep a contact was, else 0.
         offset_y, offset_z: place of its origin in the plane of the plate.
         a0, a1, friction, degradation, decay_rate: of the law (kernels/interaction.py).
         onset_jump: of the law if the core touches this layer alone; all the layers that it touches add theirs.
@@ -45,7 +45,7 @@ class Materials:
 
     front: Array
     thickness: Array
-    depths: Array
+    together: Array
     deep: Array
     offset_y: Array
     offset_z: Array
@@ -103,7 +103,7 @@ def _material(
     layer: int,
     front: Array,
     thickness: Array,
-    of_laminate: Array,
+    together: Array,
     laminate: int,
     weakens: bool,
 ) -> Materials:
@@ -112,13 +112,12 @@ def _material(
         shots.own_of(scene.target, name, layer)
         for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
     )
-    depths = of_laminate / plate.degradation_depth
     a0, a1, a2 = scene.interaction.coefficients(resistance, plate.density)
     return Materials(
         front=front,
         thickness=thickness,
-        depths=depths,
-        deep=np.asarray(weakens & (depths > 1.0 + ROUNDING), dtype=np.float64),
+        together=together,
+        deep=np.asarray(weakens & (together > (1.0 + ROUNDING) * plate.degradation_depth), dtype=np.float64),
         offset_y=offset_y,
         offset_z=offset_z,
         a0=a0,

@@ -73,7 +73,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     """
     core, target, record, interaction = scene.core, scene.target, scene.record, scene.interaction
     if numerics.explicit is None:
-        raise ValueError("got numerics that name an accuracy, for which a pilot finds the resolution, but no pilot did")
+        raise ValueError("got numerics with an accuracy, but this needs a resolution: give a level or single settings")
     materials = materials_of(scene, shots)
     weakening = [one.weakens for one in materials]
     resolution = resolve(scene, numerics, weakening)
@@ -95,7 +95,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
     # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.
     deep |= not simple and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
     grids = grids_of(target.layers, materials, resolution, deep=deep)
-    cells = first_window(core, shots, materials, grids[0], nodal=resolution.nodal)
+    cells = first_window(core, shots, materials[0], grids[0], nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,
         nodal=resolution.nodal,

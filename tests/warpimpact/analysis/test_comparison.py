@@ -266,7 +266,7 @@ def test_plates_that_were_asked_something_else_are_refused(change: dict, sentenc
     with pytest.raises(ResultError) as caught:
         compare([plate, plate.assign_attrs(change)], ["a", "b"])
     assert str(caught.value).startswith(f"b: cannot be compared with a: {sentence}")
-    with pytest.raises(ResultError, match=r"^b: does not tell its core and impact, which a comparison needs"):
+    with pytest.raises(ResultError, match=r"^b: has no description of its core and impact, which a comparison needs"):
         compare([plate, plate.drop_attrs()], ["a", "b"])
 
 
@@ -360,7 +360,7 @@ def test_a_comparison_that_was_broken_off_goes_on(
         assert main(command) == 130
     assert "continue with --resume" in capsys.readouterr().err
     assert main(command) == 2
-    assert "holds a run that has not ended" in capsys.readouterr().err
+    assert "contains an unfinished run" in capsys.readouterr().err
     before = Path("slots.nc").stat()
     assert main([*command, "--resume"]) == 0
     assert Path("slots.nc").stat() == before

@@ -196,8 +196,11 @@ def test_lengths_make_scenes_of_their_own(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        (("degradation = 0.8", "degradation = 0.7"), "was found with plate.degradation = 0.8, but it is 0.7 here"),
-        (("[impact]", "[interaction]\nonset = 0.01\n[impact]"), "found with interaction.onset = 0.005, but it is 0.01"),
+        (("degradation = 0.8", "degradation = 0.7"), "found with plate.degradation = 0.8, but the campaign has 0.7"),
+        (
+            ("[impact]", "[interaction]\nonset = 0.01\n[impact]"),
+            "interaction.onset = 0.005, but the campaign has 0.01",
+        ),
         (("degradation = 0.8", 'degradation = 0.8\ndegradation_distance = "1 mm"'), "gives plate.degradation_interval"),
         (
             ('resistance = "1 GPa"', 'resistance = { distribution = "uniform", low = "1 GPa", high = "2 GPa" }'),

@@ -110,7 +110,7 @@ FILES: dict[str, tuple[str, str | bytes, str]] = {
     "an infinite scale": (
         "a.svg",
         SVG.format('<g transform="scale(1e400)"><rect width="1" height="1"/></g>'),
-        "has shapes that are not understood",
+        "has shapes that cannot be read",
     ),
     "a junk path": ("a.svg", SVG.format('<path d="M 0 0 L foo bar 1e999 C z A 1 2 3"/>'), "a.svg"),
     "an unknown encoding": ("a.svg", f'<?xml version="1.0" encoding="klingon"?>{SVG}', "unknown encoding"),
@@ -389,7 +389,7 @@ def test_a_closed_stream_a_backend_and_a_name_end_in_no_bug(tmp_path: Path) -> N
     arguments = ["run", name, "--count", "64", "--device", "cpu"]
     done = ended("")
     assert done.returncode == 2
-    assert "a name holds bytes that are no UTF-8; rename it" in done.stderr
+    assert "the name contains bytes that are not UTF-8; rename the file" in done.stderr
 
 
 def test_a_pipe_in_the_folder_of_a_run_blocks_nothing(tmp_path: Path) -> None:

@@ -141,7 +141,7 @@ def test_rows_are_chosen_joined_and_put() -> None:
 
 def test_outcomes_are_immutable_and_say_what_they_lack() -> None:
     one = some()
-    with pytest.raises(AttributeError, match=r"outcomes are immutable; assign\(tilt=\.\.\.\) gives others"):
+    with pytest.raises(AttributeError, match=r"outcomes are immutable; assign\(tilt=\.\.\.\) gives a changed copy"):
         one.tilt = one.yaw
     with pytest.raises(AttributeError, match=r'no "bending_stress"; it is there with `output.bending`'):
         _ = one.bending_stress

@@ -25,8 +25,8 @@ def layered() -> xarray.Dataset:
 
 
 MAPS: dict[str, tuple[Change, str]] = {
-    "a face without the other": (lambda d: d.drop_vars("layer_rear"), 'no variable "layer_rear" beside'),
-    "no depth": (lambda d: d.drop_vars("depth"), 'no variable "depth" beside'),
+    "a face without the other": (lambda d: d.drop_vars("layer_rear"), 'but no variable "layer_rear"'),
+    "no depth": (lambda d: d.drop_vars("depth"), 'but no variable "depth"'),
     "the solid plate along another": (lambda d: d.rename(solid_hit="shot"), "is along"),
 }
 

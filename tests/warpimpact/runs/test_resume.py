@@ -122,7 +122,7 @@ def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pyte
                 time.sleep(0.05)
             for manner in ("--resume", "--overwrite"):
                 assert main([*command, manner]) == 2
-                sentence = f"warpimpact: error: {output}: another run is at work on it; wait for its end or name"
+                sentence = f"warpimpact: error: {output}: another run is writing it; wait for its end or name"
                 assert capsys.readouterr().err.startswith(sentence)
             assert first.poll() is None
         finally:
@@ -205,7 +205,7 @@ def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
 def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
     broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
 ) -> None:
-    with pytest.raises(OutputError, match=r"holds a run that has not ended .* --resume or begin anew with --overwrite"):
+    with pytest.raises(OutputError, match=r"contains an unfinished run .* --resume or begin anew with --overwrite"):
         run_to_file(campaign, broken_off, device="cpu")
     standings: list[RunProgress] = []
     run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
@@ -375,7 +375,7 @@ def test_a_damaged_manifest_is_written_again_and_told(
     assert_same_bits: SameBits,
 ) -> None:
     harm(folder_of(broken_off) / "manifest.json")
-    with pytest.raises(OutputError, match="holds a run that has not ended"):
+    with pytest.raises(OutputError, match="contains an unfinished run"):
         run_to_file(campaign, broken_off, device="cpu")
     standings: list[RunProgress] = []
     with pytest.warns(UserWarning, match=r"manifest.json: is damaged; it is written again"):
@@ -393,7 +393,7 @@ def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
         if standing.done == standing.total and output.with_name("a.nc.parts").exists():
             _cut(_shards(output))
 
-    with pytest.raises(OutputError, match=r"this shard is gone or damaged; 16 of 16 shards .* continue with --resume"):
+    with pytest.raises(OutputError, match=r"this shard is missing or damaged; 16 of 16 shards .* with --resume"):
         run_to_file(campaign, output, device="cpu", progress=harm)
     with pytest.warns(UserWarning, match="computed again"):
         run_to_file(campaign, output, device="cpu", resume=True)

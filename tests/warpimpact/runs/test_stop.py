@@ -109,7 +109,7 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
         ("mean(speed)", "1 m/s", 'stop.quantity: got "speed", but it must be one of limit_velocity, limit_thick'),
         ("mean(tilt)", "1 deg", 'stop.quantity: got "tilt", which needs a stand-off, as in tilt@130mm'),
         ("mean(deflection@130mm)", "1 deg", 'stop.quantity: got "deflection", which has no stand-off'),
-        ("mean(tilt@100mm)", "1 deg", "got stop.quantity at 0.1 m, but output.standoffs are 0.05 m, 0.13 m"),
+        ("mean(tilt@100mm)", "1 deg", "at 0.1 m, but it must be one of output.standoffs: 0.05 m, 0.13 m"),
         ("P(tilt@130mm > 30 m)", "0.01", 'stop.quantity: got "30 m", which is not an angle'),
         ("P(broken)", "0.01", 'stop.quantity = "P(broken)" needs core.strength'),
         ("quantile(deflection, 1.5)", "1 deg", "stop.quantity: got the quantile 1.5, but it must lie between 0 and 1"),
@@ -129,7 +129,7 @@ def test_a_rule_takes_the_place_of_the_count(tmp_path: Path) -> None:
     assert len(Campaign.from_toml(tmp_path / "campaign.toml", count=500).sampler()) == 500
     again = Campaign.from_text(scene.model_dump_json(), name="text", folder=tmp_path)
     assert again.model_dump() == scene.model_dump()
-    with pytest.raises(CampaignError, match=r"got hits.count = 7 beside stop.max_count = 3000"):
+    with pytest.raises(CampaignError, match=r"hits.count = 7 and stop.max_count = 3000 cannot be combined"):
         campaign(tmp_path, "mean(residual_velocity)", "1 m/s", max_count=3000, count="7\nseed = 1")
     with pytest.raises(CampaignError, match=r'\[stop\] cannot be combined with hits.sampling = "grid"'):
         campaign(tmp_path, "mean(residual_velocity)", "1 m/s", sampling='"grid"')

@@ -103,7 +103,7 @@ def test_a_grid_and_a_spacing_of_one_length() -> None:
 @pytest.mark.parametrize(
     ("given", "sentence"),
     [
-        ({"count": 3}, "got neither spacing, offsets nor scatter"),
+        ({"count": 3}, "needs spacing, offsets or scatter"),
         ({"count": 3, "spacing": "5 mm", "scatter": "1 mm"}, "burst.spacing cannot be combined with burst.scatter"),
         ({"count": 3, "offsets": [[0.0, 0.0], [1e-3, 0.0]]}, "got count = 3 and 2 offsets"),
         ({"count": 1, "scatter": "1 mm"}, "greater than or equal to 2"),

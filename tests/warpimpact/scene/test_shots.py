@@ -87,12 +87,12 @@ def test_a_bad_row_is_named(tmp_path: Path, row: str, complaint: str) -> None:
 @pytest.mark.parametrize(
     ("hits", "complaint"),
     [
-        ({}, 'got sampling = "sobol" without count'),
-        ({"sampling": "list"}, 'got sampling = "list" without file'),
-        ({"sampling": "list", "file": __file__, "count": 3}, "got count beside"),
-        ({"sampling": "grid", "count": 3, "replicates": 8}, "got replicates beside"),
-        ({"sampling": "random", "count": 3, "repeats": 2}, "got repeats beside"),
-        ({"count": 3, "file": __file__}, "got file beside"),
+        ({}, 'sampling = "sobol" needs count'),
+        ({"sampling": "list"}, 'sampling = "list" needs file'),
+        ({"sampling": "list", "file": __file__, "count": 3}, "count and sampling"),
+        ({"sampling": "grid", "count": 3, "replicates": 8}, "replicates and sampling"),
+        ({"sampling": "random", "count": 3, "repeats": 2}, "repeats and sampling"),
+        ({"count": 3, "file": __file__}, "file and sampling"),
         ({"count": 0}, "greater than or equal to 1"),
         ({"count": 1.5}, "valid integer"),
         ({"count": True}, "valid integer"),

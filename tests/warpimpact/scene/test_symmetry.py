@@ -201,7 +201,7 @@ def test_without_a_symmetry_the_hits_are_the_plain_ones() -> None:
 
 def test_a_list_has_no_irreducible_part(tmp_path: Path) -> None:
     (tmp_path / "hits.csv").write_text("hit_y,hit_z\n0,0\n")
-    with pytest.raises(ValidationError, match='got irreducible beside sampling = "list", which takes none'):
+    with pytest.raises(ValidationError, match='irreducible and sampling = "list" cannot be combined'):
         Hits(sampling="list", file=tmp_path / "hits.csv", irreducible=True)
     with pytest.raises(ValidationError, match="valid boolean"):
         Hits(count=3, irreducible="yes")

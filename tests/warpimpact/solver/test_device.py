@@ -1,9 +1,16 @@
 """Kernels made ready on a device."""
 
+import json
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
 import warp as wp
 
 from warpimpact.kernels.variant import Variant
-from warpimpact.solver.device import find_device, load
+from warpimpact.solver.device import DeviceError, find_device, load
 
 
 def test_kernel_is_compiled_for_the_launches_to_come_and_for_nothing_else() -> None:
@@ -16,3 +23,84 @@ def test_kernel_is_compiled_for_the_launches_to_come_and_for_nothing_else() -> N
     wp.launch(kernel, 3, outputs=[values], device=device)
     assert values.numpy().tolist() == [1.0, 1.0, 1.0]
     assert len(kernel.module.execs) == 1
+
+
+def _flip(file: Path) -> None:
+    content = bytearray(file.read_bytes())
+    for at in range(64, len(content), 16):
+        content[at] ^= 1
+    file.write_bytes(content)
+
+
+def _folder(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+
+
+def _other_file(file: Path) -> None:
+    shutil.rmtree(file.parent)
+    file.parent.write_text("")
+
+
+def _pipe(file: Path) -> None:
+    file.unlink()
+    os.mkfifo(file)
+
+
+DAMAGES: list[Callable[[Path], object]] = [
+    _flip,
+    _folder,
+    _other_file,
+    _pipe,
+    Path.unlink,
+    lambda file: file.write_bytes(b""),
+    lambda file: file.write_bytes(bytes(file.stat().st_size)),
+    lambda file: file.write_bytes(file.read_bytes()[:-9]),
+    lambda file: (file.parent / "checksums.json").unlink(),
+    lambda file: [_flip(file), (file.parent / "checksums.json").write_text("{}")],
+]
+
+
+@pytest.mark.parametrize("suffix", [".o", ".meta"])
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_cache_is_compiled_again(
+    damage: Callable[[Path], object], suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def two(values: wp.array(dtype=wp.float32)) -> None:
+        values[wp.tid()] = 2.0
+
+    device = find_device("cpu")
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    kernel = Variant().kernel(two)
+
+    def twos() -> list[float]:
+        kernel.module.unload()  # as a process that starts
+        load(kernel, device)
+        values = wp.zeros(2, dtype=wp.float32, device=device)
+        wp.launch(kernel, 2, outputs=[values], device=device)
+        return list(values.numpy())
+
+    assert twos() == [2.0, 2.0]
+    (file,) = tmp_path.glob(f"*/*{suffix}")
+    damage(file)
+    assert twos() == [2.0, 2.0]
+    assert json.loads((file.parent / "checksums.json").read_bytes())[file.name]
+    before = file.stat().st_mtime_ns
+    assert twos() == [2.0, 2.0]
+    assert file.stat().st_mtime_ns == before  # what is whole is not compiled again
+
+
+def test_a_damaged_cache_that_cannot_be_removed_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def three(values: wp.array(dtype=wp.float32)) -> None:
+        values[wp.tid()] = 3.0
+
+    def refuse(folder: Path) -> None:
+        raise PermissionError(13, "Permission denied", str(folder))
+
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    kernel, device = Variant().kernel(three), find_device("cpu")
+    folder = tmp_path / kernel.module.get_module_identifier(1)
+    folder.mkdir()
+    monkeypatch.setattr(shutil, "rmtree", refuse)
+    with pytest.raises(DeviceError, match=f"{folder} is damaged and cannot be removed .Permission denied.; delete it"):
+        load(kernel, device)

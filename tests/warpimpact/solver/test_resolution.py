@@ -52,12 +52,12 @@ def test_a_single_setting_goes_with_the_coarsest_level_of_a_fidelity(fidelity: s
 @pytest.mark.parametrize(
     ("numerics", "words"),
     [
-        ({"fidelity": "draft", "level": 2}, "got fidelity beside level"),
-        ({"fidelity": "draft", "accuracy": {"tilt": "1 deg"}}, "got fidelity beside accuracy"),
-        ({"accuracy": {"tilt": "1 deg"}, "patches_axial": 20}, "got patches_axial beside accuracy"),
-        ({"travel": 0.1, "time_step": 1e-6}, "got travel beside time_step"),
-        ({"travel": 0.1, "scheme": "nodal"}, "got travel beside scheme"),
-        ({"accuracy": {}}, "at least one of them must be given"),
+        ({"fidelity": "draft", "level": 2}, "fidelity and level cannot be combined"),
+        ({"fidelity": "draft", "accuracy": {"tilt": "1 deg"}}, "fidelity and accuracy cannot be combined"),
+        ({"accuracy": {"tilt": "1 deg"}, "patches_axial": 20}, "patches_axial and accuracy cannot be combined"),
+        ({"travel": 0.1, "time_step": 1e-6}, "travel and time_step cannot be combined"),
+        ({"travel": 0.1, "scheme": "nodal"}, "travel and scheme"),
+        ({"accuracy": {}}, "needs at least one of residual_velocity"),
         ({"accuracy": {"tilt": "1 deg", "share": 0.995}}, "less than or equal to 0.99"),
     ],
 )

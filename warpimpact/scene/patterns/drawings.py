@@ -26,7 +26,7 @@ def check_drawing(path: Path) -> None:
     elements = list(root.iter())
     for element in elements:
         for name in _NOT_UNDERSTOOD & {_tag(element), *element.attrib}:
-            raise ValueError(f"{path.name} has {name}, which is not understood; give filled paths and plain shapes")
+            raise ValueError(f"{path.name} has {name}, which is not supported; give filled paths and plain shapes")
     elements += _used(path, elements)
     if len(elements) > _MOST_ELEMENTS:
         raise ValueError(f"{path.name} has {len(elements)} shapes, but a drawing has at most {_MOST_ELEMENTS}")
@@ -40,7 +40,7 @@ def _parsed(path: Path) -> xml.Element:
     depth, root = 0, None
     try:
         if b"<!ENTITY" in path.read_bytes():
-            raise ValueError(f"{path.name} declares entities, which are not understood; save it as a plain SVG")
+            raise ValueError(f"{path.name} declares entities, which are not supported; save it as a plain SVG")
         for event, element in xml.iterparse(path, ("start", "end")):
             root = element if root is None else root
             depth += 1 if event == "start" else -1
@@ -63,7 +63,7 @@ def _used(path: Path, elements: list[xml.Element]) -> list[xml.Element]:
         targets = [by_name[name[1:]] for name in names if name[1:] in by_name]
         inner = [one for target in targets for one in target.iter()]
         if any(_tag(one) == "use" for one in inner):
-            raise ValueError(f"{path.name} has a use of another use, which is not understood; give plain shapes")
+            raise ValueError(f"{path.name} has a use of another use, which is not supported; give plain shapes")
         again += inner
         if len(again) > _MOST_ELEMENTS:
             break

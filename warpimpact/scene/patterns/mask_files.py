@@ -140,7 +140,7 @@ def _cells_of(path: Path, cell_size: float) -> BoolArray:
     except _NoShape:
         raise
     except Exception as error:  # of drawings that are no drawings, svgelements lets errors of any class through
-        raise ValueError(f"{path.name} has shapes that are not understood: {brief(str(error))}") from None
+        raise ValueError(f"{path.name} has shapes that cannot be read: {brief(str(error))}") from None
     shapely.prepare(shapes)
     y, z = ((np.arange(count) + 0.5) * cell_size for count in counts)
     return np.array([shapely.contains_xy(shapes, at, z) for at in y])
