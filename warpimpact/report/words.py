@@ -28,7 +28,6 @@ from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
 from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.outlines import outlines
-from warpimpact.studies.accuracy import QUANTITIES
 from warpimpact.studies.accuracy_text import study_text
 
 _MM = 1e3
@@ -123,12 +122,12 @@ def study_table(study: xarray.Dataset) -> dict[str, Any]:
     head = [
         "setting",
         "hits/s",
-        *(f"{words(name)}, {share} [{units[name]}]" for name in QUANTITIES for share in quoted),
+        *(f"{words(name)}, {share} [{units[name]}]" for name in v.STUDIED for share in quoted),
     ]
     rows = []
     for index in range(last.sizes["setting"]):
         one = last.isel(setting=index)
-        errors = [f"{value:.3f}" for name in QUANTITIES for value in one[v.ERRORS[name]].values]
+        errors = [f"{value:.3f}" for name in v.STUDIED for value in one[v.ERRORS[name]].values]
         rows.append([one[v.SETTING].item(), f"{one[v.HITS_PER_SECOND].item():.4g}", *errors])
     return {"title": study.attrs[attr.TITLE], "device": study.attrs[attr.DEVICE], "head": head, "rows": rows} | {
         "made": study.attrs[attr.HISTORY][:10],

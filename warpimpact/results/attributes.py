@@ -6,149 +6,147 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
+
+Kind = Literal["text", "table", "number", "count", "pair"]
+
+
+class Attribute(NamedTuple):
+    """What a result has under the name of a global attribute.
+
+    Attributes:
+        kind: a "table" is a text with a JSON object, a "count" a whole number of at least 1, a "pair" two numbers.
+        units: as CF writes them, which the attribute ``<name>_units`` of a result says; empty where it has none.
+    """
+
+    kind: Kind
+    units: str
+
+
+ATTRIBUTES: dict[str, Attribute] = {}
+"""By name."""
+_SI = "SI; a text says its unit"
+
+
+def _declared(name: str, kind: Kind = "text", units: str = "") -> str:
+    ATTRIBUTES[name] = Attribute(kind, units)
+    return name
+
 
 # CF
-TITLE = "title"
-HISTORY = "history"
-REFERENCES = "references"
+TITLE = _declared("title")
+HISTORY = _declared("history")
+REFERENCES = _declared("references")
 
 # The campaign, and how it was computed
-CAMPAIGN = "campaign"
-WARPIMPACT_VERSION = "warpimpact_version"
-WARP_VERSION = "warp_version"
-PYTHON_VERSION = "python_version"
-NUMPY_VERSION = "numpy_version"
-XARRAY_VERSION = "xarray_version"
-COMMIT = "commit"
+CAMPAIGN = _declared("campaign")
+WARPIMPACT_VERSION = _declared("warpimpact_version")
+WARP_VERSION = _declared("warp_version")
+PYTHON_VERSION = _declared("python_version")
+NUMPY_VERSION = _declared("numpy_version")
+XARRAY_VERSION = _declared("xarray_version")
+COMMIT = _declared("commit")
 """Of the checkout that computed the result; not there where warpimpact was installed without one."""
-MACHINE = "machine"
-PROCESSOR = "processor"
-DEVICE = "device"
-NUMERICS = "numerics"
+MACHINE = _declared("machine")
+PROCESSOR = _declared("processor")
+DEVICE = _declared("device")
+NUMERICS = _declared("numerics")
 """The numerics in force in words. As numbers:"""
-PATCHES_AXIAL = "patches_axial"
-PATCHES_AROUND = "patches_around"
-GRID_SPACING = "grid_spacing"
-TIME_STEP = "time_step"
-PRECISION = "precision"
-NUMERICS_GIVEN = "numerics_given"
-RESOLUTION = "resolution"
+PATCHES_AXIAL = _declared("patches_axial", "number")
+PATCHES_AROUND = _declared("patches_around", "number")
+GRID_SPACING = _declared("grid_spacing", "number", "m")
+TIME_STEP = _declared("time_step", "number", "s")
+PRECISION = _declared("precision")
+NUMERICS_GIVEN = _declared("numerics_given", "table", _SI)
+RESOLUTION = _declared("resolution", "table")
 """JSON of the numerics that a pilot found; likewise only with a pilot:"""
-PROMISE_KEPT = "promise_kept"
-ACCURACY = "accuracy"
+PROMISE_KEPT = _declared("promise_kept", "number")
+ACCURACY = _declared("accuracy", "table")
 """JSON of what was asked for: errors in SI, and the share of the hits that is to stay within them. What was found:"""
-RESIDUAL_VELOCITY_ERROR = "residual_velocity_error"
-TILT_ERROR = "tilt_error"
-DEPTH_ERROR = "depth_error"
+RESIDUAL_VELOCITY_ERROR = _declared("residual_velocity_error", "number", "m s-1")
+TILT_ERROR = _declared("tilt_error", "number", "degree")
+DEPTH_ERROR = _declared("depth_error", "number", "m")
 """Only where some shots of the pilot stop in a layer."""
-FINGERPRINT = "fingerprint"
-COMPUTE_TIME = "compute_time"
-HITS_PER_SECOND = "hits_per_second"
+FINGERPRINT = _declared("fingerprint")
+COMPUTE_TIME = _declared("compute_time", "number", "s")
+HITS_PER_SECOND = _declared("hits_per_second", "number", "s-1")
 
 # The shots
-SAMPLING = "sampling"
-SEED = "seed"
-COUNT = "count"
-REPLICATES = "replicates"
-SYMMETRIES = "symmetries"
-IMAGES = "images"
+SAMPLING = _declared("sampling")
+SEED = _declared("seed", "number")
+COUNT = _declared("count", "count")
+REPLICATES = _declared("replicates", "count")
+SYMMETRIES = _declared("symmetries")
+IMAGES = _declared("images", "count")
 """How many hits in a row are images of each other. SYMMETRIES, IMAGES and COMPUTED_HITS need `hits.irreducible`."""
-COMPUTED_HITS = "computed_hits"
-BURST = "burst"
+COMPUTED_HITS = _declared("computed_hits", "count")
+BURST = _declared("burst", "table")
 """JSON of the burst; likewise only of a campaign of bursts:"""
-SHOTS_AT_A_PLATE = "shots_at_a_plate"
+SHOTS_AT_A_PLATE = _declared("shots_at_a_plate", "count")
 
 # Core, plate and output
-CORE = "core"
-PLATE = "plate"
-IMPACT = "impact"
-MATERIAL = "material"
-DISCREPANCY = "discrepancy"
+CORE = _declared("core", "table", _SI)
+PLATE = _declared("plate", "table", _SI)
+IMPACT = _declared("impact", "table", _SI)
+MATERIAL = _declared("material", "table", _SI)
+DISCREPANCY = _declared("discrepancy", "table")
 """JSON of the standard deviation that a posterior's model misses by, by units of the Dataset."""
-DISCREPANCY_COUNTS = "discrepancy_counts"
+DISCREPANCY_COUNTS = _declared("discrepancy_counts", "number")
 """1 where a reader asks to count it; in no file."""
-LAYERS = "layers"
+LAYERS = _declared("layers", "table")
 """JSON of what stands behind the plate, by its number; not there where that is nothing."""
-STANDOFF_POINT = "standoff_point"
-OPEN_AREA = "open_area"
-AREAL_DENSITY = "areal_density"
-LIGAMENT = "ligament"
-PLATE_PERIOD = "plate_period"
-PLATE_THICKNESS = "plate_thickness"
-FAILED_SHARE = "failed_share"
+STANDOFF_POINT = _declared("standoff_point")
+OPEN_AREA = _declared("open_area", "number", "1")
+AREAL_DENSITY = _declared("areal_density", "number", "kg m-2")
+LIGAMENT = _declared("ligament", "number", "m")
+PLATE_PERIOD = _declared("plate_period", "pair", "m")
+PLATE_THICKNESS = _declared("plate_thickness", "number", "m")
+FAILED_SHARE = _declared("failed_share", "number", "1")
 
 # A sweep
-SWEEP = "sweep"
+SWEEP = _declared("sweep", "table")
 """JSON of the swept inputs: name of the dimension → values as they were written."""
 
 # The stop rule
-STOP_QUANTITY = "stop_quantity"
-STOP_REASON = "stop_reason"
-ESTIMATE = "estimate"
-ESTIMATE_INTERVAL = "estimate_interval"
-ESTIMATE_UNITS = "estimate_units"
-CONFIDENCE = "confidence"
+STOP_QUANTITY = _declared("stop_quantity")
+STOP_REASON = _declared("stop_reason")
+ESTIMATE = _declared("estimate", "number")
+ESTIMATE_INTERVAL = _declared("estimate_interval", "pair")
+ESTIMATE_UNITS = _declared("estimate_units")
+CONFIDENCE = _declared("confidence", "number")
 
 # A search of limits
-LIMIT = "limit"
+LIMIT = _declared("limit")
 """The quantity: "velocity" or "thickness"."""
-LIMIT_LAYER = "limit_layer"
+LIMIT_LAYER = _declared("limit_layer", "number")
 """Whose thickness was searched; 0 is the plate."""
-LIMIT_DENSITY = "limit_density"
+LIMIT_DENSITY = _declared("limit_density", "number", "kg m-3")
 """Mass per area and thickness of that layer, its holes included."""
-LIMIT_ELSEWHERE = "limit_elsewhere"
+LIMIT_ELSEWHERE = _declared("limit_elsewhere", "number", "kg m-2")
 """Areal density of all other layers."""
-SOLID_LIMIT_TIME = "solid_limit_time"
+SOLID_LIMIT_TIME = _declared("solid_limit_time", "number", "s")
 """Time that the search at the solid plate took [s]."""
-SOLID_LIMIT_DENSITY, SOLID_LIMIT_HIGHEST = "solid_limit_density", "solid_limit_highest"
+SOLID_LIMIT_DENSITY = _declared("solid_limit_density", "number", "kg m-3")
+SOLID_LIMIT_HIGHEST = _declared("solid_limit_highest", "number")
 """Mass per volume of the solid plate that replaces the whole target, and the largest value tried."""
-LIMIT_TOLERANCE = "limit_tolerance"
-LIMIT_HIGHEST = "limit_highest"
-LIMIT_ERROR = "limit_error"
+LIMIT_TOLERANCE = _declared("limit_tolerance", "number")
+LIMIT_HIGHEST = _declared("limit_highest", "number")
+LIMIT_ERROR = _declared("limit_error", "number")
 """Of a limit velocity [m/s] or of a limit thickness [m]."""
 
 # A replayed hit
-HIT = "hit"
-AGREEMENT = "agreement"
-
-
-_SI = "SI; a text says its unit"
-UNITS = {
-    COMPUTE_TIME: "s",
-    HITS_PER_SECOND: "s-1",
-    RESIDUAL_VELOCITY_ERROR: "m s-1",
-    TILT_ERROR: "degree",
-    DEPTH_ERROR: "m",
-    GRID_SPACING: "m",
-    TIME_STEP: "s",
-    OPEN_AREA: "1",
-    AREAL_DENSITY: "kg m-2",
-    LIMIT_DENSITY: "kg m-3",
-    SOLID_LIMIT_DENSITY: "kg m-3",
-    SOLID_LIMIT_TIME: "s",
-    LIMIT_ELSEWHERE: "kg m-2",
-    LIGAMENT: "m",
-    PLATE_PERIOD: "m",
-    PLATE_THICKNESS: "m",
-    FAILED_SHARE: "1",
-    CORE: _SI,
-    PLATE: _SI,
-    IMPACT: _SI,
-    MATERIAL: _SI,
-    NUMERICS_GIVEN: _SI,
-}
-"""Units of the attributes that have one; the attribute ``<name>_units`` tells them in the Dataset."""
+HIT = _declared("hit", "number")
+AGREEMENT = _declared("agreement")
 
 
 def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes, each that has a unit followed by it."""
-    told: dict[str, Any] = {}
+    described: dict[str, Any] = {}
     for name, value in attributes.items():
-        told[name] = value
-        if name in UNITS:
-            told[f"{name}_units"] = UNITS[name]
-    return told
+        described[name] = value
+        if name in ATTRIBUTES and (units := ATTRIBUTES[name].units):
+            described[f"{name}_units"] = units
+    return described
 
 
 def versions() -> dict[str, str]:
@@ -161,7 +159,7 @@ def versions() -> dict[str, str]:
 @cache
 def machine() -> dict[str, str]:
     """The attributes that say what else was there: machine, processor, commit and other versions."""
-    told = {
+    found = {
         PYTHON_VERSION: platform.python_version(),
         NUMPY_VERSION: version("numpy"),
         XARRAY_VERSION: version("xarray"),
@@ -169,7 +167,7 @@ def machine() -> dict[str, str]:
         PROCESSOR: _processor(),
     }
     commit = _commit()
-    return told | ({COMMIT: commit} if commit else {})
+    return found | ({COMMIT: commit} if commit else {})
 
 
 def _processor() -> str:

@@ -17,31 +17,6 @@ if TYPE_CHECKING:
 
 _LABELS = (v.AXIS, v.QUATERNION, v.SETTING, v.SCHEME, v.STUDY_LEVEL)
 """Variables that hold words."""
-_TEXTS = (
-    *(attr.TITLE, attr.HISTORY, attr.REFERENCES, attr.CAMPAIGN, attr.WARPIMPACT_VERSION, attr.WARP_VERSION),
-    *(attr.DEVICE, attr.NUMERICS, attr.NUMERICS_GIVEN, attr.FINGERPRINT, attr.SAMPLING, attr.SYMMETRIES, attr.CORE),
-    *(attr.MATERIAL, attr.RESOLUTION, attr.ACCURACY, attr.IMPACT, attr.STANDOFF_POINT, attr.STOP_QUANTITY),
-    *(attr.STOP_REASON, attr.ESTIMATE_UNITS, attr.AGREEMENT, attr.PLATE, attr.LAYERS, attr.PRECISION, attr.MACHINE),
-    *(attr.PROCESSOR, attr.COMMIT, attr.PYTHON_VERSION, attr.NUMPY_VERSION, attr.XARRAY_VERSION, attr.SWEEP),
-    *(attr.BURST, attr.DISCREPANCY),
-    *(f"{name}_units" for name in attr.UNITS),
-)
-_TABLES = (
-    *(attr.SWEEP, attr.CORE, attr.PLATE, attr.IMPACT, attr.MATERIAL, attr.LAYERS, attr.NUMERICS_GIVEN),
-    *(attr.RESOLUTION, attr.ACCURACY, attr.BURST, attr.DISCREPANCY),
-)
-"""Texts that are JSON objects."""
-_COUNTS = (attr.COUNT, attr.REPLICATES, attr.IMAGES, attr.COMPUTED_HITS, attr.SHOTS_AT_A_PLATE)
-_NUMBERS = (
-    *(attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.SEED, attr.OPEN_AREA, attr.AREAL_DENSITY, attr.LIGAMENT),
-    *(attr.PLATE_THICKNESS, attr.FAILED_SHARE, attr.ESTIMATE, attr.CONFIDENCE, attr.HIT),
-    *(attr.LIMIT_LAYER, attr.LIMIT_DENSITY, attr.LIMIT_ELSEWHERE, attr.LIMIT_TOLERANCE, attr.LIMIT_HIGHEST),
-    *(attr.SOLID_LIMIT_TIME, attr.SOLID_LIMIT_DENSITY, attr.SOLID_LIMIT_HIGHEST),
-    *(attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.DEPTH_ERROR, attr.LIMIT_ERROR),
-    *(attr.GRID_SPACING, attr.TIME_STEP),
-    *(attr.PATCHES_AXIAL, attr.PATCHES_AROUND),
-)
-_PAIRS = (attr.PLATE_PERIOD, attr.ESTIMATE_INTERVAL)
 _TOGETHER = (
     (attr.SAMPLING, attr.SEED, attr.REPLICATES),
     (attr.AREAL_DENSITY, attr.OPEN_AREA),
@@ -102,11 +77,11 @@ def history_fault(dataset: xarray.Dataset) -> str | None:
     return fault(dataset, known)
 
 
-def posterior_fault(groups: Mapping[str, xarray.Dataset], told: Mapping[Any, Any]) -> str | None:
+def posterior_fault(groups: Mapping[str, xarray.Dataset], attributes: Mapping[Any, Any]) -> str | None:
     """What keeps the groups of a posterior from being one, as a phrase; None if nothing does.
 
     Args:
-        told: global attributes.
+        attributes: global attributes.
     """
     parameters = [str(name) for name in groups["prior"].data_vars]
     wanted = [(group, name, dims) for name in parameters for group, dims in _OF_A_PARAMETER.items()]
@@ -120,26 +95,26 @@ def posterior_fault(groups: Mapping[str, xarray.Dataset], told: Mapping[Any, Any
         if set(dims) & {*_SHOTS, *_OBSERVED} - groups[group].coords.keys():
             return f'its group "{group}" does not name what "{name}" is along'
     for name in _NUMBERS_OF_A_POSTERIOR:
-        if not isinstance(told.get(name), int | float | np.number):
+        if not isinstance(attributes.get(name), int | float | np.number):
             return f'its attribute "{name}" is no number'
-    shares = _json(told.get("row_probability"))
+    shares = _json(attributes.get("row_probability"))
     if not isinstance(shares, dict) or not all(isinstance(one, int | float) for one in shares.values()):
         return 'its attribute "row_probability" is not what it should be'
-    return draws_fault(groups["posterior"][parameters], told)
+    return draws_fault(groups["posterior"][parameters], attributes)
 
 
-def draws_fault(draws: xarray.Dataset, told: Mapping[Any, Any]) -> str | None:
+def draws_fault(draws: xarray.Dataset, attributes: Mapping[Any, Any]) -> str | None:
     """What keeps the draws of parameters from being drawn from, as a phrase; None if nothing does.
 
     Args:
-        told: global attributes of the posterior.
+        attributes: global attributes of the posterior.
     """
     for name, array in draws.data_vars.items():
         if array.dims != _DRAWS or array.dtype.kind not in "iuf" or not array.size:
             return f'its group "posterior" has no numbers "{name}" along {_DRAWS}'
         if not isinstance(_json(array.attrs.get("path")), list):
             return f'its parameter "{name}" has no path as it should'
-    material = _json(told.get("material"))
+    material = _json(attributes.get("material"))
     tables = material if isinstance(material, dict) else {}
     if not all(isinstance(tables.get(one), dict) for one in ("plate", "interaction")):
         return 'its attribute "material" is not what it should be'
@@ -205,13 +180,13 @@ def _variable_fault(array: xarray.DataArray, declared: v.Variable) -> str | None
     return None
 
 
-def _attribute_fault(told: dict[str, Any]) -> str | None:
-    for name, value in told.items():
+def _attribute_fault(attributes: dict[str, Any]) -> str | None:
+    for name, value in attributes.items():
         if not _is_allowed(name, value):
             return f'its attribute "{name}" is not what it should be'
     for first, *others in _TOGETHER:
-        missing = [name for name in others if name not in told]
-        if first in told and missing:
+        missing = [name for name in others if name not in attributes]
+        if first in attributes and missing:
             return f'it has "{first}", but no attribute "{missing[0]}"'
     return None
 
@@ -219,19 +194,19 @@ def _attribute_fault(told: dict[str, Any]) -> str | None:
 def _is_allowed(name: str, value: Any) -> bool:
     if name in v.OUTLINE_VARIABLES:
         return np.asarray(value).dtype.kind == "f"
-    if name in _TEXTS:
-        return isinstance(value, str) and (name not in _TABLES or _is_table(value))
-    if name in _PAIRS:
-        return np.shape(value) == (2,) and np.asarray(value).dtype.kind in "iuf"
-    if name in _COUNTS:
-        return isinstance(value, int | np.integer) and bool(value >= 1)
-    if name in _NUMBERS:
-        return isinstance(value, int | float | np.number)
-    return True
-
-
-def _is_table(text: str) -> bool:
-    return isinstance(_json(text), dict)
+    if name not in attr.ATTRIBUTES:
+        return isinstance(value, str) or name.removesuffix("_units") not in attr.ATTRIBUTES
+    match attr.ATTRIBUTES[name].kind:
+        case "text":
+            return isinstance(value, str)
+        case "table":
+            return isinstance(value, str) and isinstance(_json(value), dict)
+        case "pair":
+            return np.shape(value) == (2,) and np.asarray(value).dtype.kind in "iuf"
+        case "count":
+            return isinstance(value, int | np.integer) and bool(value >= 1)
+        case "number":
+            return isinstance(value, int | float | np.number)
 
 
 def _json(text: Any) -> Any:

@@ -1,5 +1,5 @@
-"""The variables of the Datasets by their names: those that are recorded of a shot, which records/ declares, and those
-that stand beside them, with their dimensions, units and meanings."""
+"""The variables of the Datasets, with dimensions, units and meanings: those that records/ declares, the conditions of
+the shots, which scene/quantities.py has, and what stands beside them."""
 
 from __future__ import annotations
 
@@ -13,58 +13,47 @@ from warpimpact.records.exit import *
 from warpimpact.records.layers import *
 from warpimpact.records.limit import *
 from warpimpact.records.variable import *
+from warpimpact.scene.quantities import BY_LAYER, OF_THE_SCENE, QUANTITIES
+from warpimpact.scene.units import quantity
 
 if TYPE_CHECKING:
     import xarray
 
+
+def _condition(name: str, of: str = "") -> Variable:
+    """The column of a quantity of the shots; `of` says of what, where each layer has the quantity."""
+    known = QUANTITIES[name]
+    units = quantity(known.type).display.stored
+    return Variable(known.column or name, HITS, units, f"{known.meaning}{of}", field=name)
+
+
+def _by_layer(name: str) -> Variable:
+    """The column of a quantity of every layer."""
+    one = _condition(name, " of each layer")
+    return Variable(f"layer_{name}", IN_LAYER, one.units, one.long_name)
+
+
 # --- Coordinates of a hit map ---
 HIT = Variable("hit", HITS, "1", "number of the hit in its campaign, from 0")
-HIT_Y = Variable("hit_y", HITS, "m", "hit point on the front face, y")
-HIT_Z = Variable("hit_z", HITS, "m", "hit point on the front face, z")
+HIT_Y, HIT_Z = _condition("hit_y"), _condition("hit_z")
 STANDOFF = Variable("standoff", ("standoff",), "m", "distance behind the rear face of the target")
 AXIS = Variable("axis", ("axis",), "1", "axis of the plate frame")
 
 COORDINATES = (HIT, HIT_Y, HIT_Z, STANDOFF, AXIS)
 
-# --- Impact ---
-IMPACT_VELOCITY = Variable("impact_velocity", HITS, "m s-1", "impact velocity", field="velocity")
-OBLIQUITY = Variable("obliquity", HITS, "degree", "angle between line of fire and plate normal")
-AZIMUTH = Variable("azimuth", HITS, "degree", "direction of the obliquity, from +y towards +z")
-IMPACT_PITCH = Variable(
-    "impact_pitch", HITS, "degree", "pitch of the core on impact, relative to the line of fire", field="pitch"
-)
-IMPACT_YAW = Variable(
-    "impact_yaw", HITS, "degree", "yaw of the core on impact, relative to the line of fire", field="yaw"
-)
-SPIN = Variable("spin", HITS, "rad s-1", "spin of the core about its axis on impact")
-
-SHOT_VARIABLES = (IMPACT_VELOCITY, OBLIQUITY, AZIMUTH, IMPACT_PITCH, IMPACT_YAW, SPIN)
-
-# --- Plate and core, where they differ from shot to shot ---
-RESISTANCE = Variable("resistance", HITS, "Pa", "resistance of the plate")
-SHEAR_COEFFICIENT = Variable("shear_coefficient", HITS, "1", "friction per normal stress")
-DEGRADATION = Variable("degradation", HITS, "1", "share of the resistance left after an interval of contact")
-THICKNESS = Variable("thickness", HITS, "m", "thickness of the plate")
-MASS = Variable("mass", HITS, "kg", "mass of the core")
-STRENGTH = Variable("strength", HITS, "Pa", "strength of the core, a nominal bending stress")
+# --- Conditions of the shots ---
+SHOT_VARIABLES = tuple(_condition(name) for name, one in QUANTITIES.items() if one.table == "impact")
+IMPACT_VELOCITY, OBLIQUITY, AZIMUTH, IMPACT_PITCH, IMPACT_YAW, SPIN = SHOT_VARIABLES
+_OF_THE_SCENE = tuple(_condition(name, " of the plate" if name in BY_LAYER else "") for name in OF_THE_SCENE)
+RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH = _OF_THE_SCENE
+LAYER_SCATTER = tuple(_by_layer(name) for name in BY_LAYER)
+LAYER_THICKNESS = LAYER_SCATTER[BY_LAYER.index("thickness")]
+SCATTER_VARIABLES = (*_OF_THE_SCENE, *LAYER_SCATTER)
+"""Present only in a campaign in which they differ from shot to shot."""
 
 POSTERIOR_DRAW = Variable("posterior_draw", HITS, "1", "place of the shot's parameters in the posterior")
 POSTERIOR_VARIABLES = (POSTERIOR_DRAW,)
 """Present only in a campaign with a posterior."""
-
-LAYER_THICKNESS = Variable("layer_thickness", IN_LAYER, "m", "thickness of each layer")
-
-LAYER_SCATTER = (
-    LAYER_THICKNESS,
-    Variable("layer_resistance", IN_LAYER, "Pa", "resistance of each layer"),
-    Variable("layer_shear_coefficient", IN_LAYER, "1", "friction per normal stress of each layer"),
-    Variable("layer_degradation", IN_LAYER, "1", "share of the resistance left after contact, of each layer"),
-    Variable("layer_offset_y", IN_LAYER, "m", "place of the layer's origin in the plane of the plate, y"),
-    Variable("layer_offset_z", IN_LAYER, "m", "place of the layer's origin in the plane of the plate, z"),
-)
-
-SCATTER_VARIABLES = (RESISTANCE, SHEAR_COEFFICIENT, DEGRADATION, THICKNESS, MASS, STRENGTH, *LAYER_SCATTER)
-"""Present only in a campaign in which they differ from shot to shot."""
 
 # --- Bursts ---
 SAMPLE = Variable("sample", HITS, "1", "number of the plate that the shot hits")
@@ -168,20 +157,8 @@ LAYER_SECTIONS = (LAYER_SOLID_ALONG_Y, LAYER_SOLID_ALONG_Z)
 """Present only with layers behind the plate, as LAYER_FACES, which are those of the hit here."""
 
 HISTORY_VARIABLES = (
-    POSITION,
-    PLATE_POSITION,
-    ATTITUDE,
-    CORE_AXIS,
-    VELOCITY,
-    MARCHED_ANGULAR_VELOCITY,
-    FORCE,
-    MOMENT,
-    TRANSLATIONAL_ENERGY,
-    ROTATIONAL_ENERGY,
-    RESISTANCE_SHARE,
-    CORE_RADIUS,
-    SOLID_ALONG_Y,
-    SOLID_ALONG_Z,
+    *(POSITION, PLATE_POSITION, ATTITUDE, CORE_AXIS, VELOCITY, MARCHED_ANGULAR_VELOCITY, FORCE, MOMENT),
+    *(TRANSLATIONAL_ENERGY, ROTATIONAL_ENERGY, RESISTANCE_SHARE, CORE_RADIUS, SOLID_ALONG_Y, SOLID_ALONG_Z),
 )
 RESIDUAL_ANGULAR_VELOCITY = "residual_angular_velocity"
 """Name of the outcome's angular velocity in a history. Its own name belongs to the motion there."""
@@ -209,56 +186,32 @@ TIME_STEP = Variable("time_step", _SETTING, "s", "time step at impact velocity")
 HITS_PER_SECOND = Variable("hits_per_second", _SETTING, "s-1", "hits computed per second")
 OTHER_STATUS = Variable("other_status", _SETTING, "1", "hits whose status differs from the converged answer")
 SETTLED = Variable("settled", HITS, "1", "1 where the hit ends with the same status on all levels")
-CONVERGED_STATUS = Variable("status", HITS, "1", "how the shot ended, converged", flags=OF_SHOTS)
-CONVERGED_VELOCITY = Variable("residual_velocity", HITS, "m s-1", "residual velocity, converged")
-CONVERGED_TILT = Variable("tilt", AT_STANDOFF, "degree", "angle between core axis and line of fire, converged")
+STUDIED = (RESIDUAL_VELOCITY, TILT)
+"""Quantities whose errors a study measures."""
 
-ERRORS = {
-    RESIDUAL_VELOCITY: Variable(
-        "residual_velocity_error", ("setting", "quantile"), "m s-1", "error of the residual velocity"
-    ),
-    TILT: Variable("tilt_error", ("setting", "quantile", "standoff"), "degree", "error of the tilt"),
-}
-"""By the two quantities of a study, as the following tables."""
+
+def _studied(suffix: str, along: tuple[str, ...], meaning: str) -> dict[Variable, Variable]:
+    """A variable for each quantity of a study; `meaning` has a place for its name."""
+    return {
+        one: Variable(f"{one}{suffix}", (*along, *one.dims[1:]), one.units, meaning.format(one.replace("_", " ")))
+        for one in STUDIED
+    }
+
+
+ERRORS = _studied("_error", ("setting", "quantile"), "error of the {}")
 FRONTS = {
-    RESIDUAL_VELOCITY: Variable(
-        "residual_velocity_front", _SETTING, "1", "1 where no faster setting has a smaller 90 % error"
-    ),
-    TILT: Variable("tilt_front", _SETTING, "1", "1 where no faster setting has a smaller 90 % error, last stand-off"),
+    one: Variable(f"{one}_front", _SETTING, "1", "1 where no faster setting has a smaller 90 % error, last stand-off")
+    for one in STUDIED
 }
-CHANGES = {
-    RESIDUAL_VELOCITY: Variable(
-        "residual_velocity_change",
-        ("level", "quantile"),
-        "m s-1",
-        "change of the residual velocity from the level before",
-    ),
-    TILT: Variable(
-        "tilt_change", ("level", "quantile", "standoff"), "degree", "change of the tilt from the level before"
-    ),
-}
-UNCERTAINTIES = {
-    RESIDUAL_VELOCITY: Variable("residual_velocity_uncertainty", HITS, "m s-1", "velocity change on the last level"),
-    TILT: Variable("tilt_uncertainty", AT_STANDOFF, "degree", "tilt change on the last level"),
-}
+CHANGES = _studied("_change", ("level", "quantile"), "change of the {} from the level before")
+CONVERGED = _studied("", HITS, "{}, converged")
+UNCERTAINTIES = _studied("_uncertainty", HITS, "change of the {} on the last level")
+CONVERGED_STATUS = Variable("status", HITS, "1", "how the shot ended, converged", flags=OF_SHOTS)
 
 STUDY_VARIABLES = (
-    SCHEME,
-    PATCHES_AXIAL,
-    PATCHES_AROUND,
-    GRID_SPACING,
-    TIME_STEP,
-    HITS_PER_SECOND,
-    *ERRORS.values(),
-    OTHER_STATUS,
-    *FRONTS.values(),
-    *CHANGES.values(),
-    SETTLED,
-    CONVERGED_STATUS,
-    CONVERGED_VELOCITY,
-    UNCERTAINTIES[RESIDUAL_VELOCITY],
-    CONVERGED_TILT,
-    UNCERTAINTIES[TILT],
+    *(SCHEME, PATCHES_AXIAL, PATCHES_AROUND, GRID_SPACING, TIME_STEP, HITS_PER_SECOND, OTHER_STATUS),
+    *(one for group in (ERRORS, FRONTS, CHANGES) for one in group.values()),
+    *(SETTLED, CONVERGED_STATUS, *CONVERGED.values(), *UNCERTAINTIES.values()),
 )
 
 

@@ -35,18 +35,22 @@ class Quantity(NamedTuple):
     Attributes:
         table: that of a campaign file which has it; of what layers have, that of the plate.
         type: as it is read.
+        meaning: long name of its column in a result.
         by_layer: whether each layer has its own.
         scatters: whether it may have a distribution, and so differ from shot to shot.
         listed: whether a list of hits may have it.
         drawn: whether it may be drawn from a posterior.
+        column: name of its column in a result, where it is not its own.
     """
 
     table: str
     type: Any
+    meaning: str = ""
     by_layer: bool = False
     scatters: bool = True
     listed: bool = True
     drawn: bool = False
+    column: str | None = None
 
 
 def _of_material(table: str, kind: Any) -> Quantity:
@@ -55,22 +59,34 @@ def _of_material(table: str, kind: Any) -> Quantity:
 
 
 QUANTITIES: Mapping[str, Quantity] = {
-    "hit_y": Quantity("hits", Length, scatters=False),
-    "hit_z": Quantity("hits", Length, scatters=False),
-    "velocity": Quantity("impact", PositiveSpeed),
-    "obliquity": Quantity("impact", Obliquity),
-    "azimuth": Quantity("impact", Angle),
-    "pitch": Quantity("impact", Tilt),
-    "yaw": Quantity("impact", Tilt),
-    "spin": Quantity("impact", AngularVelocity),
-    "resistance": Quantity("plate", NonNegativeStress, by_layer=True, drawn=True),
-    "shear_coefficient": Quantity("plate", NonNegativeNumber, by_layer=True, drawn=True),
-    "degradation": Quantity("plate", Annotated[Number, Field(ge=0, le=1)], by_layer=True, drawn=True),
-    "thickness": Quantity("plate", PositiveLength, by_layer=True),
-    "mass": Quantity("core", PositiveMass),
-    "strength": Quantity("core", PositiveStress),
-    "offset_y": Quantity("layer", Length, by_layer=True, listed=False),
-    "offset_z": Quantity("layer", Length, by_layer=True, listed=False),
+    "hit_y": Quantity("hits", Length, "hit point on the front face, y", scatters=False),
+    "hit_z": Quantity("hits", Length, "hit point on the front face, z", scatters=False),
+    "velocity": Quantity("impact", PositiveSpeed, "impact velocity", column="impact_velocity"),
+    "obliquity": Quantity("impact", Obliquity, "angle between line of fire and plate normal"),
+    "azimuth": Quantity("impact", Angle, "direction of the obliquity, from +y towards +z"),
+    "pitch": Quantity(
+        "impact", Tilt, "pitch of the core on impact, relative to the line of fire", column="impact_pitch"
+    ),
+    "yaw": Quantity("impact", Tilt, "yaw of the core on impact, relative to the line of fire", column="impact_yaw"),
+    "spin": Quantity("impact", AngularVelocity, "spin of the core about its axis on impact"),
+    "resistance": Quantity("plate", NonNegativeStress, "resistance", by_layer=True, drawn=True),
+    "shear_coefficient": Quantity("plate", NonNegativeNumber, "friction per normal stress", by_layer=True, drawn=True),
+    "degradation": Quantity(
+        "plate",
+        Annotated[Number, Field(ge=0, le=1)],
+        "share that an interval of contact leaves of the resistance",
+        by_layer=True,
+        drawn=True,
+    ),
+    "thickness": Quantity("plate", PositiveLength, "thickness", by_layer=True),
+    "mass": Quantity("core", PositiveMass, "mass of the core"),
+    "strength": Quantity("core", PositiveStress, "strength of the core, a nominal bending stress"),
+    "offset_y": Quantity(
+        "layer", Length, "place of its origin in the plane of the plate, y", by_layer=True, listed=False
+    ),
+    "offset_z": Quantity(
+        "layer", Length, "place of its origin in the plane of the plate, z", by_layer=True, listed=False
+    ),
     "degradation_interval": _of_material("plate", PositiveTime),
     "degradation_distance": _of_material("plate", PositiveLength),
     "degradation_length": _of_material("plate", PositiveLength),

@@ -29,7 +29,7 @@ OF_A_BURST = ("sample", "burst_order", "nearest_earlier_hit")
 """Columns of shots that share their plates."""
 
 
-EXPORTED = {"impact_velocity": "velocity", "impact_pitch": "pitch", "impact_yaw": "yaw"}
+EXPORTED = {one.column: name for name, one in QUANTITIES.items() if one.column is not None}
 """Names of columns in an exported result, and those of a list of hits."""
 
 

@@ -65,7 +65,6 @@ LADDER_LEVELS = (0, 2, 4, 6)
 NODAL_STEPS = (1.0e-6, 0.5e-6)
 """Time steps of the paper's literal scheme [s]."""
 
-QUANTITIES = (v.RESIDUAL_VELOCITY, v.TILT)
 QUANTILES = (0.5, 0.9, 1.0)
 QUOTED = 0.9
 MEASURED_TIME = 1.0
@@ -92,15 +91,13 @@ class Converged:
     Attributes:
         answer: the answer of the finest level.
         settled: whether the status is the same in all runs of all levels, shape [hits].
-        residual_velocity_changes: changes from the answer of the level before [m/s], shape [levels, hits]; NaN on the
-            first level and for hits that are not settled.
-        tilt_changes: the same for tilt [rad], shape [levels, hits, stand-offs].
+        changes: of each quantity from the answer of the level before, SI and radians, shape [levels, hits] or [levels,
+            hits, stand-offs]; NaN on the first level and for hits that are not settled.
     """
 
     answer: Answer
     settled: NDArray[np.bool_]
-    residual_velocity_changes: Array
-    tilt_changes: Array
+    changes: dict[str, Array]
 
 
 def study(
@@ -152,7 +149,7 @@ def study(
         v.HITS_PER_SECOND: rates,
     }
     quoted = QUANTILES.index(QUOTED)
-    for name in QUANTITIES:
+    for name in v.STUDIED:
         errors = values[v.ERRORS[name]][:, quoted].reshape(len(rates), -1)[:, -1]  # at the last stand-off
         values[v.FRONTS[name]] = front(rates, errors).astype(np.int8)
     return study_dataset(
@@ -225,17 +222,12 @@ def converged(runs: Sequence[tuple[Answer, Answer]]) -> Converged:
     settled = (statuses == statuses[-1]).all(axis=0)
     answers = [extrapolated(*pair) for pair in runs]
 
-    def changes(values: list[Array]) -> Array:
-        moved = np.abs(np.diff(values, axis=0, prepend=np.nan))
+    def changes(name: str) -> Array:
+        moved = np.abs(np.diff([getattr(answer, name) for answer in answers], axis=0, prepend=np.nan))
         moved[:, ~settled] = np.nan
         return moved
 
-    return Converged(
-        answers[-1],
-        settled,
-        changes([answer.residual_velocity for answer in answers]),
-        changes([answer.tilt for answer in answers]),
-    )
+    return Converged(answers[-1], settled, {name: changes(name) for name in v.STUDIED})
 
 
 def front(rates: Array, errors: Array) -> NDArray[np.bool_]:
@@ -327,22 +319,19 @@ def _error_values(answers: Sequence[Answer], truth: Converged) -> dict[str, Any]
 
     values: dict[str, Any] = {
         v.ERRORS[name]: np.stack([_quantiles(errors(name, index)) for index in range(len(answers))])
-        for name in QUANTITIES
+        for name in v.STUDIED
     }
     return values | {v.OTHER_STATUS: (truth.settled & ~same).sum(axis=1)}
 
 
 def _converged_values(truth: Converged) -> dict[str, Any]:
-    return {
-        v.SETTLED: truth.settled.astype(np.int8),
-        v.CONVERGED_STATUS: truth.answer.status,
-        v.CONVERGED_VELOCITY: truth.answer.residual_velocity,
-        v.CONVERGED_TILT: truth.answer.tilt,
-        v.UNCERTAINTIES[v.RESIDUAL_VELOCITY]: truth.residual_velocity_changes[-1],
-        v.UNCERTAINTIES[v.TILT]: truth.tilt_changes[-1],
-        v.CHANGES[v.RESIDUAL_VELOCITY]: np.stack([_quantiles(change) for change in truth.residual_velocity_changes]),
-        v.CHANGES[v.TILT]: np.stack([_quantiles(change) for change in truth.tilt_changes]),
-    }
+    values: dict[str, Any] = {v.SETTLED: truth.settled.astype(np.int8), v.CONVERGED_STATUS: truth.answer.status}
+    for name in v.STUDIED:
+        changes = truth.changes[name]
+        values[v.CONVERGED[name]] = getattr(truth.answer, name)
+        values[v.UNCERTAINTIES[name]] = changes[-1]
+        values[v.CHANGES[name]] = np.stack([_quantiles(change) for change in changes])
+    return values
 
 
 def _quantiles(errors: Array) -> Array:

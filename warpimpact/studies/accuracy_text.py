@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray
 
 from warpimpact.results import variables as v
-from warpimpact.studies.accuracy import QUANTITIES, QUOTED
+from warpimpact.studies.accuracy import QUOTED
 
 
 def advantage(dataset: xarray.Dataset, literal: str) -> tuple[str, float] | None:
@@ -19,7 +19,7 @@ def advantage(dataset: xarray.Dataset, literal: str) -> tuple[str, float] | None
     quoted = dataset.sel(quantile=QUOTED).isel(standoff=-1)
     rival = quoted.sel(setting=literal)
     no_worse = quoted[v.SCHEME] == "consistent"
-    for name in QUANTITIES:
+    for name in v.STUDIED:
         no_worse &= quoted[v.ERRORS[name]] <= rival[v.ERRORS[name]]
     if not no_worse.any():
         return None
@@ -63,7 +63,7 @@ def _heads() -> str:
 
 def _row(setting: xarray.Dataset, width: int) -> str:
     cells = f"{setting[v.SETTING].item():{width}}{setting[v.HITS_PER_SECOND].item():10.4g}"
-    for name in QUANTITIES:
+    for name in v.STUDIED:
         cells += "  " + "".join(f"{value:8.3f}" for value in setting[v.ERRORS[name]].values)
         cells += " *" if setting[v.FRONTS[name]] else "  "
     return cells + f"{setting[v.OTHER_STATUS].item():8d}"

@@ -81,8 +81,8 @@ def test_changes_are_those_of_the_extrapolated_answers_from_level_to_level() -> 
     levels = [(answer([710.0]), answer([705.0])), (answer([704.0]), answer([703.0])), (answer([702.5]),) * 2]
     found = converged(levels)
     np.testing.assert_allclose(found.answer.residual_velocity, [702.5])
-    np.testing.assert_allclose(found.residual_velocity_changes, [[np.nan], [2.0], [0.5]])
-    np.testing.assert_allclose(found.tilt_changes[-1], [[0.0]])
+    np.testing.assert_allclose(found.changes["residual_velocity"], [[np.nan], [2.0], [0.5]])
+    np.testing.assert_allclose(found.changes["tilt"][-1], [[0.0]])
 
 
 @pytest.mark.parametrize("run", range(4))
@@ -91,8 +91,8 @@ def test_a_hit_that_ends_otherwise_in_any_run_is_not_settled(run: int) -> None:
     runs[run] = answer([0.0, 700.0], status=[Status.ARRESTED, Status.PERFORATED])
     found = converged([(runs[0], runs[1]), (runs[2], runs[3])])
     assert found.settled.tolist() == [False, True]
-    assert np.isnan(found.residual_velocity_changes[:, 0]).all()
-    assert found.residual_velocity_changes[-1, 1] == 0.0
+    assert np.isnan(found.changes["residual_velocity"][:, 0]).all()
+    assert found.changes["residual_velocity"][-1, 1] == 0.0
 
 
 def test_errors_leave_out_hits_that_end_otherwise() -> None:
