@@ -39,6 +39,8 @@ class Level:
 
 
 SLENDER = 1.0 / 7.0
+DEEP = 2.0
+"""Of the degradation depth: a passage no longer than that leaves a step within the depth."""
 ALONG = 1.6
 """Way of a step in the plane of the plate, in degradation lengths and per unit of `travel`: contact that sweeps
 sideways by more than that leaves gaps in the exposure."""
@@ -132,9 +134,10 @@ class Resolution:
     patch_width: float
     """No ring is wider than this radially [m]."""
 
-    def passage(self, thickness: ArrayLike) -> Array:
+    def passage(self, thickness: ArrayLike, plate: Plate, *, weakens: bool) -> Array:
         """Way [m] on which the plate acts on a core, for some thicknesses [m], of their shape."""
-        return np.minimum(thickness, self.slender)
+        acting = np.minimum(thickness, DEEP * plate.degradation_depth) if weakens else thickness
+        return np.minimum(acting, self.slender)
 
     def longest_time(
         self, degradation: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
@@ -146,13 +149,10 @@ class Resolution:
         slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / np.maximum(static_stress, SMALLEST_STRESS)
         return np.asarray(np.minimum(weakened, slowed))
 
-    def step_at(
-        self, velocity: ArrayLike, obliquity: ArrayLike, thickness: ArrayLike, longest_time: ArrayLike
-    ) -> Array:
-        """Time steps [s] at impact velocities [m/s], obliquities [rad], thicknesses of the plate [m] and `longest_time`
-        [s], of their shape."""
-        passage = self.passage(thickness)
-        longest = self.travel * passage
+    def step_at(self, velocity: ArrayLike, obliquity: ArrayLike, passage: ArrayLike, longest_time: ArrayLike) -> Array:
+        """Time steps [s] at impact velocities [m/s], obliquities [rad], `passage` [m] and `longest_time` [s], of their
+        shape."""
+        longest = self.travel * np.asarray(passage)
         aslant = self.way_along / np.maximum(np.sin(obliquity), 1e-9)
         way = np.clip(np.minimum(aslant, np.multiply(longest_time, velocity)), 0.25 * longest, longest)
         if self.time_step is not None:
@@ -163,7 +163,8 @@ class Resolution:
         """Time step [s] of a plate that stands alone, or where it scatters, of its means."""
         stress = self.static * plate.resistance
         longest_time = self.longest_time(np.array(plate.degradation), plate, impact.velocity, self.mass, stress)
-        return float(self.step_at(impact.velocity, impact.obliquity, plate.thickness, longest_time))
+        passage = self.passage(plate.thickness, plate, weakens=plate.degradation < 1.0)
+        return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time))
 
     def step_in(self, impact: Impact, target: Target) -> float:
         """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
@@ -216,7 +217,10 @@ def conditions_of(
     """
     body = core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
-    passage = _least(resolution.passage(one.thickness) for one in materials)
+    passage = _least(
+        resolution.passage(material.thickness, layer, weakens=material.weakens)
+        for material, layer in zip(materials, target.layers, strict=True)
+    )
     times = (
         resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
         for material, layer in zip(materials, target.layers, strict=True)

@@ -94,14 +94,16 @@ def test_nodal_scheme_has_the_paper_s_own_resolution(level: int | None) -> None:
 
 
 def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
-    way = 800.0 * resolved(level=2).step_at(800.0, 0.0, np.array([1e-3, 1.0]), np.inf)
+    resolution = resolved(level=2)
+    passage = resolution.passage(np.array([1e-3, 1.0]), PLATE, weakens=False)
+    way = 800.0 * resolution.step_at(800.0, 0.0, passage, np.inf)
     standard = LADDER[2].travel
     np.testing.assert_allclose(way, [standard * 1e-3, standard * SLENDER * PAPER.length])
 
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
     resolution, velocity = resolved(level=2), 800.0
-    free = resolution.step_at(velocity, 0.0, PLATE.thickness, np.inf)
+    free = resolution.step_at(velocity, 0.0, resolution.passage(PLATE.thickness, PLATE, weakens=True), np.inf)
     for degradation, interval in ((1.0, 1e-6), (0.9, 1e-6), (0.05, 1e-6), (0.05, 1e-9), (0.0, 1e-6)):
         plate = PLATE.model_copy(update={"degradation": degradation, "degradation_interval": interval})
         step = resolution.step_of(Impact(velocity=velocity), plate)

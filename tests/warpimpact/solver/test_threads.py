@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from warpimpact import Campaign, simulate
+from warpimpact import Campaign, Numerics, simulate
 from warpimpact.solver.marching import CPU_CHUNK, March
 
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -22,7 +22,8 @@ def test_launches_begin_and_end_with_single_shots(hits: int, threads: int, monke
 
     monkeypatch.setattr(March, "_launch", recorded)
     monkeypatch.setattr("warpimpact.solver.marching.CPU_LAUNCH", 1e9)  # however slow the machine
-    simulate(campaign.scene, campaign.sampler().shots(0, hits), device="cpu", threads=threads)
+    shots = campaign.sampler().shots(0, hits)
+    simulate(campaign.scene, shots, numerics=Numerics(level=2), device="cpu", threads=threads)
     first_windows = counts[: next(k + 1 for k in range(len(counts)) if sum(counts[: k + 1]) >= hits)]
     assert sum(first_windows) == hits
     assert max(first_windows) <= max(1, min(CPU_CHUNK, hits // (2 * threads)))
