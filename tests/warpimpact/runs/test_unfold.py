@@ -14,6 +14,7 @@ from warpimpact.analysis.summary import estimated
 from warpimpact.campaign.campaign import Output
 from warpimpact.campaign.stop import Stop
 from warpimpact.cli import main
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
@@ -24,6 +25,7 @@ from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
+from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -55,14 +57,14 @@ def every_hit_computed(campaign: Campaign, unfolded: xarray.Dataset, folder: Pat
 
 @pytest.fixture
 def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many shots each call of `simulate` computed."""
+    """How many shots each computation had."""
     counts: list[int] = []
 
-    def counting(scene: Any, shots: Any, **how: Any) -> Any:
-        counts.append(len(shots))
-        return simulation.simulate(scene, shots, **how)
+    def counting(prepared: Prepared, *how: Any) -> Outcomes:
+        counts.append(len(prepared.shots))
+        return simulation.computed(prepared, *how)
 
-    monkeypatch.setattr(computing, "simulate", counting)
+    monkeypatch.setattr(computing, "computed", counting)
     return counts
 
 
