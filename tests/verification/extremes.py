@@ -35,10 +35,8 @@ from warpimpact.scene import (
     Target,
 )
 from warpimpact.scene.core import MassProperties
-from warpimpact.solver.device import find_device
 from warpimpact.solver.history import History
-from warpimpact.solver.marching import March
-from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import traced
 
 from .scenes import shots_at
 
@@ -135,11 +133,10 @@ def drawn(share: Callable[[], float], hits: int) -> Extreme:
 
 
 def found(extreme: Extreme) -> Found:
-    """Compute the shots of a scene with their histories, at draft, on one thread of the CPU."""
+    """Compute the shots of a scene with their histories, at draft, on the CPU."""
     scene, shots, precision = extreme
     numerics = Numerics(level=0, precision=precision)
-    march = March(prepare(scene, shots, numerics, traced=True), find_device("cpu"), threads=1)
-    contact = march.march()
+    march, contact = traced(scene, shots, numerics)
     report, traces = Outcomes.collected(scene, shots, march.report(contact)), march.traces(contact)
     statuses = [Status(int(code)) for code in report.status]
     properties = scene.core.mass_properties

@@ -99,6 +99,14 @@ class Plate(Model):
         half_y, half_z = (0.5 * side for side in self.size or (np.inf, np.inf))
         return (np.abs(y) <= half_y) & (np.abs(z) <= half_z) & ~self.pattern.is_hole(y, z)
 
+    def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
+        """`Pattern.has_edge`, where the rim of the plate is an edge, too."""
+        near_y, near_z = (
+            np.abs(np.abs(along) - 0.5 * side) <= reach
+            for along, side in zip((y, z), self.size or (np.inf, np.inf), strict=True)
+        )
+        return self.pattern.has_edge(y, z, reach) | near_y | near_z
+
     @property
     def sampled_cell(self) -> tuple[float, float]:
         """Extent (y, z) of the cell over which hits are spread [m]: the unit cell, or a plate that is smaller."""

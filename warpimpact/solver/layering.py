@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.solver.grid import WHOLE
+from warpimpact.solver.grid import AT_A_TIME, WHOLE
 
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
@@ -107,9 +107,11 @@ def share_left(arrays: Prepared, layer: int, exposure: NDArray[Any], cells: Sequ
     depth = depth + materials[layer].thickness[-1] * (np.arange(THROUGH) + 0.5) / THROUGH
     place = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
     below = np.floor(place).astype(int)
-    share = (place - below)[:, None, None]
-    exposed = (1.0 - share) * field[below] + share * field[np.minimum(below + 1, planes.number - 1)]
-    return np.asarray(np.exp(materials[layer].decay_rate[-1] * np.maximum(exposed, 0.0)).mean(axis=0))
+    share = np.zeros(field.shape[1:])
+    for at, low in zip(place - below, below, strict=True):
+        exposed = (1.0 - at) * field[low] + at * field[min(low + 1, planes.number - 1)]
+        share += np.exp(materials[layer].decay_rate[-1] * np.maximum(exposed, 0.0))
+    return share / THROUGH
 
 
 def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:
@@ -119,12 +121,17 @@ def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float)
 
 
 def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:
-    """Share of material about every node, shape [nodes_y, nodes_z]."""
+    """Share of material about every node, shape [nodes_y, nodes_z]; points are taken where an edge may be."""
     samples = 16
-    fine = (np.arange(samples) + 0.5) / samples - 0.5
-    along_y, along_z = ((nodes[:, None] + spacing * fine).reshape(-1) for nodes in (y, z))
-    solid = plate.is_solid(along_y[:, None], along_z[None, :])
-    return np.asarray(solid.reshape((len(y), samples, len(z), samples)).mean(axis=(1, 3)))
+    fine = ((np.arange(samples) + 0.5) / samples - 0.5) * spacing
+    share, rows = np.empty((len(y), len(z))), max(1, AT_A_TIME // len(z))
+    for first in range(0, len(y), rows):
+        along_y = y[first : first + rows, None]
+        share[first : first + rows] = plate.is_solid(along_y, z)
+        row, column = np.nonzero(plate.has_edge(along_y, z, spacing))
+        points = along_y[row, :, None] + fine[:, None], z[column, None, None] + fine
+        share[first + row, column] = plate.is_solid(*points).mean(axis=(1, 2))
+    return share
 
 
 class Passages:

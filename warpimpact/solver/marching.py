@@ -200,6 +200,10 @@ class March:
             cells_y, cells_z = cells_y // 2, cells_z // 2
         return cells_y, cells_z
 
+    def cells_in_all(self) -> int:
+        """Cells of the windows of all layers."""
+        return sum(math.prod(cells) for cells in self._windows(*self.cells))
+
     def _windows(self, cells_y: int, cells_z: int) -> list[tuple[int, int]]:
         """Cells of the windows of all layers, if the plate's has this many."""
         own = [(cells_y, cells_z)] + [

@@ -13,7 +13,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions as asked
 from warpimpact.solver.grid import Grid, block_window, first_window, grids_of
 from warpimpact.solver.materials import Materials, materials_of
-from warpimpact.solver.resolution import Resolution, conditions_of, most_steps, resolve
+from warpimpact.solver.resolution import Resolution, conditions_of, resolve
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ class Prepared:
     materials: list[Materials]
     conditions: dict[str, Array]
     cells: int
-    rows: int
+    rows: int = 0
 
     @property
     def grid(self) -> Grid:
@@ -59,12 +59,11 @@ class Prepared:
         return self.grids[0]
 
 
-def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = False) -> Prepared:
+def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     """Make every choice for some shots.
 
     Args:
         numerics: those of a resolution; for an accuracy a pilot finds it first.
-        traced: leave room for the history of every shot.
 
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
@@ -123,5 +122,4 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics, *, traced: bool = Fa
         materials=materials,
         conditions=conditions,
         cells=cells,
-        rows=most_steps(conditions, resolution) + 2 if traced else 0,  # the end, and a step that rounding may add
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -241,10 +241,3 @@ def conditions_of(
 
 def _least(values: Iterable[Array]) -> Array:
     return np.asarray(reduce(np.minimum, values))
-
-
-def most_steps(conditions: Mapping[str, Array], resolution: Resolution) -> int:
-    """Steps after which any of the shots is given up."""
-    names = ("velocity", "obliquity", "longest_step", "longest_time")
-    step = resolution.step_at(*(conditions[name] for name in names))
-    return math.ceil(float((conditions["longest_way"] / (conditions["velocity"] * step)).max()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpimpact.kernels import free_flight, march
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.device import find_device, load
+from warpimpact.solver.device import find_device, free_memory, load
 from warpimpact.solver.history import History
 from warpimpact.solver.layering import Weakened
 from warpimpact.solver.marching import March, Progress
@@ -22,6 +22,11 @@ from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 Array = NDArray[np.float64]
+
+HISTORY_BYTES = 1000
+"""That a step of a history takes until it is written [bytes]: its trace, and twice the columns of its Dataset."""
+SNAPSHOT_COPIES, OTHER_COPIES = 3, 8
+"""Numbers for every cell that each snapshot takes until it is written, and that computing any takes."""
 
 
 @dataclass(frozen=True)
@@ -123,8 +128,8 @@ def _outcomes(march: March, contact: Any) -> Outcomes:
 
 def trace(scene: Scene, shots: Shots, *, numerics: Numerics) -> list[Array]:
     """Histories of shots on the CPU: one array [steps + 1, WIDTH] per shot (kernels/trace.py)."""
-    march = _traced(scene, shots, numerics)
-    return march.traces(march.march())
+    march, contact = traced(scene, shots, numerics)
+    return march.traces(contact)
 
 
 def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6) -> Replay:
@@ -136,9 +141,11 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
         numerics: the resolution with which `simulate` computed it.
         snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. Each computes
             the shot again up to there; 0 computes no field of any layer.
+
+    Raises:
+        MemoryError: history and snapshots do not fit; the message is for the user.
     """
-    march = _traced(scene, shots, numerics)
-    contact = march.march()
+    march, contact = traced(scene, shots, numerics, snapshots)
     trace, outcomes = march.traces(contact)[-1], _outcomes(march, contact)
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
@@ -167,5 +174,24 @@ def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
     return last._replace(share=np.stack([share(one.get(number)) for one in left]))
 
 
-def _traced(scene: Scene, shots: Shots, numerics: Numerics) -> March:
-    return March(prepare(scene, shots, numerics, traced=True), find_device("cpu"))
+def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[March, Any]:
+    """March shots on the CPU with their histories; returns what marched, and the outcomes on the device.
+
+    They march twice: the most steps that a shot may take are thousands of times those that it takes.
+
+    Raises:
+        MemoryError: the histories, and so many snapshots, do not fit.
+    """
+    prepared = prepare(scene, shots, numerics)
+    first = March(prepared, find_device("cpu"))
+    steps = int(first.march().steps.numpy().max())
+    cells = first.cells_in_all()
+    of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
+    needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells
+    if needed > (free := free_memory()):
+        raise MemoryError(
+            f"the history of {steps} steps with {snapshots} snapshots of {cells} cells needs {needed / 2**30:.3g} GiB, "
+            f"and {free / 2**30:.3g} GiB are free"
+        )
+    march = March(replace(prepared, rows=steps + 1), find_device("cpu"))
+    return march, march.march()

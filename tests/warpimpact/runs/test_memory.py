@@ -13,7 +13,9 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.runs.run import run_to_file
+from warpimpact.scene import Numerics
 from warpimpact.solver import device, marching, simulate
+from warpimpact.solver.layering import material_about
 from warpimpact.solver.prepare import Prepared
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -103,3 +105,29 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
     assert granted >= 5  # 4 slots fail at the second, 2 at the second, 1 does not; wider windows come after these
     assert np.array_equal(plenty.residual_velocity, little.residual_velocity)
     assert np.array_equal(plenty.tilt, little.tilt)
+
+
+def test_a_replay_that_does_not_fit_is_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    shots, numerics = campaign.sampler().shots(0, 1), Numerics(level=0)
+    march, contact = simulate.traced(campaign.scene, shots, numerics)
+    assert march.arrays.rows == contact.steps.numpy().max() + 1  # a shot may take thousands of times as many
+    monkeypatch.setattr(simulate, "free_memory", lambda: 2**16)
+    with pytest.raises(MemoryError, match=r"history of \d+ steps with 6 snapshots of \d+ cells needs .* GiB are free"):
+        simulate.replay(campaign.scene, shots, numerics=numerics)
+
+
+@pytest.mark.parametrize("size", [None, (10e-3, 10e-3)])
+def test_the_material_of_a_window_takes_no_points_inside(campaign: Campaign, size: tuple[float, float] | None) -> None:
+    plate, spacing = campaign.plate.model_copy(update={"size": size}), 50e-6
+    y, z = (spacing * (np.arange(300) - at) for at in (133, 171))
+    fine = ((np.arange(16) + 0.5) / 16 - 0.5) * spacing
+    tracemalloc.start()
+    try:
+        share = material_about(plate, y, z, spacing)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    some = slice(0, 300, 23), slice(0, 300, 29)
+    points = y[some[0], None, None, None] + fine[:, None], z[some[1], None, None] + fine
+    np.testing.assert_array_equal(share[some], plate.is_solid(*points).mean(axis=(2, 3)))
+    assert peak < 20e6  # all points are 23 MB in one byte each
