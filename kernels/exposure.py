@@ -4,6 +4,8 @@ degradation length in the plane of the plate, by the tent filter, and over the d
 A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth. Where shots
 have thicknesses of their own, a window of several planes serves both: a shot at a plate that is no thicker than the
 depth uses the first.
+
+Long because all that is spread goes over the same strips of a window.
 """
 
 from functools import cache
@@ -14,12 +16,15 @@ import warp as wp
 from . import lanes, memory, plate_grid
 from .variant import Variant
 
+LANES = 16
+"""Nodes that a CPU's vector holds: the columns of a strip are whole vectors."""
+
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the exposure for one variant."""
     real = variant.real
-    half = real(0.5)
+    half, one = real(0.5), real(1.0)
     read, write, part_of = memory.build(real).read, memory.build(real).write, memory.build(real).part_of
     use, split = variant.use(lanes, plate_grid), lanes.split(variant)
     Plate, Window, Box = use.plate_grid.Plate, use.plate_grid.Window, use.plate_grid.Box
@@ -85,9 +90,17 @@ def build(variant: Variant) -> SimpleNamespace:
 
     scatter = scatter_plain if variant.double else scatter_single
 
+    def by_rows(loop: str) -> str:
+        """Native code that does a loop over j < count in some rows of a field, `stride` apart, from node `start` on.
+        Whole rows are one loop."""
+        return split(
+            "if (count == stride) { count *= rows; rows = 1; }\n"
+            "for (int row = 0; row < rows; ++row) {" + loop + "start += stride; }"
+        )
+
     # Native, because a compiler vectorises these loops only if the pointers do not alias.
     @wp.func_native(
-        split("""
+        by_rows("""
     assert(start - step >= 0 && start + count + step <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ from = source.data + start;
@@ -100,16 +113,18 @@ def build(variant: Variant) -> SimpleNamespace:
         target: wp.array(dtype=real),
         source: wp.array(dtype=real),
         start: wp.int32,
+        rows: wp.int32,
         count: wp.int32,
+        stride: wp.int32,
         step: wp.int32,
         middle: real,
         side: real,
     ):
-        """target[j] = middle × source[j] + side × (source[j − step] + source[j + step]), start ≤ j < start + count."""
+        """target[j] = middle × source[j] + side × (source[j − step] + source[j + step]) in a strip."""
         ...
 
     @wp.func_native(
-        split("""
+        by_rows("""
     assert(start - step >= 0 && start + count + step <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ before = source.data + start - step;
@@ -121,15 +136,17 @@ def build(variant: Variant) -> SimpleNamespace:
         target: wp.array(dtype=real),
         source: wp.array(dtype=real),
         start: wp.int32,
+        rows: wp.int32,
         count: wp.int32,
+        stride: wp.int32,
         step: wp.int32,
         side: real,
     ):
-        """target[j] += side × (source[j − step] + source[j + step]) for start ≤ j < start + count."""
+        """target[j] += side × (source[j − step] + source[j + step]) in a strip."""
         ...
 
     @wp.func_native(
-        split("""
+        by_rows("""
     assert(start >= 0 && start + count <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ from = source.data + start;
@@ -137,13 +154,19 @@ def build(variant: Variant) -> SimpleNamespace:
     """)
     )
     def add_scaled(
-        target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        start: wp.int32,
+        rows: wp.int32,
+        count: wp.int32,
+        stride: wp.int32,
+        factor: real,
     ):
-        """target[j] += factor × source[j] for start ≤ j < start + count; target and source are different arrays."""
+        """target[j] += factor × source[j] in a strip; target and source are different arrays."""
         ...
 
     @wp.func_native(
-        split("""
+        by_rows("""
     assert(start >= 0 && start + count <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     auto* __restrict__ from = source.data + start;
@@ -151,20 +174,31 @@ def build(variant: Variant) -> SimpleNamespace:
     """)
     )
     def take_scaled(
-        target: wp.array(dtype=real), source: wp.array(dtype=real), start: wp.int32, count: wp.int32, factor: real
+        target: wp.array(dtype=real),
+        source: wp.array(dtype=real),
+        start: wp.int32,
+        rows: wp.int32,
+        count: wp.int32,
+        stride: wp.int32,
+        factor: real,
     ):
         """As `add_scaled`; then source[j] = 0."""
         ...
 
     @wp.func_native(
-        split("""
+        by_rows("""
     auto* __restrict__ into = target.data + start;
     for (int j = 0; j < count; ++j) into[j] = 0;
     """)
     )
+    def clear_strip(target: wp.array(dtype=real), start: wp.int32, rows: wp.int32, count: wp.int32, stride: wp.int32):
+        """target[j] = 0 in a strip."""
+        ...
+
+    @wp.func
     def clear(target: wp.array(dtype=real), start: wp.int32, count: wp.int32):
         """target[start + j] = 0 for j < count."""
-        ...
+        clear_strip(target, start, 1, count, count)
 
     @wp.func
     def own_fields(fields: Fields, slot: wp.int32):
@@ -188,155 +222,194 @@ def build(variant: Variant) -> SimpleNamespace:
             clear(fields.gain, window.first, window.planes * window.nodes)
         return window
 
+    @wp.struct
+    class Strip:
+        """Nodes of one plane of a window: `rows` rows of `count` nodes, `stride` apart, from node `start` on."""
+
+        start: wp.int32
+        rows: wp.int32
+        count: wp.int32
+        stride: wp.int32
+
+    @wp.func
+    def strip_of(plate: Plate, window: Window, box: Box):
+        """The nodes of a box and those that the filter reaches from there. Whole rows where that is not much more, for
+        all of them are then one loop."""
+        first = box.z_low - plate.reach
+        columns = box.z_high - box.z_low + 1 + 2 * plate.reach
+        columns = wp.static(LANES) * ((columns + wp.static(LANES - 1)) // wp.static(LANES))
+        whole = wp.static(variant.window > 0) or 4 * columns > 3 * window.cells_z
+        first = wp.where(whole, 0, wp.min(first, window.cells_z - columns))
+        columns = wp.where(whole, window.cells_z, columns)
+        strip = Strip()
+        strip.start = window.first + (box.y_low - plate.reach) * window.cells_z + first
+        strip.rows = box.y_high - box.y_low + 1 + 2 * plate.reach
+        strip.count = columns
+        strip.stride = window.cells_z
+        return strip
+
     @wp.func
     def filter_(
         target: wp.array(dtype=real),
         source: wp.array(dtype=real),
         plate: Plate,
         start: wp.int32,
-        count: wp.int32,
+        rows: wp.int32,
+        strip: Strip,
         step: wp.int32,
     ):
-        """target = the tent's taps along one direction, `step` apart, applied to source."""
-        filter_near(target, source, start, count, step, plate.taps[0], plate.taps[1])
+        """target = the tent's taps along one direction, `step` apart, applied to source in rows of a strip."""
+        count, stride = strip.count, strip.stride
+        filter_near(target, source, start, rows, count, stride, step, plate.taps[0], plate.taps[1])
         for k in range(2, plate.reach + 1):
-            filter_far(target, source, start, count, k * step, plate.taps[k])
+            filter_far(target, source, start, rows, count, stride, k * step, plate.taps[k])
 
     @wp.func
-    def filter_plane(plate: Plate, fields: Fields, start: wp.int32, count: wp.int32, stride: wp.int32):
-        """Filter the gained exposure of some rows, whose first node is `start`, one direction after the other."""
-        above = plate.reach * stride
-        filter_(fields.filtered, fields.gain, plate, start - 2 * above, count + 4 * above, 1)
+    def filter_plane(plate: Plate, fields: Fields, strip: Strip, start: wp.int32):
+        """Filter the gained exposure of a strip of the plane that begins `start` nodes later, one direction after the
+        other."""
+        above = plate.reach * strip.stride
+        start += strip.start
+        filter_(fields.filtered, fields.gain, plate, start - above, strip.rows + 2 * plate.reach, strip, 1)
         if wp.static(variant.window > 0):
             use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
-        filter_(fields.gain, fields.filtered, plate, start - above, count + 2 * above, stride)
+        filter_(fields.gain, fields.filtered, plate, start, strip.rows, strip, strip.stride)
 
     # Σ over |i − plane| < reach, and half of the planes at ± reach: the trapezoidal rule over twice the depth. From one
-    # plane to the next two planes come in by halves, and two go.
-    @wp.func_native("""
+    # plane to the next two planes come in by halves, and two go. The sums are those of a kernel with ends that three
+    # linear interpolations blur (of what is scattered, of the trapezoidal rule, and of what is gathered), each with the
+    # variance 1/6 of a spacing squared. What a quarter of the second difference takes off makes up for that: the error
+    # is of fourth order. All planes of a few nodes at a time stay in registers.
+    @wp.func_native(
+        """
     const int first = low - reach - 2 > 0 ? low - reach - 2 : 0;
     const int last = high + reach + 2 < planes ? high + reach + 2 : planes - 1;
-    assert(start + first * nodes >= 0 && start + last * nodes + count <= sum.shape[0]);
-    for (int plane = first; plane <= last; ++plane) {
-        auto* __restrict__ into = sum.data + start + plane * nodes;
-        for (int j = 0; j < count; ++j) into[j] = plane > first ? into[j - nodes] : 0;
-        const auto add = [&](int from, decltype(0 * sum.data[0]) share) {
-            if (from < low || from > high) return;
-            const auto* __restrict__ gained = gain.data + start + from * nodes;
-            for (int j = 0; j < count; ++j) into[j] += share * gained[j];
+    assert(start + first * nodes >= 0 && start + (rows - 1) * stride + last * nodes + count <= exposure.shape[0]);
+    if (count == stride) { count *= rows; rows = 1; }
+    using Real = decltype(0 * gain.data[0]);
+    const auto sum = [=](auto none, const Real* gained, Real* into, Real* kept) {
+        using Some = decltype(none);
+        const auto load = [](const Real* from) { Some x; memcpy(&x, from, sizeof(x)); return x; };
+        const auto add = [=](Some& total, int from, Real share) {
+            if (from >= low && from <= high) total += share * load(gained + from * nodes);
         };
-        if (plane == first)
-            for (int from = low; from < first + reach && from <= high; ++from) add(from, 1);
-        add(plane + reach, 0.5f);
-        if (plane > first) {
-            add(plane + reach - 1, 0.5f);
-            add(plane - reach, -0.5f);
-            add(plane - reach - 1, -0.5f);
+        Some before = none, here = none;
+        for (int plane = first; plane <= last; ++plane) {
+            Some next = here;
+            if (plane == first)
+                for (int from = low; from < first + reach && from <= high; ++from) add(next, from, 1);
+            add(next, plane + reach, 0.5f);
+            if (plane > first) {
+                add(next, plane + reach - 1, 0.5f);
+                add(next, plane - reach, -0.5f);
+                add(next, plane - reach - 1, -0.5f);
+            }
+            if (plane > first + 1) {
+                const int at = (plane - 1) * nodes;
+                const Some part = (Real)0.75f * here - (Real)0.125f * (before + next);
+                const Some whole = load(into + at) + part;
+                memcpy(kept + at, &part, sizeof(part));
+                memcpy(into + at, &whole, sizeof(whole));
+            }
+            before = here;
+            here = next;
         }
+    };
+    for (int row = 0; row < rows; ++row, start += stride) {
+        const auto* gained = gain.data + start;
+        auto *into = exposure.data + start, *kept = later.data + start;
+        int j = 0;
+    #if !defined(__CUDA_ARCH__)
+        typedef Real Vector __attribute__((vector_size(LANES * sizeof(Real))));
+        for (; j + LANES <= count; j += LANES) sum(Vector{}, gained + j, into + j, kept + j);
+    #endif
+        for (; j < count; ++j) sum((Real)0, gained + j, into + j, kept + j);
     }
-    """)
-    def sum_planes(
-        sum: wp.array(dtype=real),
+    """.replace("LANES", str(LANES))
+    )
+    def add_half_of_planes(
+        exposure: wp.array(dtype=real),
+        later: wp.array(dtype=real),
         gain: wp.array(dtype=real),
         start: wp.int32,
+        rows: wp.int32,
         count: wp.int32,
+        stride: wp.int32,
         nodes: wp.int32,
         planes: wp.int32,
         low: wp.int32,
         high: wp.int32,
         reach: wp.int32,
     ):
-        """Sum a gain over the planes up to `reach` away, of `nodes` each, for `count` nodes from `start` on in each.
-        Only the planes from `low` to `high` have gained."""
-        ...
-
-    # The sums are those of a kernel with ends that three linear interpolations blur (of what is scattered, of the
-    # trapezoidal rule, and of what is gathered), each with the variance 1/6 of a spacing squared. What a quarter of the
-    # second difference takes off makes up for that: the error is of fourth order.
-    @wp.func_native("""
-    const int first = low - reach - 1 > 1 ? low - reach - 1 : 1;
-    const int last = high + reach + 1 < planes - 1 ? high + reach + 1 : planes - 2;
-    for (int plane = first; plane <= last; ++plane) {
-        auto* __restrict__ into = exposure.data + start + plane * nodes;
-        const auto* __restrict__ from = sum.data + start + plane * nodes;
-        for (int j = 0; j < count; ++j) into[j] += 0.75f * from[j] - 0.125f * (from[j - nodes] + from[j + nodes]);
-    }
-    """)
-    def add_half_sharpened(
-        exposure: wp.array(dtype=real),
-        sum: wp.array(dtype=real),
-        start: wp.int32,
-        count: wp.int32,
-        nodes: wp.int32,
-        planes: wp.int32,
-        low: wp.int32,
-        high: wp.int32,
-        reach: wp.int32,
-    ):
-        """Add half of what `sum_planes` found to the exposure."""
+        """Add half of what a gain spreads over the planes up to `reach` away, of `nodes` each, in a strip of each, and
+        keep it in `later`. Only the planes from `low` to `high` have gained."""
         ...
 
     @wp.func
-    def add_half_through(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
-        """Add half of the sums over planes to the exposure."""
-        low, high, reach = box.plane_low, box.plane_high, plate.plane_reach
-        add_half_sharpened(
-            fields.exposure, fields.filtered, start, count, window.nodes, window.planes, low, high, reach
-        )
-
-    # In one plane, whole rows are filtered at once. Values that wrap from one row to the next are zero, because the box
-    # keeps the filter's reach away from the window's edge.
-    @wp.func
-    def spread_in_one(plate: Plate, fields: Fields, start: wp.int32, count: wp.int32, stride: wp.int32):
+    def spread_in_one(plate: Plate, fields: Fields, strip: Strip):
         """`spread` for the whole thickness at once."""
-        above = plate.reach * stride
-        filter_plane(plate, fields, start, count, stride)
-        add_scaled(fields.exposure, fields.gain, start - above, count + 2 * above, half)
+        filter_plane(plate, fields, strip, 0)
+        add_scaled(fields.exposure, fields.gain, strip.start, strip.rows, strip.count, strip.stride, half)
 
     @wp.func
-    def spread_through(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+    def spread_through(plate: Plate, fields: Fields, window: Window, box: Box, strip: Strip):
         """`spread` over several planes."""
-        low, high, above = box.plane_low, box.plane_high, plate.reach * window.cells_z
-        for plane in range(low, high + 1):
-            filter_plane(plate, fields, start + plane * window.nodes, count, window.cells_z)
-        start, count = start - above, count + 2 * above
-        sum_planes(
-            fields.filtered, fields.gain, start, count, window.nodes, window.planes, low, high, plate.plane_reach
+        for plane in range(box.plane_low, box.plane_high + 1):
+            filter_plane(plate, fields, strip, plane * window.nodes)
+        add_half_of_planes(
+            fields.exposure,
+            fields.filtered,
+            fields.gain,
+            strip.start,
+            strip.rows,
+            strip.count,
+            strip.stride,
+            window.nodes,
+            window.planes,
+            box.plane_low,
+            box.plane_high,
+            plate.plane_reach,
         )
-        add_half_through(plate, fields, window, box, start, count)
 
     @wp.func
-    def settle_through(plate: Plate, fields: Fields, window: Window, box: Box, start: wp.int32, count: wp.int32):
+    def settle_through(plate: Plate, fields: Fields, window: Window, box: Box, strip: Strip):
         """`settle` over several planes."""
-        add_half_through(plate, fields, window, box, start, count)
+        first = wp.max(box.plane_low - plate.plane_reach - 1, 1)
+        last = wp.min(box.plane_high + plate.plane_reach + 1, window.planes - 2)
+        for plane in range(first, last + 1):
+            start = strip.start + plane * window.nodes
+            add_scaled(fields.exposure, fields.filtered, start, strip.rows, strip.count, strip.stride, one)
         for plane in range(box.plane_low, box.plane_high + 1):
-            clear(fields.gain, start + plane * window.nodes, count)
+            start = strip.start + plane * window.nodes
+            clear_strip(fields.gain, start, strip.rows, strip.count, strip.stride)
 
     @wp.func
     def spread(plate: Plate, fields: Fields, window: Window, box: Box):
         """Spread the gained exposure by the tent K of the law and over the degradation depth, and add half of it to the
-        exposure. The sum is the exposure at mid-step."""
-        stride = window.cells_z
-        start, count = window.first + box.y_low * stride, (box.y_high - box.y_low + 1) * stride
+        exposure. The sum is the exposure at mid-step.
+
+        Values that wrap from one row to the next are zero, because the box keeps the filter's reach away from the
+        window's edge.
+        """
+        strip = strip_of(plate, window, box)
         if wp.static(variant.deep):
             if window.planes > 1:
-                spread_through(plate, fields, window, box, start, count)
+                spread_through(plate, fields, window, box, strip)
             else:
-                spread_in_one(plate, fields, start, count, stride)
+                spread_in_one(plate, fields, strip)
         else:
-            spread_in_one(plate, fields, start, count, stride)
+            spread_in_one(plate, fields, strip)
 
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
         """Add the other half of the gained exposure and clear it for the next step."""
-        start = window.first + (box.y_low - plate.reach) * window.cells_z
-        count = (box.y_high - box.y_low + 1 + 2 * plate.reach) * window.cells_z
+        strip = strip_of(plate, window, box)
         if wp.static(variant.deep):
             if window.planes > 1:
-                settle_through(plate, fields, window, box, start, count)
+                settle_through(plate, fields, window, box, strip)
             else:
-                take_scaled(fields.exposure, fields.gain, start, count, half)
+                take_scaled(fields.exposure, fields.gain, strip.start, strip.rows, strip.count, strip.stride, half)
         else:
-            take_scaled(fields.exposure, fields.gain, start, count, half)
+            take_scaled(fields.exposure, fields.gain, strip.start, strip.rows, strip.count, strip.stride, half)
 
     return SimpleNamespace(**locals())

@@ -22,7 +22,7 @@ from warpimpact.identification.evaluate import benches, data_of, discrepancies, 
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import Data, score
 from warpimpact.identification.reading import fit_from
-from warpimpact.statistics.importance import Sampler, Weights
+from warpimpact.statistics.importance import ImportanceSampler, Weights
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def calibrate(fit: Fit, *, data_sets: int, library: int, device: str = "auto") -
     """
     dimensions = len(fit.parameters)
     shared = [(sum(not one.is_column for one in fit.parameters), fit.sampling.shared)]
-    points = Sampler(dimensions, shared, fit.sampling.seed).propose(library)
+    points = ImportanceSampler(dimensions, shared, fit.sampling.seed).propose(library)
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(4,)))
     truth = rng.standard_normal((data_sets, dimensions))
     measured = _measured(fit, truth, device)

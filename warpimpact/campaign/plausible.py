@@ -30,8 +30,8 @@ def warn_of(campaign: Campaign) -> None:
     for sentence in implausible(_values(campaign), usual):
         warnings.warn(sentence, Implausible, stacklevel=2)
     if campaign.burst is not None and campaign.plate.degradation == 1.0 and not campaign.scatter.degradation:
-        told = "burst: the plate does not weaken (plate.degradation = 1), so earlier hits change nothing"
-        warnings.warn(told, Implausible, stacklevel=2)
+        message = "burst: the plate does not weaken (plate.degradation = 1), so earlier hits change nothing"
+        warnings.warn(message, Implausible, stacklevel=2)
 
 
 def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import Any
@@ -32,13 +32,6 @@ MOST_DRAWS = 64
 the degradation length needs a scene for each."""
 _COLUMN = 2**20
 """Of the random numbers that choose the draws; those of quantities that scatter have small ones."""
-
-
-@dataclass(frozen=True)
-class DrawnShots(Shots):
-    """Shots with the place of their parameters in the posterior, shape [shots]."""
-
-    posterior_draw: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -104,7 +97,7 @@ class Posterior:
 
     def scenes(self, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:
         """Places of the shots that share a scene, and that scene."""
-        draw = shots.posterior_draw if isinstance(shots, DrawnShots) else None
+        draw = shots.posterior_draw
         if draw is None or not self.of_scene:
             yield np.arange(len(shots)), scene
             return
@@ -130,13 +123,11 @@ class DrawnSampler(Sampler):
         self._posterior, self._plate, self._seed, self._images = posterior, plate, seed, images
 
     def shots(self, first: int, count: int) -> Shots:
-        """As those of a `Sampler`."""
         shots = super().shots(first, count)
         numbers = np.arange(first, first + len(shots)) // self._images
         chosen = self._posterior.which(self._seed, int(numbers[0]), int(np.ptp(numbers)) + 1)[numbers - numbers[0]]
         drawn = {path: column[chosen] for path, column in self._posterior.values.items()}
-        shots = shots.with_own(columns_of(drawn, self._plate))
-        return DrawnShots(**shots.columns, posterior_draw=chosen.astype(np.float64))
+        return replace(shots.with_own(columns_of(drawn, self._plate)), posterior_draw=chosen.astype(np.float64))
 
 
 def read_posterior(path: FilePath) -> Posterior:

@@ -7,22 +7,22 @@ from pydantic_core import ErrorDetails
 
 from ..scene.units import brief, quoted
 
-MOST_TOLD = 8
-"""Problems that are told of one file."""
+_MOST = 8
+"""Problems of one file that a sentence names."""
 
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
     problems = error.errors(include_url=False)
-    told = [_told(problem, data) for problem in problems[:MOST_TOLD]]
-    if (more := len(problems) - len(told)) > 0:
-        told.append(f"{more} more problem{'s' if more > 1 else ''}")
-    return "; also ".join(told)
+    described = [_described(problem, data) for problem in problems[:_MOST]]
+    if (more := len(problems) - len(described)) > 0:
+        described.append(f"{more} more problem{'s' if more > 1 else ''}")
+    return "; also ".join(described)
 
 
-def _told(problem: ErrorDetails, data: dict[str, Any]) -> str:
-    place, told = _place(problem, data), complaint(problem)
-    return f"{place}: {told}" if place else told
+def _described(problem: ErrorDetails, data: dict[str, Any]) -> str:
+    place, text = _place(problem, data), complaint(problem)
+    return f"{place}: {text}" if place else text
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:
@@ -49,11 +49,13 @@ def complaint(problem: ErrorDetails) -> str:
             return str(context["error"])
         case "union_tag_invalid":
             return f'got "{brief(str(context["tag"]))}", but it must be one of {context["expected_tags"]}'
-        case "model_type" | "model_attributes_type":
+        case "model_type" | "model_attributes_type" | "dict_type":
             return f"got {quoted(problem['input'])}, but it must be a table"
+        case "too_short":
+            return f"got {quoted(problem['input'])}, but it must have at least {context['min_length']} items"
         case "too_long":
             return f"got {quoted(problem['input'])}, but it must have at most {context['max_length']} items"
-        case "tuple_type":
+        case "tuple_type" | "list_type":
             return f"got {quoted(problem['input'])}, but it must be a list"
     allowed = problem["msg"].replace("Input should", "it must")
     return f"got {quoted(problem['input'])}, but {allowed}"

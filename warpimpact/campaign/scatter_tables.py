@@ -50,8 +50,8 @@ def _taken(table: Any, field: str, place: str, layer: int) -> Distribution | Non
     try:
         ((_, distribution),) = Scatter.model_validate({field: given}).given.items()
     except ValidationError as error:
-        told = sentence(error, {field: given}).removeprefix(field).removeprefix(f"[{layer}]")
-        raise CampaignError(f"{place}.{label}{told}") from None
+        problem = sentence(error, {field: given}).removeprefix(field).removeprefix(f"[{layer}]")
+        raise CampaignError(f"{place}.{label}{problem}") from None
     median = quantity(known.type).as_read(float(distribution.quantile(np.array(0.5))))
     table[key] = median if at is None else [median if k == at else old for k, old in enumerate(value or ())]
     return distribution

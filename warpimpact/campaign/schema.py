@@ -145,8 +145,8 @@ def _take_distributions(schema: Schema) -> None:
 def _let_scatter(properties: Schema, name: str) -> None:
     """A distribution may take the place of this value."""
     value = properties[name]
-    told = {key: value.pop(key) for key in ("description", "default") if key in value}
-    properties[name] = told | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
+    beside = {key: value.pop(key) for key in ("description", "default") if key in value}
+    properties[name] = beside | {"anyOf": [value, {"$ref": "#/$defs/Distribution"}]}
 
 
 def _referred(schema: Schema, part: Schema) -> list[Schema]:
@@ -170,10 +170,10 @@ def _take_plates(schema: Schema) -> None:
         "required": ["name", *one["required"]],
     }
     several = {"type": "array", "items": {"$ref": "#/$defs/NamedPlate"}, "minItems": 2}
-    told = schema["properties"]["plate"]
+    plate = schema["properties"]["plate"]
     schema["properties"]["plate"] = {
-        "description": told.pop("description"),
+        "description": plate.pop("description"),
         "if": {"type": "array"},  # not anyOf: a slip in one of many keys would make an editor mark the whole table
         "then": several,
-        "else": told,
+        "else": plate,
     }

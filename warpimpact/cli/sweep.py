@@ -57,6 +57,6 @@ def _sweep(arguments: argparse.Namespace) -> None:
             progress=named,
             tell=warn,
         )
-    sweep_figure(files.read_sweep(output)).savefig(picture, dpi=150)
+    sweep_figure(files.read_sweep_result(output)).savefig(picture, dpi=150)
     for written in (output, folder_of(output), picture):
         print(written)

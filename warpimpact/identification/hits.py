@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.parameters import FitError, is_distribution, read_distribution
+from warpimpact.identification.parameters import is_distribution, read_distribution
 from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmetries_used
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Array
@@ -84,28 +84,32 @@ class Place:
         return along(self.y, share_y), along(self.z, share_z)
 
 
-def read_hit(given: Any, place: str) -> str | Place:
-    """A class, or the place of a hit."""
+def read_hit(given: Any) -> str | Place:
+    """A class, or the place of a hit.
+
+    Raises:
+        ValueError: says what is allowed.
+    """
     if isinstance(given, str):
         if given not in CLASSES:
             meant = get_close_matches(given, CLASSES, n=1)
             hint = f'; did you mean "{meant[0]}"?' if meant else ""
             allowed = ", ".join(f'"{one}"' for one in CLASSES)
-            raise FitError(f"{place}: got {quoted(given)}, but it must be {allowed}, or a table with y and z{hint}")
+            raise ValueError(f"got {quoted(given)}, but it must be {allowed}, or a table with y and z{hint}")
         return given
     if not isinstance(given, dict) or set(given) != {"y", "z"}:
-        raise FitError(f"{place}: got {quoted(given)}, but it must be the name of a class, or a table with y and z")
+        raise ValueError(f"got {quoted(given)}, but it must be the name of a class, or a table with y and z")
+    return Place(**{axis: _coordinate(value, axis) for axis, value in given.items()})
+
+
+def _coordinate(value: Any, axis: str) -> float | Distribution:
     read = quantity(Length)
-    values: dict[str, float | Distribution] = {}
-    for axis, value in given.items():
-        if is_distribution(value):
-            values[axis] = read_distribution(read, value, f"{place}.{axis}")
-            continue
-        try:
-            values[axis] = float(read(value))
-        except ValueError as error:
-            raise FitError(f"{place}.{axis}: {error}") from None
-    return Place(**values)
+    if is_distribution(value):
+        return read_distribution(read, value, axis)
+    try:
+        return float(read(value))
+    except ValueError as error:
+        raise ValueError(f"{axis}: {error}") from None
 
 
 @dataclass(frozen=True)

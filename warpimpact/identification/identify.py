@@ -20,7 +20,7 @@ from warpimpact.results.files import OutputError
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.run import Interrupted
 from warpimpact.runs.shards import claimed
-from warpimpact.statistics.importance import LARGEST_K, Sampler
+from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def identify_to_file(
 def sample(fit: Fit, *, device: str = "auto", store: Store | None = None, progress: Follow | None = None) -> Sampled:
     """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn."""
     plan, follow = fit.sampling, progress or (lambda now: None)
-    sampler = Sampler(len(fit.parameters), shared(fit), plan.seed)
+    sampler = ImportanceSampler(len(fit.parameters), shared(fit), plan.seed)
     work = _Work(fit, device, store, follow)
     for count in rounds(plan):
         points = sampler.propose(count)
@@ -198,7 +198,7 @@ def _check_reach(fit: Fit, scores: list[Score]) -> None:
             (abs(float(one.miss(score.best[nearest, place]))) / np.hypot(one.std, largest[one.kind]), one, place)
             for place, one in enumerate(shot.observations)
         ]
-        worst, one, place = max(missed, key=lambda told: told[0])
+        worst, one, place = max(missed, key=lambda miss: miss[0])
         if worst > FARTHEST:
             raise FitError(
                 f'the priors exclude shot "{shot.name}": the nearest of {sets} sets of parameters has {one.label} = '

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Annotated, Any, get_args, get_origin
+from typing import Any, get_args, get_origin
 
 import numpy as np
-from pydantic import BeforeValidator, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from warpimpact.campaign.problems import complaint
 from warpimpact.campaign.text import CampaignError
@@ -16,7 +16,7 @@ from warpimpact.scene import AnyCore, Interaction, Plate
 from warpimpact.scene.distributions import EDGE, AnyDistribution, Distribution
 from warpimpact.scene.model import Array, Model
 from warpimpact.scene.scatter import in_si
-from warpimpact.scene.units import quoted
+from warpimpact.scene.units import quoted, reader_in, typed
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path
 
 TABLES: dict[str, Any] = {"plate": Plate, "interaction": Interaction, "core": AnyCore}
@@ -94,10 +94,10 @@ def read_distribution(read: Any, given: Mapping[str, Any], place: str) -> Distri
     try:
         return _DISTRIBUTION.validate_python(in_si(read, given))
     except ValidationError as error:
-        told = error.errors(include_url=False)[0]
-        where = ".".join(str(part) for part in told["loc"] if part != given.get("distribution"))
-        said = complaint(told)
-        said = f"got {quoted(dict(given))}, but: {said}" if told["type"] == "value_error" else said
+        problem = error.errors(include_url=False)[0]
+        where = ".".join(str(part) for part in problem["loc"] if part != given.get("distribution"))
+        said = complaint(problem)
+        said = f"got {quoted(dict(given))}, but: {said}" if problem["type"] == "value_error" else said
         raise FitError(f"{place}{'.' if where else ''}{where}: {said}") from None
     except ValueError as error:
         raise FitError(f"{place}.{error}") from None
@@ -151,10 +151,9 @@ def _reader(path: Path, tables: Mapping[str, Any], place: str) -> Any:
             meant = get_close_matches(part, fields, n=1)
             hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(fields)}"
             raise FitError(f'{place}: got the unknown key "{part}"; {hint}')
-        field = fields[part]
-        annotation = Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
+        annotation = typed(fields[part])
         node = node.get(part, {}) if isinstance(node, Mapping) else {}
-    found = _quantity(annotation)
+    found = reader_in(annotation)
     if found is None:
         raise FitError(f"{place}: is no number, but only a number can have a prior")
     return found
@@ -183,16 +182,6 @@ def _element(annotation: Any, index: int) -> Any:
             return inner[0]
         return inner[index] if index < len(inner) else None
     return next((found for one in get_args(annotation) if (found := _element(one, index)) is not None), None)
-
-
-def _quantity(annotation: Any) -> Any:
-    """The reader in a type such as `PositiveLength | None`."""
-    for mark in getattr(annotation, "__metadata__", ()):
-        if isinstance(mark, BeforeValidator) and hasattr(mark.func, "unit"):
-            return mark.func
-    if get_origin(annotation) is tuple:
-        return None
-    return next((found for one in get_args(annotation) if (found := _quantity(one)) is not None), None)
 
 
 def with_medians(table: Any, prior: Any, parameters: Sequence[Parameter], path: Path = ()) -> Any:

@@ -334,7 +334,7 @@ def together(tree: xarray.DataTree) -> list[tuple[str, str, float]]:
     found = [
         (one, other, spearmanr(posterior[one].values.ravel(), posterior[other].values.ravel())) for one, other in pairs
     ]
-    return [(one, other, float(told.statistic)) for one, other, told in found if abs(told.statistic) > STRONG]
+    return [(one, other, float(rank.statistic)) for one, other, rank in found if abs(rank.statistic) > STRONG]
 
 
 def parameters_of(tree: xarray.DataTree) -> Sequence[str]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path as FilePath
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import ValidationError
+from pydantic import BeforeValidator, Field, ValidationError
 
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import parsed, read_text
@@ -26,16 +26,14 @@ from warpimpact.identification.parameters import (
 from warpimpact.results.measures import Measure, place_of_standoff
 from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
 from warpimpact.scene import exclusions as asked
-from warpimpact.scene.distributions import Distribution
+from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import Angle, Speed, Title, quantity, quoted
 from warpimpact.solver.columns import Path
 from warpimpact.solver.limit import check_arrests
 
-_TABLES = ("core", "plate", "interaction")
-_KEYS = ("title", *_TABLES, "record", "numerics", "prior", "discrepancy", "selection", "sampling", "shot")
-_SHOT_KEYS = ("name", "hit", "impact", "measured", *_TABLES)
+_Table = dict[str, Any]
 _MOST_SHOTS = 256
 DISCREPANCY = {
     "velocity": (Speed, {"distribution": "truncated_normal", "mean": 0, "std": 10, "low": 0, "high": 50}),
@@ -58,71 +56,84 @@ def read_fit(path: str | FilePath) -> Fit:
     return fit_from(read_text(path), str(path), path.parent)
 
 
+def _at_a_level(numerics: Any) -> Any:
+    """Numerics of level 0 unless they name another; they may not ask for an accuracy."""
+    if not isinstance(numerics, dict):
+        return numerics
+    if named := next((key for key in ("fidelity", "accuracy") if key in numerics), None):
+        raise ValueError(f"got {named}, but a fit has no pilot; give level = 0 to 9, or single settings")
+    return {"level": 0} | numerics
+
+
+class _WithScene(Model):
+    """Tables of a scene, which are read when their priors are known."""
+
+    core: _Table = Field(default_factory=dict)
+    plate: _Table = Field(default_factory=dict)
+    interaction: _Table = Field(default_factory=dict)
+
+    @property
+    def tables(self) -> dict[str, _Table]:
+        return {"core": self.core, "plate": self.plate, "interaction": self.interaction}
+
+
+class _ShotTable(_WithScene):
+    """A table [[shot]] of a fit file; `measured` is read with the stand-offs of the record."""
+
+    name: str = ""
+    hit: Annotated[Any, BeforeValidator(read_hit)] = "unknown"
+    impact: _Table = Field(default_factory=dict)
+    measured: Any = None
+
+
+class _DiscrepancyTable(Model):
+    """A scale for each kind of discrepancy, a number or a prior; None is the usual prior."""
+
+    velocity: Any = None
+    angle: Any = None
+
+
+class _FitFile(_WithScene):
+    """A fit file."""
+
+    title: Title = ""
+    record: Record = Record()
+    numerics: Annotated[Numerics, BeforeValidator(_at_a_level)] = Numerics(level=0)
+    prior: Annotated[_Table, Field(min_length=1)]
+    discrepancy: _DiscrepancyTable = _DiscrepancyTable()
+    selection: tuple[Any, ...] = ()
+    sampling: Sampling = Sampling()
+    shot: Annotated[tuple[_ShotTable, ...], Field(min_length=1, max_length=_MOST_SHOTS)]
+
+
 def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     """Read a fit from its text; `name` is what errors call it."""
-    data = parsed(text, name)
-    _known(data, _KEYS, name)
-    given, prior = data.get("shot"), data.get("prior", {})
-    if not isinstance(given, list) or not given:
-        raise FitError(f"{name}: shot: is missing, but a fit needs a table [[shot]] per measured shot")
-    if len(given) > _MOST_SHOTS:
-        raise FitError(f"{name}: shot: got {len(given)} shots, but a fit takes at most {_MOST_SHOTS}")
-    if not isinstance(prior, dict) or not prior:
-        raise FitError(f"{name}: prior: is missing, but a fit needs a prior of what it is to find")
-    tables = {table: _table(data, table, name) for table in _TABLES}
-    parameters = read_priors(prior, tables, name)
-    tables = with_medians(tables, prior, parameters)
-    record = _model(Record, data.get("record", {}), f"{name}: record")
-    settings = _table(data, "numerics", name)
-    if named := next((key for key in ("fidelity", "accuracy") if key in settings), None):
-        raise FitError(f"{name}: numerics.{named}: a fit has no pilot; give level = 0 to 9, or single settings")
-    numerics = _model(Numerics, {"level": 0} | settings, f"{name}: numerics")
-    shots = tuple(_shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given))
-    selection = tuple(_condition(one, record, f"{name}: selection") for one in _selection(data, name))
+    given: _FitFile = _model(_FitFile, parsed(text, name), name)
+    parameters, record = read_priors(given.prior, given.tables, name), given.record
+    tables = with_medians(given.tables, given.prior, parameters)
+    shots = tuple(
+        _shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given.shot)
+    )
+    selection = tuple(_condition(one, record, f"{name}: selection") for one in given.selection)
     if any(one.variable == "bending_stress" for one in selection):
         record = record.model_copy(update={"bending": True})
     kinds = {one.kind for shot in shots for one in shot.observations}
-    scales, fixed = _discrepancy(_table(data, "discrepancy", name), kinds, name)
+    scales, fixed = _discrepancy(given.discrepancy, kinds, name)
     fit = Fit(
-        title=_model(_Titled, {"title": data.get("title", "")}, name).title,
+        title=given.title,
         text=text,
         folder=folder,
         parameters=tuple(sorted((*parameters, *scales), key=lambda one: one.is_column)),
         discrepancy=fixed,
         selection=selection,
         record=record,
-        numerics=numerics,
-        sampling=_model(Sampling, data.get("sampling", {}), f"{name}: sampling"),
+        numerics=given.numerics,
+        sampling=given.sampling,
         shots=shots,
         warnings=tuple(_doubts(shots, parameters)),
     )
     _check_scenes(fit, name)
     return fit
-
-
-class _Titled(Model):
-    title: Title
-
-
-def _known(table: Mapping[str, Any], allowed: tuple[str, ...], place: str) -> None:
-    unknown = [key for key in table if key not in allowed]
-    if unknown:
-        raise FitError(f"{place}: got the unknown key {quoted(unknown[0])}; allowed are {', '.join(allowed)}")
-
-
-def _table(data: Mapping[str, Any], key: str, place: str) -> dict[str, Any]:
-    """A table of a fit, empty where it is missing."""
-    table = data.get(key, {})
-    if not isinstance(table, dict):
-        raise FitError(f"{place}: {key}: got {quoted(table)}, but it must be a table")
-    return table
-
-
-def _selection(data: Mapping[str, Any], place: str) -> list[Any]:
-    conditions = data.get("selection", [])
-    if not isinstance(conditions, list):
-        raise FitError(f"{place}: selection: got {quoted(conditions)}, but it must be a list of conditions")
-    return conditions
 
 
 def _model(kind: Any, data: Any, place: str) -> Any:
@@ -132,30 +143,28 @@ def _model(kind: Any, data: Any, place: str) -> Any:
         raise FitError(f"{place}: {sentence(error, data)}") from None
 
 
-def _shot(given: Any, tables: Mapping[str, Any], record: Record, place: str, parameters: list[Parameter]) -> Any:
-    if not isinstance(given, dict):
-        raise FitError(f"{place}: got {quoted(given)}, but it must be a table")
-    _known(given, _SHOT_KEYS, place)
-    impact = dict(_table(given, "impact", place))
+def _shot(
+    given: _ShotTable, tables: Mapping[str, Any], record: Record, place: str, parameters: list[Parameter]
+) -> MeasuredShot:
+    impact = dict(given.impact)
     scattered = {key: value for key, value in impact.items() if isinstance(value, dict)}
     for key, value in scattered.items():
         if key not in QUANTITIES or QUANTITIES[key].table != "impact":
-            raise FitError(f"{place}: impact.{key}: got {quoted(value)}, but no such quantity of an impact scatters")
-        kind = QUANTITIES[key].type
-        median = float(read_distribution(quantity(kind), value, f"{place}: impact.{key}").quantile(np.array(0.5)))
-        impact[key] = quantity(kind).as_read(median)
-    observations, status = read_measured(given.get("measured"), record.standoffs, f"{place}: measured")
+            raise FitError(f"{place}.impact.{key}: got {quoted(value)}, but no such quantity of an impact scatters")
+        read = quantity(QUANTITIES[key].type)
+        median = float(read_distribution(read, value, f"{place}.impact.{key}").quantile(np.array(0.5)))
+        impact[key] = read.as_read(median)
+    observations, status = read_measured(given.measured, record.standoffs, f"{place}.measured")
     limits = [one.value for one in observations if one.is_limit]
     if limits:  # at which its search begins
         impact.setdefault("velocity", limits[0])
-    own = {table: _table(given, table, place) for table in _TABLES if table in given}
     return MeasuredShot(
-        name=str(given.get("name", place.partition(": ")[2])),
-        hit=read_hit(given.get("hit", "unknown"), f"{place}: hit"),
-        impact=_model(Impact, impact, f"{place}: impact"),
-        scatter=_model(Scatter, scattered, f"{place}: impact"),
-        tables=_merged(tables, own),
-        own=frozenset(one.path for one in parameters if _gives(own, one.path)),
+        name=given.name or place.partition(": ")[2],
+        hit=given.hit,
+        impact=_model(Impact, impact, f"{place}.impact"),
+        scatter=_model(Scatter, scattered, f"{place}.impact"),
+        tables=_merged(tables, given.tables),
+        own=frozenset(one.path for one in parameters if _gives(given.tables, one.path)),
         observations=observations,
         status=status,
     )
@@ -192,16 +201,16 @@ def _condition(text: Any, record: Record, place: str) -> Measure:
     return measure
 
 
-def _discrepancy(given: Any, kinds: set[str], name: str) -> tuple[list[Parameter], dict[str, float]]:
+def _discrepancy(given: _DiscrepancyTable, kinds: set[str], name: str) -> tuple[list[Parameter], dict[str, float]]:
     """Scales of discrepancy that are unknown, and those that are fixed."""
-    _known(given, tuple(DISCREPANCY), f"{name}: discrepancy")
     scales, fixed = list[Parameter](), dict[str, float]()
     for kind, (unit, default) in DISCREPANCY.items():
-        value, read = given.get(kind, default), quantity(unit)
+        value, read = getattr(given, kind), quantity(unit)
+        value = default if value is None else value
         place = f"{name}: discrepancy.{kind}"
         if isinstance(value, dict):
             prior: Distribution = read_distribution(read, value, place)
-            if prior.quantile(np.array(2.0**-31)) < 0.0:
+            if prior.quantile(np.array(EDGE)) < 0.0:
                 raise FitError(f"{place}: got a prior that reaches below 0, but a scale is at least 0")
             if kind in kinds:
                 scales.append(Parameter(("discrepancy", kind), f"discrepancy_{kind}", read.unit, prior))
@@ -217,21 +226,21 @@ def _discrepancy(given: Any, kinds: set[str], name: str) -> tuple[list[Parameter
 
 def _doubts(shots: tuple[MeasuredShot, ...], parameters: list[Parameter]) -> list[str]:
     """Sentences about data that a fit can take, but that say less than they seem to."""
-    told, before = list[str](), dict[str, str]()
+    doubts, before = list[str](), dict[str, str]()
     for shot in shots:
         if (first := before.get(content := repr(shot.content))) is None:
             before[content] = shot.name
         else:
-            told.append(
+            doubts.append(
                 f'shots "{first}" and "{shot.name}" are the same in every number: they count twice, as two measurements'
             )
     numbers = sum(len(shot.observations) + (shot.status is not None) for shot in shots)
     if numbers < len(parameters):
-        told.append(
+        doubts.append(
             f"got {numbers} measured number{'s' if numbers > 1 else ''} against {len(parameters)} parameters: the "
             "posterior keeps its prior in most directions"
         )
-    return told
+    return doubts
 
 
 def _check_scenes(fit: Fit, name: str) -> None:
@@ -243,8 +252,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
             scene = fit.scene_of(shot)
             asked.check_together({asked.BENDING: fit.record.bending, asked.NODAL: fit.numerics.scheme == "nodal"})
         except ValueError as error:
-            told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
-            raise FitError(f"{where}: {told}") from None
+            raise FitError(f"{where}: {_reason(error, shot)}") from None
         _check_hit(shot, scene, where)
         has_limit = any(one.is_limit for one in shot.observations)
         if has_limit and fit.record.bending:
@@ -259,12 +267,15 @@ def _check_scenes(fit: Fit, name: str) -> None:
                 if has_limit:
                     check_arrests(reached)
             except ValueError as error:
-                told = sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
                 at = ", ".join(f"{dotted(path)} = {value:.4g}" for path, value in values.items())
                 raise FitError(
-                    f"{where}: the priors reach {at} (SI), which is not possible: {told}; bound them, as uniform or "
-                    "truncated_normal do"
+                    f"{where}: the priors reach {at} (SI), which is not possible: {_reason(error, shot)}; bound them, "
+                    "as uniform or truncated_normal do"
                 ) from None
+
+
+def _reason(error: ValueError, shot: MeasuredShot) -> str:
+    return sentence(error, dict(shot.tables)) if isinstance(error, ValidationError) else str(error)
 
 
 def _check_hit(shot: MeasuredShot, scene: Scene, where: str) -> None:

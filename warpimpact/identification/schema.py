@@ -18,16 +18,16 @@ def fit_schema() -> Schema:
     whole = campaign_schema()
     for definition in whole["$defs"].values():
         definition["required"] = [name for name in definition.get("required", []) if name in ("shape", "distribution")]
-    told = whole["properties"]
-    told["plate"] = {"description": told["plate"]["description"], **told["plate"]["else"]}
-    tables = {name: told[name] for name in ("core", "plate", "interaction")}
+    keys = whole["properties"]
+    keys["plate"] = {"description": keys["plate"]["description"], **keys["plate"]["else"]}
+    tables = {name: keys[name] for name in ("core", "plate", "interaction")}
     free: Schema = {"type": "object"}
-    shot = {"name": {"type": "string"}, "hit": {}, "impact": told["impact"], "measured": free, **tables}
+    shot = {"name": {"type": "string"}, "hit": {}, "impact": keys["impact"], "measured": free, **tables}
     properties = {
-        "title": told["title"],
+        "title": keys["title"],
         **tables,
         "record": _table("What is recorded of a shot.", _keys(Record)),
-        "numerics": told["numerics"],
+        "numerics": keys["numerics"],
         "prior": free | {"description": "Distributions of the parameters, in the tables core, plate and interaction."},
         "discrepancy": _table("Scale of what the model misses.", {kind: {} for kind in DISCREPANCY}),
         "selection": {"description": "What the measured cores have in common."},
@@ -48,5 +48,4 @@ def _table(description: str, properties: Schema) -> Schema:
 
 
 def _keys(model: Any) -> Schema:
-    """Names of the keys of a model; warpimpact checks their values."""
     return {name: {} for name in model.model_fields}

@@ -95,7 +95,6 @@ class Store:
 
     @property
     def count(self) -> int:
-        """Batches on the disk."""
         return len(self._batches())
 
     def discard(self) -> None:

@@ -22,7 +22,6 @@ def unit_of(array: xarray.DataArray | xarray.DataTree) -> tuple[str, float]:
 
 
 def posterior_text(tree: xarray.DataTree) -> str:
-    """The whole of it."""
     return "\n".join([*_parameters(tree), "", *_rows(tree), "", *_best(tree), "", *_worth(tree)])
 
 
@@ -81,15 +80,15 @@ def _best(tree: xarray.DataTree) -> list[str]:
 
 
 def _worth(tree: xarray.DataTree) -> list[str]:
-    told = tree.attrs
-    effective, k, noise = (float(told[name]) for name in (files.EFFECTIVE, files.PARETO_K, files.HIT_NOISE))
+    attributes = tree.attrs
+    effective, k, noise = (float(attributes[name]) for name in (files.EFFECTIVE, files.PARETO_K, files.HIT_NOISE))
     lines = [
         f"{tree.attrs[files.SETS]} sets of parameters, effective sample size {effective:.0f}, Pareto k {k:.2f}, "
         f"the hits leave ±{noise:.2g} in ln L"
     ]
-    if told[files.CONVERGED]:
+    if attributes[files.CONVERGED]:
         return lines
-    wanted = int(told["wanted_sample_size"])
+    wanted = int(attributes["wanted_sample_size"])
     causes = [
         (effective < wanted, f"the effective sample size is below {wanted}: give more sets"),
         (k > LARGEST_K, f"Pareto k is above {LARGEST_K}: some sets carry too much weight; give more sets"),

@@ -56,11 +56,9 @@ class Outcomes:
         return name in vars(self)
 
     def __len__(self) -> int:
-        """Number of shots."""
         return len(self.status)
 
     def __getitem__(self, which: Which) -> Self:
-        """Those of some shots."""
         return type(self)(**{name: values[which] for name, values in vars(self).items()})
 
     def __repr__(self) -> str:

@@ -62,11 +62,11 @@ class Variable(str):
     @property
     def attributes(self) -> dict[str, Any]:
         """CF attributes of the variable in the Dataset."""
-        told: dict[str, Any] = {"units": self.units, "long_name": self.long_name}
+        attributes: dict[str, Any] = {"units": self.units, "long_name": self.long_name}
         if self.flags is not None:
-            told["flag_values"] = np.array(list(self.flags), dtype=np.int8)
-            told["flag_meanings"] = " ".join(flag.name.lower() for flag in self.flags)
-        return told
+            attributes["flag_values"] = np.array(list(self.flags), dtype=np.int8)
+            attributes["flag_meanings"] = " ".join(flag.name.lower() for flag in self.flags)
+        return attributes
 
     @property
     def is_number_of_hit(self) -> bool:

@@ -91,9 +91,9 @@ def to_table(
     )
 
 
-def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **told: Any) -> xarray.Dataset:
+def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any) -> xarray.Dataset:
     """The Dataset of the hit map; the arguments are those of `to_table`."""
-    return in_memory(to_table(scene, shots, outcomes, **told).to_xarray())
+    return in_memory(to_table(scene, shots, outcomes, **arguments).to_xarray())
 
 
 def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:

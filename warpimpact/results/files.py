@@ -186,7 +186,7 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
         yield dataset
 
 
-def read_sweep(path: Path) -> xarray.Dataset:
+def read_sweep_result(path: Path) -> xarray.Dataset:
     """Read a sweep into memory.
 
     Raises:

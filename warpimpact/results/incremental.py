@@ -61,7 +61,6 @@ class IncrementalFile:
             file.close()
 
     def _write(self) -> None:
-        """Write what waits."""
         if not self._waiting:
             return
         table, self._waiting = joined(self._waiting), []

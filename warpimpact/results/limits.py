@@ -40,7 +40,7 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
     if len(values) > 1 and not np.array_equal(hit_numbers(dataset[[v.HIT]])[: len(values)], np.arange(len(values))):
         return None  # a choice of hits that are not the first ones
     status = np.where(np.isnan(values), Status.UNFINISHED, Status.PERFORATED).astype(np.int8)
-    told = {
+    attributes = {
         attr.LIMIT: quantity,
         attr.LIMIT_LAYER: 0,
         attr.LIMIT_HIGHEST: dataset.attrs[attr.SOLID_LIMIT_HIGHEST],
@@ -48,4 +48,4 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
         attr.LIMIT_DENSITY: dataset.attrs[attr.SOLID_LIMIT_DENSITY],
     }
     names = v.LIMITS[quantity].value, v.STATUS
-    return xarray.Dataset(described(names, dict(zip(names, (values, status), strict=True))), attrs=told)
+    return xarray.Dataset(described(names, dict(zip(names, (values, status), strict=True))), attrs=attributes)

@@ -119,5 +119,5 @@ def attribute(path: Path, name: str) -> Any:
 
 
 def _column(variable: Any) -> Any:
-    told = {name: variable.getncattr(name) for name in variable.ncattrs() if name != "_FillValue"}
-    return Column(tuple(variable.dimensions), variable, told)
+    attributes = {name: variable.getncattr(name) for name in variable.ncattrs() if name != "_FillValue"}
+    return Column(tuple(variable.dimensions), variable, attributes)

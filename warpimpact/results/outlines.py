@@ -32,9 +32,9 @@ def outlines(dataset: xarray.Dataset | Table, layer: int = 0) -> dict[str, NDArr
     """
     if not layer and v.OUTLINE_Y in dataset.attrs:
         return {axis: np.atleast_1d(dataset.attrs[name]) for axis, name in v.OUTLINE.items()}
-    told = json.loads(dataset.attrs.get(attr.LAYERS, "{}")).get(str(layer), {})
-    offset = told.get("offset", (0.0, 0.0))
-    text = json.dumps({name: told[name] for name in Plate.model_fields if name in told}) if layer else None
+    fields = json.loads(dataset.attrs.get(attr.LAYERS, "{}")).get(str(layer), {})
+    offset = fields.get("offset", (0.0, 0.0))
+    text = json.dumps({name: fields[name] for name in Plate.model_fields if name in fields}) if layer else None
     try:
         plate = Plate.model_validate_json(text or dataset.attrs.get(attr.PLATE, ""))
     except ValueError:  # without a plate, or the file of its mask

@@ -43,7 +43,6 @@ class Column:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Extents along `dims`."""
         if _HIT not in self.dims:
             return tuple(self.data.shape)
         return len(range(self.data.shape[0])[self.first : self.stop]), *self.data.shape[1:]
@@ -85,13 +84,12 @@ class Table:
     @classmethod
     def from_xarray(cls, dataset: xarray.Dataset) -> Table:
         """That of a Dataset, in memory."""
-        told = {str(name): (one.dims, one.values, one.attrs) for name, one in dataset.variables.items()}
-        coordinates = {name: one for name, one in told.items() if name in dataset.coords}
-        return cls.of({name: one for name, one in told.items() if name not in coordinates}, coordinates, dataset.attrs)
+        columns = {str(name): (one.dims, one.values, one.attrs) for name, one in dataset.variables.items()}
+        data = {name: one for name, one in columns.items() if name not in dataset.coords}
+        return cls.of(data, {name: columns[name] for name in columns if name not in data}, dataset.attrs)
 
     @property
     def sizes(self) -> dict[str, int]:
-        """Extents of the dimensions."""
         return {name: size for one in self.variables.values() for name, size in zip(one.dims, one.shape, strict=True)}
 
     def __contains__(self, name: str) -> bool:
@@ -140,9 +138,9 @@ class Table:
         """The Dataset, in memory."""
         import xarray
 
-        told = {name: (one.dims, one.values, dict(one.attrs)) for name, one in self.variables.items()}
-        data = {name: one for name, one in told.items() if name not in self.coords}
-        return xarray.Dataset(data, {name: one for name, one in told.items() if name in self.coords}, self.attrs)
+        columns = {name: (one.dims, one.values, dict(one.attrs)) for name, one in self.variables.items()}
+        data = {name: one for name, one in columns.items() if name not in self.coords}
+        return xarray.Dataset(data, {name: one for name, one in columns.items() if name in self.coords}, self.attrs)
 
 
 def joined(tables: Iterable[Table]) -> Table:

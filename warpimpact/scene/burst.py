@@ -135,11 +135,9 @@ class BurstSampler(Sampler):
         self._burst = burst
 
     def __len__(self) -> int:
-        """Number of shots."""
         return self._burst.count * super().__len__()
 
     def shots(self, first: int, count: int) -> Shots:
-        """`count` shots from number `first` on."""
         each, count = self._burst.count, min(count, len(self) - first)
         sample, skipped = divmod(first, each)
         samples = -(-(skipped + count) // each)

@@ -178,11 +178,9 @@ class PolynomialCore(Core):
 
     @property
     def max_radius(self) -> float:
-        """Largest radius [m]."""
         return float(self.radius(np.array([0.0, self.length, *self._extremes()])).max())
 
     def radius(self, s: Array) -> Array:
-        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
         return np.asarray(np.maximum(self._polynomial(s), 0.0))
 
     @property
@@ -222,7 +220,6 @@ class _NosedCore(Core):
 
     @property
     def max_radius(self) -> float:
-        """Largest radius [m]."""
         return self.diameter / 2
 
     @property
@@ -248,7 +245,6 @@ class OgiveCore(_NosedCore):
         return float(self.diameter * np.sqrt(self.crh - 0.25))
 
     def radius(self, s: Array) -> Array:
-        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
         curvature_radius = self.crh * self.diameter
         to_shoulder = np.maximum(self.nose_length - s, 0.0)
         arc = np.sqrt(np.maximum(curvature_radius**2 - to_shoulder**2, 0.0))
@@ -268,11 +264,9 @@ class ConeCore(_NosedCore):
 
     @property
     def nose_length(self) -> float:
-        """From tip to shoulder [m]."""
         return self.length if self.cone_length is None else self.cone_length
 
     def radius(self, s: Array) -> Array:
-        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
         return self.diameter / 2 * np.minimum(np.asarray(s) / self.nose_length, 1.0)
 
 
@@ -325,12 +319,10 @@ class ProfileCore(Core):
 
     @property
     def length(self) -> float:
-        """From nose tip to base [m]."""
         return self.s[-1]
 
     @property
     def max_radius(self) -> float:
-        """Largest radius [m]."""
         return max(self.r)
 
     @property
@@ -339,7 +331,6 @@ class ProfileCore(Core):
         return self.s[1:-1]
 
     def radius(self, s: Array) -> Array:
-        """Radius [m] at stations `s` [m] within [0, length]; same shape."""
         return np.interp(s, self.s, self.r)
 
 

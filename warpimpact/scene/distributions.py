@@ -37,7 +37,6 @@ class Continuous(Distribution, ABC):
     """A distribution from scipy.stats."""
 
     def quantile(self, share: Array) -> Array:
-        """As in `Distribution`."""
         values: Array = self._frozen().ppf(share)
         return values
 
@@ -101,7 +100,7 @@ class TruncatedNormal(Bounded):
         return stats.truncnorm(*ends, loc=self.mean, scale=self.std)
 
     def quantile(self, share: Array) -> Array:
-        """As in `Distribution`; clipped, because rounding may exceed the ends."""
+        # Rounding may exceed the ends.
         return np.clip(super().quantile(share), self.low, self.high)
 
 
@@ -170,7 +169,6 @@ class Weibull(Distribution):
     scale: _Positive
 
     def quantile(self, share: Array) -> Array:
-        """As in `Distribution`."""
         return np.asarray(self.scale * (-np.log1p(-share)) ** (1.0 / self.shape))
 
 
@@ -195,7 +193,6 @@ class Discrete(Distribution):
         return self
 
     def quantile(self, share: Array) -> Array:
-        """As in `Distribution`."""
         weights = np.ones(len(self.values)) if self.weights is None else np.array(self.weights)
         order = np.argsort(self.values)
         ends = np.cumsum(weights[order])

@@ -54,7 +54,6 @@ class Sampler:
         self._sobol = [Sobol(dimensions, _seed(hits.seed, replicate)) for replicate in range(replicates)]
 
     def __len__(self) -> int:
-        """Number of shots."""
         return self._hits.total(self._extent) * len(self._group)
 
     def shots(self, first: int, count: int) -> Shots:
@@ -121,7 +120,6 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
 
 
 def _seed(seed: int, replicate: int) -> np.random.SeedSequence:
-    """Seed of one scrambling."""
     return np.random.SeedSequence(seed, spawn_key=(replicate,) if replicate else ())
 
 

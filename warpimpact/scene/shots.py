@@ -25,8 +25,8 @@ _REPLICATES = 16
 9 % wider than over very many."""
 
 
-OF_A_BURST = ("sample", "burst_order", "nearest_earlier_hit")
-"""Columns of shots that share their plates."""
+OF_A_SHOT = ("sample", "burst_order", "nearest_earlier_hit", "posterior_draw")
+"""Columns of shots that share their plates, or draw their parameters: no campaign gives their values."""
 
 
 EXPORTED = {one.column: name for name, one in QUANTITIES.items() if one.column is not None}
@@ -183,6 +183,7 @@ class Shots:
             every shot has a plate of its own.
         burst_order: how many shots have hit that plate before.
         nearest_earlier_hit: distance from the nearest hit on that plate before [m]; NaN for the first one.
+        posterior_draw: place of its parameters in a posterior; None where they are not drawn from one.
     """
 
     hit_y: Array
@@ -204,6 +205,7 @@ class Shots:
     sample: NDArray[np.int64] | None = None
     burst_order: NDArray[np.int64] | None = None
     nearest_earlier_hit: Array | None = None
+    posterior_draw: Array | None = None
 
     def __post_init__(self) -> None:
         """Make columns of the plate alone those of a first layer."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import islice
 from numbers import Real
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, get_args, get_origin
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainSerializer, WithJsonSchema
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from .display import UNITS, Unit
@@ -235,11 +236,11 @@ def _part(value: object, depth: int = 3) -> object:
 
 def _quantity(name: str, unit: str, example: str) -> BeforeValidator:
     """The reader of a quantity, and what the JSON schema of a campaign says of it."""
-    told = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
+    schema = {"type": ["number", "string"], "pattern": _STRING_WITH_UNIT if unit else _STRING, "examples": [example]}
     if unit:
-        told["unit"] = "deg" if unit == "rad" else unit
+        schema["unit"] = "deg" if unit == "rad" else unit
     return BeforeValidator(
-        _Quantity(name, unit, example), json_schema_input_type=Annotated[float | str, WithJsonSchema(told)]
+        _Quantity(name, unit, example), json_schema_input_type=Annotated[float | str, WithJsonSchema(schema)]
     )
 
 
@@ -250,9 +251,25 @@ def in_radians(value: float) -> str:
 
 def quantity(kind: Any) -> _Quantity:
     """The reader of one of the types below, or of one that is made of it; its ValueError says what is allowed."""
-    validators = (mark.func for mark in kind.__metadata__ if isinstance(mark, BeforeValidator))
-    (reader,) = (function for function in validators if isinstance(function, _Quantity))
+    reader = reader_in(kind)
+    assert reader is not None, kind
     return reader
+
+
+def reader_in(kind: Any) -> _Quantity | None:
+    """The reader of the quantity that a type holds, such as `PositiveLength | None`; None where it holds none, or
+    several in a tuple."""
+    for mark in getattr(kind, "__metadata__", ()):
+        if isinstance(mark, BeforeValidator) and isinstance(mark.func, _Quantity):
+            return mark.func
+    if get_origin(kind) is tuple:
+        return None
+    return next((found for one in get_args(kind) if (found := reader_in(one)) is not None), None)
+
+
+def typed(field: FieldInfo) -> Any:
+    """The type of a field of a model, with its marks."""
+    return Annotated[(field.annotation, *field.metadata)] if field.metadata else field.annotation
 
 
 def _is_printable(text: str) -> str:

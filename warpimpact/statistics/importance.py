@@ -75,18 +75,9 @@ class Student:
 
     def log_density(self, points: Array) -> Array:
         """Logarithm of the density at points, shape [points]."""
-        from scipy.linalg import solve_triangular
-        from scipy.special import gammaln
+        from scipy.stats import multivariate_t
 
-        dimensions = points.shape[1]
-        square = (solve_triangular(self.factor, (points - self.centre).T, lower=True) ** 2).sum(axis=0)
-        own = (
-            gammaln(0.5 * (FREEDOM + dimensions))
-            - gammaln(0.5 * FREEDOM)
-            - 0.5 * dimensions * math.log(FREEDOM * math.pi)
-            - np.log(np.diag(self.factor)).sum()
-            - 0.5 * (FREEDOM + dimensions) * np.log1p(square / FREEDOM)
-        )
+        own = multivariate_t.logpdf(points, self.centre, self.factor @ self.factor.T, FREEDOM)
         density: Array = np.logaddexp(math.log1p(-FROM_PRIOR) + own, math.log(FROM_PRIOR) + log_prior(points))
         return density
 
@@ -97,7 +88,7 @@ def log_prior(points: Array) -> Array:
 
 
 @dataclass
-class Sampler:
+class ImportanceSampler:
     """Draws of a posterior in rounds: `propose` points, compute their likelihood, `tell` it.
 
     Args:
@@ -172,7 +163,6 @@ class Sampler:
         return raw
 
     def weighed(self) -> Weights:
-        """The weights of all points."""
         return Weights.of(self._raw())
 
 
@@ -233,6 +223,8 @@ def _tempered(raw: Array, effective: float) -> Array:
 
 def _smoothed(weights: Array) -> tuple[Array, float]:
     """Weights with their largest ones replaced by quantiles of a Pareto distribution, and its index k."""
+    from scipy.stats import genpareto
+
     count = len(weights)
     tail = math.ceil(min(0.2 * count, 3.0 * math.sqrt(count)))
     order = np.argsort(weights)
@@ -241,8 +233,7 @@ def _smoothed(weights: Array) -> tuple[Array, float]:
     if tail < _FEWEST_TAIL or (beyond > 0.0).sum() < _FEWEST_TAIL:
         return weights, math.inf
     k, sigma = pareto_fit(beyond)
-    shares = (np.arange(tail) + 0.5) / tail
-    quantiles = -sigma * np.log1p(-shares) if abs(k) < 1e-9 else sigma * np.expm1(-k * np.log1p(-shares)) / k
+    quantiles = genpareto.ppf((np.arange(tail) + 0.5) / tail, k, scale=sigma)
     smooth = weights.copy()
     smooth[order[-tail:]] = np.minimum(cut + quantiles, weights.max())
     return smooth, k

@@ -164,13 +164,11 @@ def _wilson(successes: int, count: int, confidence: float) -> tuple[float, float
 
 def _matched(sample: _Sample, count: int, confidence: float) -> tuple[float, float]:
     """Agresti and Min's interval: adds half a shot to each of the four cells of the 2 × 2 table."""
-    from scipy.special import ndtri
-
     difference = sample.mean * count
     discordant = (sample.deviation**2 + sample.mean**2) * count
     padded = count + 2
     error = math.sqrt(discordant + 1.0 - difference**2 / padded) / padded
-    half = -float(ndtri(0.5 * (1.0 - confidence))) * error
+    half = NormalDist().inv_cdf(0.5 * (1.0 + confidence)) * error
     return max(-1.0, difference / padded - half), min(1.0, difference / padded + half)
 
 

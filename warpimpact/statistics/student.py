@@ -22,27 +22,18 @@ def student_quantile(share: float, freedom: int) -> float:
 
     Source: M. Abramowitz, I. A. Stegun, Handbook of Mathematical Functions, 26.7.3, 26.7.4 and 26.7.5.
     """
-    normal = NormalDist().inv_cdf(share)
-    value = _expanded(normal, freedom)
     if freedom >= _LARGE:
-        return value
-    scale = math.exp(math.lgamma(0.5 * (freedom + 1)) - math.lgamma(0.5 * freedom)) / math.sqrt(freedom * math.pi)
-    low, high = 0.0, math.inf
-    for _ in range(200):  # Newton's steps within the bounds found so far; bisection or doubling beyond them
-        excess = _within(value, freedom) - (2.0 * share - 1.0)
-        low, high = (value, high) if excess < 0.0 else (low, value)
-        density = scale * (1.0 + value**2 / freedom) ** (-0.5 * (freedom + 1))
-        before, value = value, value - 0.5 * excess / density
-        if not low <= value <= high:
-            value = 2.0 * before if math.isinf(high) else 0.5 * (low + high)
-        if abs(value - before) <= 1e-15 * value:
-            break
-    return value
+        return _expanded(NormalDist().inv_cdf(share), freedom)
+    low, high = 0.0, 1.0
+    while _within(high, freedom) < 2.0 * share - 1.0:
+        low, high = high, 2.0 * high
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if _within(middle, freedom) < 2.0 * share - 1.0 else (low, middle)
+    return middle
 
 
-def _expanded(normal: float, freedom: int) -> float:
-    """The quantile from that of the normal distribution, by powers of 1 / freedom."""
-    z = normal
+def _expanded(z: float, freedom: int) -> float:
+    """The quantile from that of the normal distribution, z, by powers of 1 / freedom."""
     terms = (
         z,
         (z**3 + z) / 4.0,

@@ -138,12 +138,12 @@ class LimitMap:
             sought = replace(sought, highest=thickest(scene, 0))
         begin = time.perf_counter()
         searched = _searched(campaign.drawn, scene, at_solid(campaign, solid), sought, numerics, worker)
-        told = {
+        attributes = {
             attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
             attr.SOLID_LIMIT_DENSITY: plate.density,
             attr.SOLID_LIMIT_HIGHEST: sought.highest,
         }
-        return with_solid_limits(table, sought.quantity, searched).assign_attrs(attr.with_units(told))
+        return with_solid_limits(table, sought.quantity, searched).assign_attrs(attr.with_units(attributes))
 
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None

@@ -30,8 +30,8 @@ def shown_unit(name: str) -> tuple[str, float]:
 
 def limits_text(dataset: xarray.Dataset) -> str:
     """What a search found, as a short table: V50 and V05, and every hit of a short list."""
-    told = dataset.attrs
-    quantity = told[attr.LIMIT]
+    attributes = dataset.attrs
+    quantity = attributes[attr.LIMIT]
     unit, factor = shown_unit(quantity)
     value, lower, upper, runs, converged = (dataset[name].values for name in v.LIMITS[quantity])
     rows = []
@@ -51,12 +51,12 @@ def limits_text(dataset: xarray.Dataset) -> str:
         rows.append(f"{broken} hits failed, and count in none of these numbers")
     beyond, missed = int(np.isposinf(value).sum()), int((value == 0.0).sum())
     if beyond:
-        rows.append(f"{beyond} hits have no limit {quantity} up to {factor * told[attr.LIMIT_HIGHEST]:g} {unit}")
+        rows.append(f"{beyond} hits have no limit {quantity} up to {factor * attributes[attr.LIMIT_HIGHEST]:g} {unit}")
     if missed:
         rows.append(f"{missed} hits touch no material")
     if open_ := int((converged == 0).sum()) - int(np.isnan(value).sum()):
         rows.append(
-            f"{open_} hits were not found to {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
+            f"{open_} hits were not found to {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
         )
     rows += _solid_lines(dataset)
     rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
@@ -99,13 +99,13 @@ def _proxy_lines(dataset: xarray.Dataset) -> list[str]:
 
 def promise_line(dataset: xarray.Dataset) -> str:
     """How far off the limits are estimated to be."""
-    told = dataset.attrs
-    unit, factor = shown_unit(told[attr.LIMIT])
-    of_layer = f"thickness of layer {told[attr.LIMIT_LAYER]}; " if told[attr.LIMIT_LAYER] else ""
-    ends = f"{of_layer}ends of a limit at most {factor * told[attr.LIMIT_TOLERANCE]:g} {unit} apart"
-    if attr.LIMIT_ERROR not in told:
+    attributes = dataset.attrs
+    unit, factor = shown_unit(attributes[attr.LIMIT])
+    of_layer = f"thickness of layer {attributes[attr.LIMIT_LAYER]}; " if attributes[attr.LIMIT_LAYER] else ""
+    ends = f"{of_layer}ends of a limit at most {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} apart"
+    if attr.LIMIT_ERROR not in attributes:
         return f"{ends}; the error of the numerics was not measured, as the campaign fixes the resolution"
-    kept = "" if told[attr.PROMISE_KEPT] else ", more than was asked for"
-    error = limit_error_text(told[attr.LIMIT_ERROR], told[attr.LIMIT])
-    hits = hits_text(json.loads(told[attr.ACCURACY])["share"])
+    kept = "" if attributes[attr.PROMISE_KEPT] else ", more than was asked for"
+    error = limit_error_text(attributes[attr.LIMIT_ERROR], attributes[attr.LIMIT])
+    hits = hits_text(json.loads(attributes[attr.ACCURACY])["share"])
     return f"{ends}; against a finer level {hits} are within {error}{kept}"

@@ -7,15 +7,14 @@ import json
 import math
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 import xarray
-from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 
 from warpimpact.campaign.campaign import Campaign
@@ -25,8 +24,7 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Impact, Interaction, Plate
-from warpimpact.scene.display import UNITS
-from warpimpact.scene.units import quoted
+from warpimpact.scene.units import quoted, reader_in, typed
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys need no table in front of them, as there is no other key of that name."""
@@ -123,12 +121,12 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
         data, labels = json.loads(json.dumps(shared, default=str)), [label for label, _ in combination]
         for one, (_, value) in zip(inputs, combination, strict=True):
             _place(data, one.key, value, str(path))
-        told = ", ".join(f"{one.name} = {label}" for one, label in zip(inputs, labels, strict=True))
+        inputs_text = ", ".join(f"{one.name} = {label}" for one, label in zip(inputs, labels, strict=True))
         if isinstance(data.get("title"), str):
-            data["title"] = f"{data['title']}: {told}"[:200]
+            data["title"] = f"{data['title']}: {inputs_text}"[:200]
         content = json.dumps(data, indent=1, ensure_ascii=False)
-        name = f"{number:04d}_{'_'.join(re.findall(r'[A-Za-z0-9.+-]+', told))}"[:100]
-        campaigns[name] = Campaign.from_text(content, name=f"{path}, {told}", folder=path.parent, count=count)
+        name = f"{number:04d}_{'_'.join(re.findall(r'[A-Za-z0-9.+-]+', inputs_text))}"[:100]
+        campaigns[name] = Campaign.from_text(content, name=f"{path}, {inputs_text}", folder=path.parent, count=count)
     return Sweep(str(shared.get("title", "")), text, inputs, campaigns)
 
 
@@ -286,21 +284,9 @@ def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
     numbers = [_value(one.key, campaign) for campaign in campaigns]
     if found is None or not all(isinstance(number, int | float) for number in numbers):
         return one.name, np.array(one.labels), {"long_name": one.key}
-    unit = next(filter(None, map(_unit, _marks(found))), "")
-    values = np.array(numbers, dtype=float)
-    told = {"units": UNITS[unit].stored, "long_name": one.key}
-    return one.name, np.degrees(values) if unit == "rad" else values, told
-
-
-def _marks(field: FieldInfo) -> Iterator[Any]:
-    yield from field.metadata
-    for part in get_args(field.annotation):  # as of Annotated[float, …] | None
-        yield from getattr(part, "__metadata__", ())
-
-
-def _unit(mark: Any) -> str | None:
-    """SI unit of the quantity that a mark of a field reads; None of any other mark."""
-    return getattr(mark.func, "unit", None) if isinstance(mark, BeforeValidator) else None
+    reader, values = reader_in(typed(found)), np.array(numbers, dtype=float)
+    units = reader.display.stored if reader else "1"
+    return one.name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": one.key}
 
 
 def _field(key: str, campaign: Campaign) -> FieldInfo | None:

@@ -85,7 +85,7 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (("[10]", "[10, 20]"), "got 2 values and 2 std at 1 stand-offs"),
         (("tilt = {", "tlit = {"), 'got the unknown key "tlit"; did you mean "tilt"?'),
         (('title = "Two', 'tilte = "Two'), 'got the unknown key "tilte"'),
-        (("seed = 3", "sets = 3"), "sampling: sets: got 3, but it must be greater than or equal to 64"),
+        (("seed = 3", "sets = 3"), "sampling.sets: got 3, but it must be greater than or equal to 64"),
         (("title =", 'selection = ["whole"]\ntitle ='), 'selection: got "whole", but it must be one of perforated'),
         (
             ("title =", 'selection = ["tilt@20mm < 3 deg"]\ntitle ='),

@@ -19,7 +19,7 @@ from warpimpact.results.files import ResultError
 TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
 DISTRIBUTION = {"distribution": ["1 mm"] * 5000, "low": 0, "high": 1}
 CASES: dict[str, tuple[tuple[Any, ...], Any, str]] = {
-    "no prior": (("prior",), "x", "prior: is missing"),
+    "no prior": (("prior",), "x", 'prior: got "x", but it must be a table'),
     "a prior of a table": (("prior",), {"distribution": "uniform", "low": 1, "high": 2}, "prior"),
     "a long distribution": (("prior", "plate", "resistance"), DISTRIBUTION, "but it must be one of"),
     "too many spacings": (
@@ -27,8 +27,8 @@ CASES: dict[str, tuple[tuple[Any, ...], Any, str]] = {
         {"spacing": [{"distribution": "uniform", "low": 1, "high": 2}] * 3},
         "is no number",
     ),
-    "an impact": (("shot", 0, "impact"), [1, 2], "shot[0]: impact: got [1, 2], but it must be a table"),
-    "a plate of a shot": (("shot", 0, "plate"), 7, "shot[0]: plate: got 7, but it must be a table"),
+    "an impact": (("shot", 0, "impact"), [1, 2], "shot[0].impact: got [1, 2], but it must be a table"),
+    "a plate of a shot": (("shot", 0, "plate"), 7, "shot[0].plate: got 7, but it must be a table"),
     "a core": (("core",), 5, "core: got 5, but it must be a table"),
     "numerics": (("numerics",), "fine", 'numerics: got "fine", but it must be a table'),
     "a selection": (("selection",), 5, "selection: got 5, but it must be a list"),

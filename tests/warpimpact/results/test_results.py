@@ -13,10 +13,9 @@ from warpimpact.results import files
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.outlines import outlines
 from warpimpact.results.variables import (
-    BURST_VARIABLES,
     EXIT_VARIABLES,
+    OPTIONAL_SHOT_VARIABLES,
     OUTCOME_VARIABLES,
-    SCATTER_VARIABLES,
     SHOT_VARIABLES,
 )
 from warpimpact.scene import NoPattern, Shots, SquarePattern
@@ -229,5 +228,5 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
 
 def test_every_field_of_shots_has_a_variable():
     shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
-    of_layers = {name.removeprefix("layer_") for name in (*SCATTER_VARIABLES, *BURST_VARIABLES)}
+    of_layers = {name.removeprefix("layer_") for name in OPTIONAL_SHOT_VARIABLES}
     assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers

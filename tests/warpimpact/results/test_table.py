@@ -18,6 +18,9 @@ from warpimpact.results.netcdf import open_table, read_table, write_table
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
 from warpimpact.runs.compute import compute
+from warpimpact.runs.task import Task
+from warpimpact.scene import Numerics
+from warpimpact.solver.worker import Worker
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -26,8 +29,9 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 def table(request: pytest.FixtureRequest) -> Table:
     """Some hits of a campaign, with the solid reference, which has a group of its own in the file."""
     campaign = Campaign.from_toml(CAMPAIGNS / f"{request.param}.toml")
+    campaign = campaign.model_copy(update={"numerics": Numerics(level=0)})
     shots = campaign.sampler().shots(0, 40)
-    return compute(campaign, shots, solid=shots[:1], device="cpu")
+    return compute(campaign, Task(shots, shots[:1]), Worker("cpu"))
 
 
 def content(group: Any, name: str = "") -> Iterator[tuple[Any, ...]]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import genpareto, multivariate_normal
 
-from warpimpact.statistics.importance import Sampler, Student, Weights, log_prior, pareto_fit, resampled
+from warpimpact.statistics.importance import ImportanceSampler, Student, Weights, log_prior, pareto_fit, resampled
 
 
 @pytest.fixture(scope="module")
@@ -14,9 +14,9 @@ def linear() -> tuple[np.ndarray, np.ndarray, float]:
     return rng.standard_normal((6, 6)), np.array([1.0, -1.0, 2.0, 0.5, 0.0, 1.0]), 0.7
 
 
-def drawn(linear: tuple[np.ndarray, np.ndarray, float], rounds: list[int]) -> tuple[Sampler, Weights]:
+def drawn(linear: tuple[np.ndarray, np.ndarray, float], rounds: list[int]) -> tuple[ImportanceSampler, Weights]:
     matrix, data, std = linear
-    sampler = Sampler(6, [(2, 16), (4, 4)], seed=0)
+    sampler = ImportanceSampler(6, [(2, 16), (4, 4)], seed=0)
     for count in rounds:
         points = sampler.propose(count)
         sampler.tell(multivariate_normal(data, std**2 * np.eye(6)).logpdf(points @ matrix.T))

@@ -109,11 +109,9 @@ class LatticePattern(Pattern):
 
     @property
     def open_area(self) -> float:
-        """Share of holes in a period."""
         return float(len(self._places) * self.hole_area / math.prod(self.period))
 
     def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        """The pattern without the holes that reach into a `margin` along the rim of a plate of this `size` [m]."""
         if self._plate == (size, margin):
             return self
         on_plate = self._on((size, margin))
@@ -125,7 +123,6 @@ class LatticePattern(Pattern):
 
     @property
     def unbounded(self) -> Self:
-        """The pattern with all its holes, without a plate that bounds it."""
         return self if self._plate is None else self._on(None)
 
     def _on(self, plate: tuple[tuple[float, float], float] | None) -> Self:
@@ -136,12 +133,10 @@ class LatticePattern(Pattern):
         return pattern
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
-        """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
         inside: BoolArray = self._deepest(y, z) >= 0
         return inside
 
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
-        """Whether the edge of a hole may lie within `reach` of points y, z [m]; bool, of their broadcast shape."""
         nearby: BoolArray = ~(np.abs(self._deepest(y, z)) > reach)
         return nearby if reach <= self._sight else np.ones_like(nearby)
 
@@ -160,7 +155,6 @@ class LatticePattern(Pattern):
         return deepest
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        """Closed outlines, each of shape [points, 2] [m], of the holes that reach into a rectangle."""
         return [outline(spine, self.rounding) for spine in placed(self.spine, self._reaching(y_range, z_range))]
 
     def ligament(self, size: tuple[float, float] | None = None) -> float:
@@ -175,7 +169,6 @@ class LatticePattern(Pattern):
         return float(min(between, to_rim[to_rim >= 0].min(initial=np.inf)))
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
-        """Whether a mirror image, then half a period along both axes if `centred`, changes nothing."""
         from scipy.spatial import KDTree
 
         period, mirror = np.array(self.period), np.array([along_y, along_z])
@@ -290,6 +283,5 @@ def _bin(at: Array, period: Any, count: Any) -> NDArray[np.int64]:
 
 
 def _millimetres(pair: Any) -> str:
-    """Two lengths as text."""
     y, z = (f"{round(1e3 * length, 6) + 0.0:g}" for length in pair)
     return f"({y}, {z}) mm"

@@ -55,11 +55,9 @@ class MaskPattern(Pattern):
 
     @property
     def open_area(self) -> float:
-        """Share of holes in the mask."""
         return 1 - float(self.material.mean())
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
-        """Whether points y, z [m] lie in a hole; bool, of their broadcast shape."""
         i, j = (
             np.floor(coordinate / self.cell_size + cells / 2).astype(np.int64) % cells
             for coordinate, cells in zip((y, z), self.material.shape, strict=True)
@@ -105,7 +103,6 @@ class MaskPattern(Pattern):
         return self.cell_size
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
-        """Whether a mirror image, then half a period along both axes if `centred`, changes no cell."""
         halves = self.material.repeat(2, axis=0).repeat(2, axis=1)  # half a period is a whole number of these
         image = halves[::along_y, ::along_z]
         return np.array_equal(np.roll(image, self.material.shape, axis=(0, 1)) if centred else image, halves)

@@ -107,25 +107,19 @@ class NoPattern(Pattern):
 
     @property
     def open_area(self) -> float:
-        """Share of holes in a unit cell."""
         return 0.0
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
-        """False everywhere, of the broadcast shape of y and z."""
         return np.zeros(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
-        """There are none."""
         return []
 
     def ligament(self, size: tuple[float, float] | None = None) -> float:
-        """There is none."""
         return math.inf
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
-        """True: all points are alike."""
         return True
 
     def bounded(self, size: tuple[float, float], margin: float) -> Self:
-        """Itself: there is no hole to leave out."""
         return self

@@ -152,7 +152,6 @@ class TrianglePattern(_PolygonPattern):
 
     @property
     def corners(self) -> Array:
-        """Sharp corners, shape [3, 2] [m]."""
         return np.array([(-self.side / 2, -self.inradius), (self.side / 2, -self.inradius), (0.0, 2 * self.inradius)])
 
     @property
@@ -174,7 +173,6 @@ class SquarePattern(_PolygonPattern):
 
     @property
     def corners(self) -> Array:
-        """Sharp corners, shape [4, 2] [m]."""
         return self.inradius * np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
 
     @property
@@ -196,7 +194,6 @@ class HexagonPattern(_PolygonPattern):
 
     @property
     def corners(self) -> Array:
-        """Sharp corners, shape [6, 2] [m]."""
         half, side = self.inradius, 2 * self.inradius / np.sqrt(3)
         flanks = [(half, -side / 2), (half, side / 2), (0.0, side), (-half, side / 2), (-half, -side / 2)]
         return np.array([*flanks, (0.0, -side)])
