@@ -8,6 +8,7 @@ import pytest
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Core, Interaction, Numerics, Plate, PolynomialCore, Record, Scene, Shots
+from warpimpact.solver import replay
 from warpimpact.solver import simulate as simulation
 
 from . import references
@@ -128,7 +129,7 @@ def test_history_and_plate_of_a_replay_are_those_of_the_shot() -> None:
     numerics = Numerics(level=0, precision="double")
     core, plate = scene_of(5)
     shown = [
-        simulation.replay(Scene(core=c, target=p, interaction=INTERACTION), s, numerics=numerics)
+        replay.replay(Scene(core=c, target=p, interaction=INTERACTION), s, numerics=numerics)
         for c, p, s in ((PAPER_CORE, paper_plate(**FAR), SHOTS[5:6]), (core, plate, without(SHOTS)[5:6]))
     ]
     own, plain = shown

@@ -140,11 +140,11 @@ class Resolution:
         return np.minimum(acting, self.slender)
 
     def longest_time(
-        self, degradation: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
+        self, decay: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
     ) -> Array:
-        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some β,
-        impact velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
-        longest = self.weakening / np.maximum(-decay_rate(degradation, plate.degradation_unit), SLOWEST_DECAY)
+        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some rates
+        of decay (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
+        longest = self.weakening / np.maximum(-decay, SLOWEST_DECAY)
         weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
         slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / np.maximum(static_stress, SMALLEST_STRESS)
         return np.asarray(np.minimum(weakened, slowed))
@@ -162,7 +162,8 @@ class Resolution:
     def step_of(self, impact: Impact, plate: Plate) -> float:
         """Time step [s] of a plate that stands alone, or where it scatters, of its means."""
         stress = self.static * plate.resistance
-        longest_time = self.longest_time(np.array(plate.degradation), plate, impact.velocity, self.mass, stress)
+        decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
+        longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
         passage = self.passage(plate.thickness, plate, weakens=plate.degradation < 1.0)
         return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time))
 
@@ -222,7 +223,7 @@ def conditions_of(
         for material, layer in zip(materials, target.layers, strict=True)
     )
     times = (
-        resolution.longest_time(material.degradation, layer, shots.velocity, mass, material.a0)
+        resolution.longest_time(material.decay_rate, layer, shots.velocity, mass, material.a0)
         for material, layer in zip(materials, target.layers, strict=True)
     )
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too

@@ -23,6 +23,7 @@ from warpimpact.runs import shards
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
+from warpimpact.solver import replay as replaying
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
 from warpimpact.solver.prepare import Prepared
@@ -146,7 +147,7 @@ def test_the_history_of_an_image_is_that_of_its_own_shot(impact: Impact) -> None
     asked = campaign(impact=impact, count=8)
     group = symmetries_used(asked.impact, asked.hits, asked.plate)
     shots = make_shots(asked.impact, asked.hits, asked.plate)
-    alone = [simulation.replay(asked.scene, shots[k : k + 1], numerics=asked.numerics) for k in range(len(group))]
+    alone = [replaying.replay(asked.scene, shots[k : k + 1], numerics=asked.numerics) for k in range(len(group))]
     for k, symmetry in enumerate(group):
         home, image = ((shots.hit_y[at], shots.hit_z[at]) for at in (0, k))
         folded = image_of(alone[0], symmetry, home=home, image=image)

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 
 from warpimpact import Campaign, Numerics, simulate
-from warpimpact.solver.marching import CPU_CHUNK, March
+from warpimpact.solver.marching import CPU_CHUNK
+from warpimpact.solver.memory import Memory
 
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
@@ -14,13 +15,13 @@ CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 @pytest.mark.parametrize("hits", [24, 700])
 @pytest.mark.parametrize("threads", [2, 3])
 def test_launches_begin_and_end_with_single_shots(hits: int, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    campaign, counts, launch = Campaign.from_toml(CAMPAIGN), [], March._launch
+    campaign, counts, launch = Campaign.from_toml(CAMPAIGN), [], Memory.launch
 
-    def recorded(self: March, *arguments: Any) -> int:
+    def recorded(self: Memory, *arguments: Any) -> int:
         counts.append(arguments[-1])
         return launch(self, *arguments)
 
-    monkeypatch.setattr(March, "_launch", recorded)
+    monkeypatch.setattr(Memory, "launch", recorded)
     monkeypatch.setattr("warpimpact.solver.marching.CPU_LAUNCH", 1e9)  # however slow the machine
     shots = campaign.sampler().shots(0, hits)
     simulate(campaign.scene, shots, numerics=Numerics(level=2), device="cpu", threads=threads)
