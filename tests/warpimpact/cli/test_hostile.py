@@ -86,6 +86,10 @@ CAMPAIGNS = {
         re.sub("degradation_length *= .*", 'degradation_length = "1 nm"', BASE),
         "must be at least 1/1000",
     ),
+    "a tiny depth": (
+        re.sub("(degradation_length *= .*)", '\\1\ndegradation_depth = "1 nm"', BASE),
+        "must be at least 1/100 of the thickness",
+    ),
 }
 FILES: dict[str, tuple[str, str | bytes, str]] = {
     "a long field": ("a.csv", "hit_y,hit_z\n" + "1" * 200_000 + ",1\n", "field larger than field limit"),
