@@ -266,7 +266,6 @@ class Campaign(Model):
                 asked.DOUBLE: numerics.precision == "double",
             }
         )
-        self.output.check_bending(self.core)
         return self
 
     @model_validator(mode="after")
@@ -336,7 +335,8 @@ class Campaign(Model):
         return self
 
     @model_validator(mode="after")
-    def _standoffs_clear_of_plate(self) -> Self:
+    def _output_is_possible(self) -> Self:
+        self.output.check_bending(self.core)
         self.output.check_standoffs(self.core, self.target)
         return self
 
