@@ -84,7 +84,11 @@ CAMPAIGNS = {
     "a long key": (BASE + "\n[interaction]\n" + "k" * 100_000 + " = 1\n", "got the unknown key"),
     "a tiny length": (
         re.sub("degradation_length *= .*", 'degradation_length = "1 nm"', BASE),
-        "must be at least 1/1000",
+        "at least 1/1000 of its radius",
+    ),
+    "a tiny depth": (
+        re.sub("(degradation_length *= .*)", '\\1\ndegradation_depth = "1 nm"', BASE),
+        "must be at least 1/100 of the thickness",
     ),
 }
 FILES: dict[str, tuple[str, str | bytes, str]] = {
