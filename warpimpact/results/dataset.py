@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from warpimpact.records.outcomes import Outcomes
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.simulate import Replay
+    from warpimpact.solver.replay import Replay
 
 
 _ATTRIBUTES = {
@@ -80,6 +80,7 @@ def to_table(
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     own = own_columns(scene.target, shots)
     values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     values |= vars(outcomes) | faces(scene.target)
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
