@@ -212,11 +212,11 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         files.HIT_NOISE: hit_noise,
         files.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
         files.EVIDENCE: weights.log_evidence,
-        "wanted_sample_size": fit.sampling.effective,
+        files.WANTED: fit.sampling.effective,
         files.SETS: len(sampled.points) // sampled.block,
         "hits": fit.sampling.hits,
         "observations": fit.observed,
-        "row_probability": json.dumps(rows),
+        files.ROW_PROBABILITY: json.dumps(rows),
     }
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from warpimpact.records.outcomes import Outcomes
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.simulate import Replay
+    from warpimpact.solver.replay import Replay
 
 
 _ATTRIBUTES = {

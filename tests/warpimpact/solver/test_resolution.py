@@ -14,15 +14,13 @@ from warpimpact.scene import (
     Scene,
 )
 from warpimpact.solver import materials
-from warpimpact.solver.materials import onset_jump
+from warpimpact.solver.materials import FASTEST_DECAY, decay_rate, onset_jump
 from warpimpact.solver.resolution import (
-    FASTEST_DECAY,
     LADDER,
     NODAL,
     SLENDER,
     WEAKENING,
     Resolution,
-    decay_rate,
     resolve,
 )
 
