@@ -1,7 +1,9 @@
 """The exposure T [s] that each node of a window remembers, and how a contact spreads it (docs/model.md §4): over the
 degradation length in the plane of the plate, by the tent filter, and over the degradation depth through its thickness.
 
-A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth.
+A window has one plane of nodes for the whole thickness, or several where a plate is thicker than the depth. Where shots
+have thicknesses of their own, a window of several planes serves both: a shot at a plate that is no thicker than the
+depth uses the first.
 
 Long because all that is spread goes over the same strips of a window.
 """
@@ -344,6 +346,44 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func
+    def spread_in_one(plate: Plate, fields: Fields, strip: Strip):
+        """`spread` for the whole thickness at once."""
+        filter_plane(plate, fields, strip, 0)
+        add_scaled(fields.exposure, fields.gain, strip.start, strip.rows, strip.count, strip.stride, half)
+
+    @wp.func
+    def spread_through(plate: Plate, fields: Fields, window: Window, box: Box, strip: Strip):
+        """`spread` over several planes."""
+        for plane in range(box.plane_low, box.plane_high + 1):
+            filter_plane(plate, fields, strip, plane * window.nodes)
+        add_half_of_planes(
+            fields.exposure,
+            fields.filtered,
+            fields.gain,
+            strip.start,
+            strip.rows,
+            strip.count,
+            strip.stride,
+            window.nodes,
+            window.planes,
+            box.plane_low,
+            box.plane_high,
+            plate.plane_reach,
+        )
+
+    @wp.func
+    def settle_through(plate: Plate, fields: Fields, window: Window, box: Box, strip: Strip):
+        """`settle` over several planes."""
+        first = wp.max(box.plane_low - plate.plane_reach - 1, 1)
+        last = wp.min(box.plane_high + plate.plane_reach + 1, window.planes - 2)
+        for plane in range(first, last + 1):
+            start = strip.start + plane * window.nodes
+            add_scaled(fields.exposure, fields.filtered, start, strip.rows, strip.count, strip.stride, one)
+        for plane in range(box.plane_low, box.plane_high + 1):
+            start = strip.start + plane * window.nodes
+            clear_strip(fields.gain, start, strip.rows, strip.count, strip.stride)
+
+    @wp.func
     def spread(plate: Plate, fields: Fields, window: Window, box: Box):
         """Spread the gained exposure by the tent K of the law and over the degradation depth, and add half of it to the
         exposure. The sum is the exposure at mid-step.
@@ -353,39 +393,22 @@ def build(variant: Variant) -> SimpleNamespace:
         """
         strip = strip_of(plate, window, box)
         if wp.static(variant.deep):
-            for plane in range(box.plane_low, box.plane_high + 1):
-                filter_plane(plate, fields, strip, plane * window.nodes)
-            add_half_of_planes(
-                fields.exposure,
-                fields.filtered,
-                fields.gain,
-                strip.start,
-                strip.rows,
-                strip.count,
-                strip.stride,
-                window.nodes,
-                window.planes,
-                box.plane_low,
-                box.plane_high,
-                plate.plane_reach,
-            )
+            if window.planes > 1:
+                spread_through(plate, fields, window, box, strip)
+            else:
+                spread_in_one(plate, fields, strip)
         else:
-            filter_plane(plate, fields, strip, 0)
-            add_scaled(fields.exposure, fields.gain, strip.start, strip.rows, strip.count, strip.stride, half)
+            spread_in_one(plate, fields, strip)
 
     @wp.func
     def settle(plate: Plate, fields: Fields, window: Window, box: Box):
         """Add the other half of the gained exposure and clear it for the next step."""
         strip = strip_of(plate, window, box)
         if wp.static(variant.deep):
-            first = wp.max(box.plane_low - plate.plane_reach - 1, 1)
-            last = wp.min(box.plane_high + plate.plane_reach + 1, window.planes - 2)
-            for plane in range(first, last + 1):
-                start = strip.start + plane * window.nodes
-                add_scaled(fields.exposure, fields.filtered, start, strip.rows, strip.count, strip.stride, one)
-            for plane in range(box.plane_low, box.plane_high + 1):
-                start = strip.start + plane * window.nodes
-                clear_strip(fields.gain, start, strip.rows, strip.count, strip.stride)
+            if window.planes > 1:
+                settle_through(plate, fields, window, box, strip)
+            else:
+                take_scaled(fields.exposure, fields.gain, strip.start, strip.rows, strip.count, strip.stride, half)
         else:
             take_scaled(fields.exposure, fields.gain, strip.start, strip.rows, strip.count, strip.stride, half)
 

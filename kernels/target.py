@@ -32,7 +32,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         or one per shot: shape [layers, 1] or [layers, shots]. Those layers that a step can touch add their
         `onset_jump`, up to `most_jump`, as if they were one plate. `weakens` says whether the layer keeps a field.
         Layers that touch each other and remember alike are one laminate: a contact in one weakens the others, and they
-        share a field. `laminate` is the number of the first of them.
+        share a field. `laminate` is the number of the first of them. `deep` is 1 where the laminate is thicker than the
+        depth over which it weakens together, else 0.
         `standoffs` are distances behind the rear face of every layer [m], which the point `ahead` of the centre of mass
         passes [m].
         """
@@ -47,6 +48,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         ahead: real
         front: wp.array2d(dtype=wp.float64)
         thickness: wp.array2d(dtype=wp.float64)
+        deep: wp.array2d(dtype=wp.float64)
         offset_y: wp.array2d(dtype=wp.float64)
         offset_z: wp.array2d(dtype=wp.float64)
         a0: wp.array2d(dtype=real)
@@ -121,8 +123,12 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         window = open_blank(plate, real(own_of(target.thickness, layer, shot)), fields, layer, y, z)
         window.weakens = target.weakens[layer]
         if wp.static(variant.deep):
-            within = own_of(target.front, layer, shot) - own_of(target.front, target.laminate[layer], shot)
-            window.behind = real(within) + one / plate.per_plane  # a plane to spare
+            if own_of(target.deep, layer, shot) > wp.float64(0.0):
+                within = own_of(target.front, layer, shot) - own_of(target.front, target.laminate[layer], shot)
+                window.behind = real(within) + one / plate.per_plane  # a plane to spare
+            else:  # it weakens as a whole: all is remembered on the first plane
+                window.planes = 1
+                window.per_plane = real(0.0)
         if wp.static(variant.burst):
             if window.weakens:
                 use.earlier.recall(earlier, fields, plate, window, slot, layer, shot, y, z)

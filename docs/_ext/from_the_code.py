@@ -242,6 +242,7 @@ class VariableReference(FromTheCode):
         groups = {
             "Coordinates": variables.COORDINATES,
             "Impact": variables.SHOT_VARIABLES,
+            "Hit point": variables.OF_THE_HIT_POINT,
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
             "With bursts": variables.BURST_VARIABLES,
             **{group.title: (*group, *group.beside) for group in RECORDS},

@@ -22,7 +22,7 @@ from warpimpact import Campaign, Numerics, Shots
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.history import History
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import trace
+from warpimpact.solver.replay import trace
 
 LOOK = 30
 # Closing speed from what its ring and its azimuth share, 5; depth, 2; extents along the meridian, around and by motion,

@@ -8,10 +8,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
-from warpimpact.solver import inputs
-from warpimpact.solver.prepare import Grid, half_taps
+from warpimpact.solver import memory
+from warpimpact.solver.grid import Grid, Tile, half_taps
 from warpimpact.solver.rings import azimuths_of, rings_of
-from warpimpact.solver.tile import Tile
 
 
 def records(struct: Any, device: str, **columns: Any) -> wp.array:
@@ -57,8 +56,8 @@ def astride(count: int) -> dict[str, NDArray[np.float64]]:
 
 def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
     """The Surface of a core in `axial` × `around` patches and its discs."""
-    put = inputs.Put(device, wp.float64)
-    return inputs.surface_of(struct, core, rings_of(core, axial, around), azimuths_of(around), put)
+    put = memory.Put(device, wp.float64)
+    return memory.surface_of(struct, core, rings_of(core, axial, around), azimuths_of(around), put)
 
 
 def plate_of(
@@ -81,7 +80,7 @@ def plate_of(
         spacing=spacing,
         taps=half_taps(length, spacing),
     )
-    return inputs.plate_of(struct, grid, inputs.Put(device, real))
+    return memory.plate_of(struct, grid, memory.Put(device, real))
 
 
 def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str, *, real: Any = wp.float64) -> Any:

@@ -9,8 +9,7 @@ import warp as wp
 from warpimpact.kernels import bending, contact, core_surface, footprint, rigid_body
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ProfileCore
-from warpimpact.solver.bending import sections_of
-from warpimpact.solver.rings import rings_of
+from warpimpact.solver.rings import rings_of, sections_of
 
 from .probes import poisoned_touches, surface_of
 

@@ -39,7 +39,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.solver import blocks, inputs, simulate
+from warpimpact.solver import grid, memory, replay, simulate
 from warpimpact.solver.rings import azimuths_of, rings_of
 
 from .probes import astride, plate_of, poisoned, poisoned_fields
@@ -140,7 +140,7 @@ def test_order_of_the_lanes_changes_no_outcome(order: str, in_blocks: pytest.Mon
     scene, shots = scene_of("slots", 12)
     first = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     in_blocks.setattr(lanes, "LANE", ORDERS[order])
-    in_blocks.setattr(blocks, "SIZES", (2080 + 32 * list(ORDERS).index(order),))  # so that kernels are built anew
+    in_blocks.setattr(grid, "SIZES", (2080 + 32 * list(ORDERS).index(order),))  # so that kernels are built anew
     assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)
 
 
@@ -148,7 +148,7 @@ def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None
     scene, shots = scene_of("slots", 12)
     simple = simulate.simulate(scene, shots, numerics=SIMPLE, device="cpu")
     in_blocks.setattr(lanes, "WAIT", "")
-    in_blocks.setattr(blocks, "SIZES", (2144,))
+    in_blocks.setattr(grid, "SIZES", (2144,))
     without = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     with pytest.raises(AssertionError):
         assert_same(without, simple)
@@ -157,7 +157,7 @@ def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None
 @pytest.mark.parametrize(("impact", "plate"), [(OBLIQUE, SLOTTED), ({"pitch": 0.6, "velocity": 300.0}, SLOTTED)])
 def test_energy_never_grows_in_a_block(impact: dict[str, float], plate: Plate) -> None:
     shots, body = shots_of(6, **impact), CORE.mass_properties
-    for rows in simulate.trace(Scene(core=CORE, target=plate), shots, numerics=BLOCK):
+    for rows in replay.trace(Scene(core=CORE, target=plate), shots, numerics=BLOCK):
         axis, velocity, momentum = (
             Rotation.from_quat(rows[:, 4:8]).apply([1.0, 0.0, 0.0]),
             rows[:, 8:11],
@@ -222,9 +222,9 @@ def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
     """Loads of random poses, and the exposure of their plates."""
     kernel, *structs = probe_of(variant)
     Surface, Plate_, Fields, Law, Load, Touches = structs
-    put = inputs.Put("cpu", variant.real)
+    put = memory.Put("cpu", variant.real)
     around = 36  # so that a round of the lanes spans two rings
-    surface = inputs.surface_of(Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)
+    surface = memory.surface_of(Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)
     plate = plate_of(Plate_, np.ones((1, 1)), np.array([CELL, CELL]), CELL, "cpu", real=variant.real)
     law = Law()
     law.a0, law.friction, law.onset, law.decay_rate = 2.6e9, 0.05, 2.0, np.log(0.8) / 1e-6

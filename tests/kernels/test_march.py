@@ -22,7 +22,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.solver import marching, prepare, simulate
+from warpimpact.solver import marching, prepare, replay, simulate
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def slanted_shots(count: int = 40) -> Shots:
 def launched(core: Core, shots: Shots) -> dict[str, Array]:
     """How shots start: first rows of their traces through a plate without resistance, drifted back."""
     numerics = Numerics(level=0, precision="double", time_step=1e-6)
-    histories = simulate.trace(Scene(core=core, target=WEIGHTLESS), shots, numerics=numerics)
+    histories = replay.trace(Scene(core=core, target=WEIGHTLESS), shots, numerics=numerics)
     first = np.array([history[0] for history in histories])
     assert (first[:, 0] == 0.5e-6).all()
     return {
@@ -204,7 +204,7 @@ def test_shot_computes_the_same_bits_in_any_window_and_company(device: str) -> N
 def test_trace_adds_up_to_the_motion() -> None:
     # Mean force and moment of every step times its duration are the change of the momenta.
     shots = shots_of(hit_y=5.0e-3, hit_z=2.0e-3, velocity=800.0, pitch=0.05)
-    (history,) = simulate.trace(at(HOLES), shots, numerics=Numerics(level=0, precision="double"))
+    (history,) = replay.trace(at(HOLES), shots, numerics=Numerics(level=0, precision="double"))
     mass, dt = PAPER.mass_properties.mass, history[1, 0] - history[0, 0]
     assert np.abs(history[:, 14:17]).max() > 1e3
     np.testing.assert_allclose(dt * history[1:, 14:17], mass * np.diff(history[:, 8:11], axis=0), atol=1e-12)

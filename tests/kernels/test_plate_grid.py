@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from warpimpact.kernels import exposure, plate_grid
 from warpimpact.kernels.variant import Variant
-from warpimpact.solver.tile import tent_taps
+from warpimpact.solver.grid import tent_taps
 
 from .probes import plate_of, poisoned, poisoned_fields
 

@@ -36,7 +36,7 @@ from warpimpact.scene import (
 )
 from warpimpact.scene.core import MassProperties
 from warpimpact.solver.history import History
-from warpimpact.solver.simulate import traced
+from warpimpact.solver.replay import traced, traces_of
 
 from .scenes import shots_at
 
@@ -137,7 +137,7 @@ def found(extreme: Extreme) -> Found:
     scene, shots, precision = extreme
     numerics = Numerics(level=0, precision=precision)
     march, contact = traced(scene, shots, numerics)
-    report, traces = Outcomes.collected(scene, shots, march.report(contact)), march.traces(contact)
+    report, traces = Outcomes.collected(scene, shots, march.memory.report(contact)), traces_of(march.memory, contact)
     statuses = [Status(int(code)) for code in report.status]
     properties = scene.core.mass_properties
     rises, steep, gains, stretches = [0.0], [0.0], [0.0], [0.0]
@@ -155,7 +155,7 @@ def found(extreme: Extreme) -> Found:
             gains.append(energy.max() - 1.0)
             stretches.append(np.abs(np.linalg.norm(history.attitude, axis=1) - 1.0).max() / epsilon)
     return Found(
-        variant=march.variant.name,
+        variant=march.memory.variant.name,
         statuses=statuses,
         steps=sum(map(len, traces)),
         rise=float(np.max(rises)),

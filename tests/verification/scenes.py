@@ -19,6 +19,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
+from warpimpact.solver import replay
 from warpimpact.solver import simulate as simulation
 
 from . import references
@@ -128,9 +129,9 @@ class History:
 def histories(
     plate: Plate, shots: Shots, *, core: Core = PAPER_CORE, interaction: Interaction = STATIC, **numerics: Any
 ) -> list[History]:
-    """`warpimpact.solver.simulate.trace` with named columns."""
+    """`warpimpact.solver.replay.trace` with named columns."""
     scene = Scene(core=core, target=plate, interaction=interaction)
-    traced = simulation.trace(scene, shots, numerics=Numerics(**{"level": 2} | numerics))
+    traced = replay.trace(scene, shots, numerics=Numerics(**{"level": 2} | numerics))
     return [_history(core, rows.astype(float)) for rows in traced]
 
 

@@ -10,8 +10,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Core, Layer, Numerics, Plate, Record, Scene, Shots, Target
 from warpimpact.solver import prepare
 from warpimpact.solver import simulate as simulation
-from warpimpact.solver.bending import Sections, sections_of
-from warpimpact.solver.rings import Rings
+from warpimpact.solver.rings import Rings, Sections, sections_of
 
 from .scenes import PAPER_CORE, REFERENCE, paper_plate, scattered_hits, shots_at, solid_plate
 

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Shots, Target
-from warpimpact.solver import blocks, marching
+from warpimpact.solver import grid, marching, replay
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.marching import March
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 
 from . import references
@@ -133,11 +134,12 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
     # a solid plate once, each at its own speed.
     shots = burst(shots_at([0.0, offset], [0.0, 0.6 * offset]), 2)
     prepared = prepare(scene_of(solid_plate()), shots, Numerics(precision="double", patches_axial=23))
-    march = March(prepared, wp.get_device("cpu"))
-    scratch = march._scratch(1, *march.cells)
-    order, outcomes = march.inputs.put(np.arange(2), wp.int32), march._empty(march.stage.Outcomes, (2,))
-    march._launch(order, outcomes, scratch, 1, 0, 2)
-    added = scratch[3].exposure.numpy().reshape(2, *march.cells)
+    memory = Memory(prepared, wp.get_device("cpu"))
+    cells = March(memory, 1).cells
+    scratch = memory.scratch(1, cells)
+    order, outcomes = memory.put(np.arange(2), wp.int32), memory.outcomes()
+    memory.launch(order, outcomes, scratch, 1, 0, 2)
+    added = scratch[3].exposure.numpy().reshape(2, *cells)
     assert (added >= 0.0).all()
     assert scratch[0].exposure.numpy().sum() == pytest.approx(added.sum(), rel=1e-12)
     assert added[1].sum() == pytest.approx(added[0].sum(), rel=0.1)
@@ -169,20 +171,21 @@ def test_any_split_into_whole_bursts(behind: Any, samples: int, device: str) -> 
 def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
     shots = near_bursts()
     prepared = prepare(scene_of(paper_plate(), behind), shots, Numerics(level=0))
-    march = March(prepared, wp.get_device("cpu"))
-    outcomes = march._empty(march.stage.Outcomes, (len(shots),))
-    order = march.inputs.put(marching.in_turns(np.arange(len(shots)), COUNT, slots), wp.int32)
-    scratch = march._scratch(slots, *march.cells)
+    memory = Memory(prepared, wp.get_device("cpu"))
+    cells = March(memory, 1).cells
+    outcomes = memory.outcomes()
+    order = memory.put(marching.in_turns(np.arange(len(shots)), COUNT, slots), wp.int32)
+    scratch = memory.scratch(slots, cells)
     for first, number in marching.turns(len(shots), COUNT, slots):
-        march._launch(order, outcomes, scratch, slots, first, number)
-    got = Outcomes.collected(march.scene, shots, march.report(outcomes))
+        memory.launch(order, outcomes, scratch, slots, first, number)
+    got = Outcomes.collected(prepared.scene, shots, memory.report(outcomes))
     assert_identical(got, simulate(paper_plate(), shots, behind))
 
 
 def test_a_shot_that_leaves_its_window_is_repeated_with_its_burst(monkeypatch: pytest.MonkeyPatch) -> None:
     shots = near_bursts()
     expected = simulate(paper_plate(), shots)
-    monkeypatch.setattr(blocks, "WINDOW_SLACK", 0.9)
+    monkeypatch.setattr(grid, "WINDOW_SLACK", 0.9)
     repeated, march_some = [], March._march_some
 
     def counted(self: March, pending: Any, *rest: Any) -> None:
@@ -205,7 +208,7 @@ def test_every_shot_of_a_failed_burst_behind_the_failure_fails() -> None:
 def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
     shots, numerics = near_bursts(), Numerics(level=0)
     at = 5 * COUNT + order
-    again = simulation.replay(scene_of(solid_plate(), behind), shots[5 * COUNT : at + 1], numerics=numerics)
+    again = replay.replay(scene_of(solid_plate(), behind), shots[5 * COUNT : at + 1], numerics=numerics)
     for name, values in vars(simulate(solid_plate(), shots, behind)).items():
         np.testing.assert_array_equal(getattr(again.outcomes, name)[0], values[at], err_msg=name)
     found = again.resistance_share[0]

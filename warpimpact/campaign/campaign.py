@@ -52,6 +52,8 @@ _FARTHEST = 100.0
 """Of hits from the origin [m]."""
 _MOST_LENGTHS = 1000
 """Degradation lengths in the radius of a core: its surface has patches of about that length."""
+_MOST_DEPTHS = 100
+"""Degradation depths in a thickness at most: each has its planes of every window in memory."""
 
 
 class Output(Record):
@@ -264,7 +266,6 @@ class Campaign(Model):
                 asked.DOUBLE: numerics.precision == "double",
             }
         )
-        self.output.check_bending(self.core)
         return self
 
     @model_validator(mode="after")
@@ -326,10 +327,16 @@ class Campaign(Model):
                     f"got {name}.degradation_length = {plate.degradation_length:g} m, but a core of radius {radius:g} "
                     f"m needs at least 1/{_MOST_LENGTHS} of its radius, {radius / _MOST_LENGTHS:.4g} m"
                 )
+            if plate.thickness > _MOST_DEPTHS * plate.degradation_depth and plate.degradation < 1.0:
+                raise ValueError(
+                    f"got {name}.degradation_depth = {plate.degradation_depth:g} m, but it must be at least "
+                    f"1/{_MOST_DEPTHS} of the thickness, {plate.thickness / _MOST_DEPTHS:.4g} m"
+                )
         return self
 
     @model_validator(mode="after")
-    def _standoffs_clear_of_plate(self) -> Self:
+    def _output_is_possible(self) -> Self:
+        self.output.check_bending(self.core)
         self.output.check_standoffs(self.core, self.target)
         return self
 

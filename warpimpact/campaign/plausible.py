@@ -20,6 +20,7 @@ _OF_A_PLATE = (
     "shear_coefficient",
     "degradation_interval",
     "degradation_length",
+    "degradation_depth",
     "density",
 )
 

@@ -77,7 +77,7 @@ def _says_something(name: str, value: Any) -> bool:
 
 def _complete(definition: Schema, model: type[BaseModel]) -> None:
     """Add what the model knows of its keys beyond their types."""
-    properties, (summary, meanings) = definition["properties"], described(model)
+    properties, (summary, meanings) = definition["properties"], read_docstring(model)
     definition["description"] = summary
     for name, text in meanings.items():
         if name in properties:
@@ -96,7 +96,7 @@ def _in_a_file(text: str) -> str:
     return re.sub(r"\bNone\b", "not given", re.sub(r"(?:^| )\[[^]]*\]", "", text)).strip(" .") + "."
 
 
-def described(model: type) -> tuple[str, dict[str, str]]:
+def read_docstring(model: type) -> tuple[str, dict[str, str]]:
     """What the docstring of a model says: its first paragraphs, and the meanings of its keys."""
     meanings: dict[str, str] = {}
     for kind in reversed(model.__mro__):

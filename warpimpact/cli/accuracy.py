@@ -15,8 +15,8 @@ def add_study(commands: Commands) -> None:
         "study",
         _study,
         summary="measure error and speed of the numerics on a campaign",
-        description="Measure error and speed of the numerics, coarse to fine, against a converged answer. Write one "
-        "netCDF file and a figure beside it. This takes minutes.",
+        description="Measure error and speed of the numerics, coarse to fine, against a converged answer. Write a "
+        "netCDF file and a figure of the same name. This takes minutes.",
         example="study campaigns/slotted_plate.toml --hits 128",
     )
     add_campaign(parser)
@@ -60,7 +60,7 @@ def add_validate(commands: Commands) -> None:
         "validate",
         _validate,
         summary="compute the published shots and compare",
-        description="Compute the paper's two shots. Print them beside the paper's model, its experiment and LS-DYNA.",
+        description="Compute the paper's two shots. Compare them with the paper's model, its experiment and LS-DYNA.",
         example="validate",
     )
     parser.add_argument(
@@ -68,7 +68,7 @@ def add_validate(commands: Commands) -> None:
         type=Path,
         nargs="?",
         metavar="CAMPAIGN.toml",
-        help="the paper's scene with two hits; lattice and numerics may differ (default: the bundled one)",
+        help="the paper's scene with two hits; lattice and numerics may differ (default: the example paper_shots)",
     )
     add_device(parser)
 

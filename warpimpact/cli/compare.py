@@ -21,9 +21,9 @@ def add_compare(commands: Commands) -> None:
         _compare,
         summary="compare plates: which protects better",
         description="Compare plates under the same shots: rankings, differences with their intervals, and a figure. Of "
-        "targets with layers, and of limits, a second figure, FIGURE_weight.png, shows them against their weight. If "
-        "you give a campaign with several plates, it is run first, each plate into NAME.nc beside the figure. A plate "
-        "whose result exists already is not run again.",
+        "targets with layers, and of limits, a second figure, FIGURE_weight.png, shows them against their weight. A "
+        "campaign with several plates is run first: each plate gives NAME.nc in the folder of the figure. A plate "
+        "whose result exists is not run again.",
         example="compare campaigns/two_plates.toml, or: warpimpact compare slotted.nc round.nc",
     )
     parser.add_argument(

@@ -26,7 +26,7 @@ def add_export(commands: Commands) -> None:
     add_output(
         parser,
         "RESULT.csv|FOLDER",
-        "CSV file, or new folder for VTK (default: beside the file, its name with .csv or _vtk)",
+        "CSV file, or new folder for VTK (default: the name of the file with .csv or _vtk, in its folder)",
     )
     add_overwrite(parser, "an existing CSV file")
 
@@ -70,13 +70,13 @@ def add_report(commands: Commands) -> None:
         example="report slotted.nc -o slotted.html",
     )
     add_results(parser)
-    add_output(parser, "REPORT.html", "report file (default: beside the first result, its name with .html)")
+    add_output(parser, "REPORT.html", "report file (default: the name of the first result with .html, in its folder)")
     parser.add_argument(
         "--trajectories",
         type=at_least(0),
         default=32,
         metavar="N",
-        help="number of hits to replay per result: the worst, and others spread evenly (default: 32)",
+        help="number of hits to replay per result: the worst hits, and others spread evenly (default: 32)",
     )
     parser.add_argument("--study", type=Path, metavar="STUDY.nc", help="accuracy to show, written by warpimpact study")
     add_campaign_folder(parser, "folder of the files that the campaigns name (default: the folder of each result)")

@@ -22,9 +22,9 @@ def add_identify(commands: Commands) -> None:
         "identify",
         _identify,
         summary="find parameters with their uncertainty from measured shots",
-        description="Find the parameters of plate, interaction and core that measured shots allow, each with its "
-        "uncertainty. Hit points that are not known are integrated out. Write the posterior as one netCDF file, which "
-        "ArviZ reads, and figures beside it. Print what the shots determine, and whether the computation has "
+        description="Find the parameters of plate, interaction and core that agree with measured shots, each with its "
+        "uncertainty. Unknown hit points are integrated out. Write the posterior as a netCDF file, which ArviZ reads, "
+        "and figures into the same folder. Print which parameters the shots determine, and whether the computation has "
         "converged.",
         example="identify campaigns/fits/paper_fit.toml -o paper_fit.nc",
     )

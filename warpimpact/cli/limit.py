@@ -28,9 +28,9 @@ def add_limit(commands: Commands) -> None:
         _limit,
         summary="find the limit velocity of every hit of a campaign, V50 and V05",
         description="Find for every hit the impact velocity at which the core just perforates, with at most 14 runs of "
-        "a hit. Write one netCDF file and a figure: the map of the limits, and the share of the hits that perforate "
-        "against velocity, with V50 and V05. The solid plate that is as heavy as the whole target is searched, too, "
-        "mostly with one hit. The plate must not weaken by time: give degradation_distance.",
+        "a hit. Write a netCDF file and a figure: the map of the limits, and the share of the hits that perforate "
+        "against velocity, with V50 and V05. Also find the limit of the solid plate that is as heavy as the whole "
+        "target. The plate must not weaken by time: give degradation_distance.",
         example="limit campaigns/limit_velocity.toml -o limit.nc",
     )
     add_campaign(parser)
@@ -46,7 +46,7 @@ def add_limit(commands: Commands) -> None:
         type=at_least(0),
         default=0,
         metavar="N",
-        help="whose thickness to find: 0 is the plate (default), 1 the first layer behind it",
+        help="layer whose thickness to find: 0 is the plate (default), 1 the first layer behind it",
     )
     parser.add_argument(
         "--tolerance",

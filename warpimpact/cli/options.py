@@ -61,7 +61,7 @@ def add_device(parser: argparse.ArgumentParser) -> None:
         "--device",
         default="auto",
         metavar="auto|cpu|cuda:0",
-        help="where to compute (default: auto, which takes a GPU if there is one); a run takes several: cuda:0,cuda:1",
+        help="where to compute (default: auto, which is a GPU if there is one); a run takes several: cuda:0,cuda:1",
     )
 
 
@@ -70,8 +70,8 @@ def add_posterior(parser: argparse.ArgumentParser) -> None:
         "--posterior",
         type=Path,
         metavar="POSTERIOR.nc",
-        help="draw the parameters of the material of every shot from this posterior, all of them together; written by "
-        "warpimpact identify",
+        help="file of warpimpact identify; every shot draws the parameters of the material from this posterior, all of "
+        "them together",
     )
 
 

@@ -13,15 +13,15 @@ def add_replay(commands: Commands) -> None:
         commands,
         "replay",
         _replay,
-        summary="compute one hit of a result again, with its history",
-        description="Compute one hit of a result again on the CPU. Write its history as netCDF and PNG files. If the "
-        "same CPU and version computed the result, the end is bit-identical to the stored outcome. If a GPU "
-        "computed it, both agree within rounding.",
+        summary="compute a hit of a result again, with its history",
+        description="Compute a hit of a result again on the CPU. Write its history as netCDF and PNG files. The end "
+        "has the bits of the stored outcome if the same kind of CPU and the same version computed the result. If a "
+        "GPU computed it, both agree within rounding.",
         example="replay slotted.nc --hit 34",
     )
     add_result(parser)
     parser.add_argument("--hit", type=int, required=True, metavar="N", help="number of the hit in the result, from 0")
-    add_output(parser, "HIT.nc", "history file (default: RESULT_hitN.nc beside the result)")
+    add_output(parser, "HIT.nc", "history file (default: RESULT_hitN.nc in the folder of the result)")
     add_campaign_folder(
         parser, "folder of the files that the campaign names, such as a hit list (default: the result's folder)"
     )

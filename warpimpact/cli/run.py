@@ -31,7 +31,7 @@ def add_run(commands: Commands) -> None:
         "run",
         _run,
         summary="compute the hit map of a campaign",
-        description="Compute every hit of a campaign and write one netCDF file.",
+        description="Compute every hit of a campaign and write a netCDF file.",
         example="run campaigns/slotted_plate.toml -o slotted.nc --count 512",
     )
     add_campaign(parser)

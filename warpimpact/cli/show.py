@@ -2,12 +2,17 @@
 
 import argparse
 import re
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from warpimpact.results import attributes as attr
 
 from .options import Commands, add_campaign, add_command, add_output, add_overwrite, add_result, add_results
 from .paths import check_folder, check_picture, named
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def add_inspect(commands: Commands) -> None:
@@ -25,7 +30,7 @@ def add_inspect(commands: Commands) -> None:
     parser.add_argument(
         "--discrepancy",
         action="store_true",
-        help="of a run with a posterior: count the discrepancy that the fit found in the intervals by parameters",
+        help="add the discrepancy of the fit to the intervals by parameters; for a result that draws from a posterior",
     )
 
 
@@ -43,24 +48,28 @@ def add_plot(commands: Commands) -> None:
         commands,
         "plot",
         _plot,
-        summary="draw maps of one result, or of several side by side",
+        summary="draw maps of a result, or of several results side by side",
         description="Draw the figures of a result as PNG files: maps, marginal distributions, residual velocity "
-        "against tilt, and what is uncertain where shots scatter or an error was estimated. For several results: maps "
-        "side by side with one colour scale.",
+        "against tilt, and maps of uncertainty where shots scatter or an error was estimated. For several results: "
+        "maps side by side with the same colour scale.",
         example="plot slotted.nc -o maps",
     )
     add_results(parser)
     add_output(parser, "FOLDER", "existing folder (default: the folder of the result)")
     add_overwrite(parser, "existing pictures")
-    parser.add_argument(
+    only = parser.add_mutually_exclusive_group()
+    only.add_argument(
         "--probability",
         metavar="QUANTITY",
         help='draw only the map of this probability, such as "P(tilt@130mm > 30 deg)"; takes one result',
     )
+    only.add_argument(
+        "--variable", metavar="NAME", help="draw only the map of this variable, such as edge_distance; takes one result"
+    )
 
 
 def _plot(arguments: argparse.Namespace) -> None:
-    from warpimpact.plotting import probability_map, save_beside, save_maps
+    from warpimpact.plotting import hit_map, probability_map, save_beside, save_maps
     from warpimpact.results import files
 
     datasets = {name: files.read(path) for name, path in named(arguments.results).items()}
@@ -68,14 +77,20 @@ def _plot(arguments: argparse.Namespace) -> None:
     check_folder(folder)
     stem = "_".join(path.stem for path in arguments.results)
     dataset, *others = datasets.values()
-    if arguments.probability is not None:
+    asked: dict[str, tuple[str | None, Callable[..., Figure]]] = {
+        "--probability": (arguments.probability, probability_map),
+        "--variable": (arguments.variable, hit_map),
+    }
+    for option, (quantity, draw) in asked.items():
+        if quantity is None:
+            continue
         if others:
-            raise files.ResultError(f"--probability: got {len(datasets)} results, but it draws the map of one")
+            raise files.ResultError(f"{option}: got {len(datasets)} results, but it draws the map of one")
         try:
-            figure = probability_map(dataset, arguments.probability)
+            figure = draw(dataset, quantity)
         except ValueError as error:
-            raise files.ResultError(f"--probability: {error}") from None
-        picture = folder / f"{stem}_{_file_name(arguments.probability)}.png"
+            raise files.ResultError(f"{option}: {error}") from None
+        picture = folder / f"{stem}_{_file_name(quantity)}.png"
         check_picture(picture, overwrite=arguments.overwrite)
         figure.savefig(picture, dpi=150)
         print(picture)

@@ -23,7 +23,7 @@ def add_examples(commands: Commands) -> None:
         _examples,
         summary="list the campaigns and fits that come with warpimpact",
         description="List the campaigns and fits that come with warpimpact, each with the question that it answers. "
-        "warpimpact new copies one.",
+        "warpimpact new NAME copies an example.",
         example="examples",
     )
 
@@ -42,11 +42,11 @@ def add_new(commands: Commands) -> None:
         "new",
         _new,
         summary="start a campaign of your own from an example",
-        description="Copy a campaign that comes with warpimpact, and the files that it names. Its schema "
-        f"is written beside it ({_SCHEMA}, {_FIT_SCHEMA}), so that an editor can complete and check the keys.",
+        description="Copy a campaign or a fit that comes with warpimpact, and the files that it names. Write its "
+        f"schema ({_SCHEMA} or {_FIT_SCHEMA}), so that an editor can complete and check the keys.",
         example="new slotted_plate -o my.toml",
     )
-    parser.add_argument("name", metavar="NAME", help="one of those that warpimpact examples lists")
+    parser.add_argument("name", metavar="NAME", help="name of an example; warpimpact examples lists them")
     add_output(parser, "CAMPAIGN.toml", "campaign file (default: NAME.toml in this folder)")
     add_overwrite(parser, "existing files")
 
@@ -106,7 +106,7 @@ def add_schema(commands: Commands) -> None:
         f"Better TOML, completes and checks a campaign whose first line is: #:schema {_SCHEMA}",
         example=f"schema -o {_SCHEMA}",
     )
-    parser.add_argument("--fit", action="store_true", help="the schema of the fits of warpimpact identify")
+    parser.add_argument("--fit", action="store_true", help="print the schema of fits, which warpimpact identify takes")
     add_output(parser, "SCHEMA.json", "file (default: printed)")
     add_overwrite(parser, "an existing file")
 
@@ -134,7 +134,7 @@ def add_completion(commands: Commands) -> None:
         commands,
         "completion",
         _completion,
-        summary="print the completion of commands for a shell",
+        summary="print a script that completes commands in a shell",
         description="Print a script that lets the Tab key complete commands, options and file names. Put it where your "
         'shell looks, or into a session: eval "$(warpimpact completion bash)"',
         example="completion bash > ~/.local/share/bash-completion/completions/warpimpact",

@@ -17,9 +17,9 @@ def add_sweep(commands: Commands) -> None:
         "sweep",
         _sweep,
         summary="run a campaign at every combination of some inputs",
-        description="Run a campaign with a table [sweep] at every combination of the values in it. Write one netCDF "
-        "file with a dimension for each input, and a figure beside it. The folder SWEEP_points holds the result of "
-        "every point, which the other commands take.",
+        description="Run a campaign with a table [sweep] at every combination of the values in it. Write a netCDF "
+        "file with a dimension for each input, and a figure of the same name. The folder SWEEP_points has the result "
+        "of every point, which the other commands take.",
         example="sweep campaigns/obliquity_sweep.toml -o sweep.nc",
     )
     add_campaign(parser)

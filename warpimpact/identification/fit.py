@@ -62,6 +62,11 @@ class MeasuredShot:
     status: str | None
 
     @property
+    def numbers(self) -> int:
+        """How many numbers were measured; how it ended counts as one."""
+        return len(self.observations) + (self.status is not None)
+
+    @property
     def content(self) -> tuple[Any, ...]:
         """All but the name: what two shots are compared by."""
         return self.hit, self.impact, self.scatter, repr(self.tables), self.observations, self.status
@@ -97,7 +102,7 @@ class Fit:
     @cached_property
     def observed(self) -> int:
         """How many numbers were measured."""
-        return sum(len(shot.observations) + (shot.status is not None) for shot in self.shots)
+        return sum(shot.numbers for shot in self.shots)
 
     def scene_of(self, shot: MeasuredShot, values: Mapping[Path, float] | None = None) -> Scene:
         """The scene of a shot at some values of the parameters, the medians elsewhere.

@@ -68,15 +68,12 @@ def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.D
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(2,)))
     which = resampled(sampled.weights.values, fit.sampling.draws, rng)
     own = rng.integers(KEPT, size=len(which))
-    hits = {
-        name: _of_shots(sampled, lambda one, axis=axis: one.fitted_hit[which, own, axis])
-        for axis, name in enumerate(files.HITS)
-    }
+    hits = np.stack([one.fitted_hit[which, own] for one in sampled.scores], axis=1)
     likelihood = np.stack([one.log_likelihood for one in sampled.scores], axis=-1)
     noise = np.sqrt(sum(one.noise[which] ** 2 for one in sampled.scores))
     groups: dict[str, xarray.Dataset] = {
         "posterior": _parameters(fit, sampled.points[which], "draw").assign(
-            {name: (("draw", "shot"), values, _place(name)) for name, values in hits.items()}
+            {name: (("draw", "shot"), hits[..., axis], _place(name)) for axis, name in enumerate(files.HITS)}
         ),
         "prior": _parameters(fit, rng.standard_normal((fit.sampling.draws, len(fit.parameters))), "draw"),
         "sample_stats": xarray.Dataset(
@@ -118,22 +115,13 @@ def _place(name: str) -> dict[str, str]:
     return {"units": "m", "long_name": {"hit_y": HIT_Y, "hit_z": HIT_Z}[name].long_name}
 
 
-def _of_shots(sampled: Sampled, of: Any) -> Array:
-    return np.stack([of(one) for one in sampled.scores], axis=-1)
-
-
-def _shown(parameter: Parameter, values: Array) -> Array:
-    return np.degrees(values) if parameter.unit == "rad" else values
-
-
 def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
     """Values of the parameters at standard normal numbers."""
-    return xarray.Dataset(
-        {
-            one.name: (dim, _shown(one, one.at(points[:, column])), _described(one))
-            for column, one in enumerate(fit.parameters)
-        }
-    )
+    columns = {}
+    for column, one in enumerate(fit.parameters):
+        values = one.at(points[:, column])
+        columns[one.name] = (dim, np.degrees(values) if one.unit == "rad" else values, _described(one))
+    return xarray.Dataset(columns)
 
 
 def _described(parameter: Parameter) -> dict[str, str]:
@@ -224,11 +212,11 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
         files.HIT_NOISE: hit_noise,
         files.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
         files.EVIDENCE: weights.log_evidence,
-        "wanted_sample_size": fit.sampling.effective,
+        files.WANTED: fit.sampling.effective,
         files.SETS: len(sampled.points) // sampled.block,
         "hits": fit.sampling.hits,
         "observations": fit.observed,
-        "row_probability": json.dumps(rows),
+        files.ROW_PROBABILITY: json.dumps(rows),
     }
 
 

@@ -234,7 +234,7 @@ def _doubts(shots: tuple[MeasuredShot, ...], parameters: list[Parameter]) -> lis
             doubts.append(
                 f'shots "{first}" and "{shot.name}" are the same in every number: they count twice, as two measurements'
             )
-    numbers = sum(len(shot.observations) + (shot.status is not None) for shot in shots)
+    numbers = sum(shot.numbers for shot in shots)
     if numbers < len(parameters):
         doubts.append(
             f"got {numbers} measured number{'s' if numbers > 1 else ''} against {len(parameters)} parameters: the "

@@ -54,7 +54,7 @@ def _rows(tree: xarray.DataTree) -> list[str]:
             for name in (files.FITTED, files.MEASURED)
         ]
         lines.append(f"{label!s:42}{f'{value:g} ± {std:g}':18}{spans[0]:22}{spans[1]:20}")
-    for shot, share in json.loads(str(tree.attrs["row_probability"])).items():
+    for shot, share in json.loads(str(tree.attrs[files.ROW_PROBABILITY])).items():
         lines.append(
             f"{shot}: {share:.2g} of the rows that another such shot would show are less probable than this one"
         )
@@ -88,7 +88,7 @@ def _worth(tree: xarray.DataTree) -> list[str]:
     ]
     if attributes[files.CONVERGED]:
         return lines
-    wanted = int(attributes["wanted_sample_size"])
+    wanted = int(attributes[files.WANTED])
     causes = [
         (effective < wanted, f"the effective sample size is below {wanted}: give more sets"),
         (k > LARGEST_K, f"Pareto k is above {LARGEST_K}: some sets carry too much weight; give more sets"),

@@ -35,4 +35,4 @@ BENDING_VARIABLES = Group(
     lambda scene, shots: scene.record.bending,
     _bent,
 )
-"""The stress is 4M/(πr³), where the core is thick enough (solver/bending.py)."""
+"""The stress is 4M/(πr³), where the core is thick enough (solver/rings.py)."""

@@ -104,7 +104,7 @@ def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
         at_standoff = v.STANDOFF in variable.dims
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoff else [None]:
             column = shown(dataset, variable, standoff)
-            if variable not in v.SHOT_VARIABLES or np.ptp(column.values) > 0.0:
+            if variable not in (*v.SHOT_VARIABLES, v.EDGE_DISTANCE) or np.ptp(column.values) > 0.0:
                 name = words(variable) + ("" if standoff is None else f" at {standoff * _MM:g} mm")
                 columns[name] = column._replace(label=f"{name} [{column.label.partition('[')[2]}")
     for variable in (name for name in v.LAYER_NUMBERS if name in dataset):

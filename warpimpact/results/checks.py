@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,19 +33,6 @@ _TOGETHER = (
 
 _OF_A_STUDY = (attr.TITLE, attr.HISTORY, attr.DEVICE)
 """Attributes of a study."""
-_DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
-_OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
-    "posterior": {"hit_y": _DRAWS + _SHOTS, "hit_z": _DRAWS + _SHOTS},
-    "best": {"misfit": _SHOTS, "hit_y": _SHOTS, "hit_z": _SHOTS},
-    "observed_data": {"measured": _OBSERVED, "std": _OBSERVED},
-    "posterior_predictive": {"measured": _DRAWS + _OBSERVED, "fitted": _DRAWS + _OBSERVED},
-}
-"""Numbers of a posterior beside its parameters, by group, and what they are along."""
-_OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
-_NUMBERS_OF_A_POSTERIOR = (
-    *("effective_sample_size", "pareto_k", "hit_noise", "converged", "wanted_sample_size", "computed_sets"),
-)
-
 _SLICE = 2**22
 """Hits that are looked at together."""
 
@@ -75,50 +62,6 @@ def history_fault(dataset: xarray.Dataset) -> str | None:
     if missing := [name for name in known if name not in dataset.variables]:
         return f'it has no variable "{missing[0]}"'
     return fault(dataset, known)
-
-
-def posterior_fault(groups: Mapping[str, xarray.Dataset], attributes: Mapping[Any, Any]) -> str | None:
-    """What keeps the groups of a posterior from being one, as a phrase; None if nothing does.
-
-    Args:
-        attributes: global attributes.
-    """
-    parameters = [str(name) for name in groups["prior"].data_vars]
-    wanted = [(group, name, dims) for name in parameters for group, dims in _OF_A_PARAMETER.items()]
-    wanted += [(group, name, dims) for group, names in _OF_A_POSTERIOR.items() for name, dims in names.items()]
-    if not groups["observed_data"].data_vars:  # of limits and of how shots ended alone
-        wanted = [one for one in wanted if _OBSERVED[0] not in one[2]]
-    for group, name, dims in wanted:
-        array = groups[group].variables.get(name)
-        if array is None or array.dims != dims or array.dtype.kind not in "iuf" or not array.size:
-            return f'its group "{group}" has no numbers "{name}" along {dims}'
-        if set(dims) & {*_SHOTS, *_OBSERVED} - groups[group].coords.keys():
-            return f'its group "{group}" does not name what "{name}" is along'
-    for name in _NUMBERS_OF_A_POSTERIOR:
-        if not isinstance(attributes.get(name), int | float | np.number):
-            return f'its attribute "{name}" is no number'
-    shares = _json(attributes.get("row_probability"))
-    if not isinstance(shares, dict) or not all(isinstance(one, int | float) for one in shares.values()):
-        return 'its attribute "row_probability" is not what it should be'
-    return draws_fault(groups["posterior"][parameters], attributes)
-
-
-def draws_fault(draws: xarray.Dataset, attributes: Mapping[Any, Any]) -> str | None:
-    """What keeps the draws of parameters from being drawn from, as a phrase; None if nothing does.
-
-    Args:
-        attributes: global attributes of the posterior.
-    """
-    for name, array in draws.data_vars.items():
-        if array.dims != _DRAWS or array.dtype.kind not in "iuf" or not array.size:
-            return f'its group "posterior" has no numbers "{name}" along {_DRAWS}'
-        if not isinstance(_json(array.attrs.get("path")), list):
-            return f'its parameter "{name}" has no path as it should'
-    material = _json(attributes.get("material"))
-    tables = material if isinstance(material, dict) else {}
-    if not all(isinstance(tables.get(one), dict) for one in ("plate", "interaction")):
-        return 'its attribute "material" is not what it should be'
-    return None
 
 
 def packing_fault(dataset: xarray.Dataset) -> str | None:
@@ -204,7 +147,7 @@ def _is_allowed(name: str, value: Any) -> bool:
         case "text":
             return isinstance(value, str)
         case "table":
-            return isinstance(value, str) and isinstance(_json(value), dict)
+            return isinstance(value, str) and isinstance(parsed_json(value), dict)
         case "pair":
             return np.shape(value) == (2,) and np.asarray(value).dtype.kind in "iuf"
         case "count":
@@ -213,7 +156,7 @@ def _is_allowed(name: str, value: Any) -> bool:
             return isinstance(value, int | float | np.number)
 
 
-def _json(text: Any) -> Any:
+def parsed_json(text: Any) -> Any:
     """What a text says as JSON; None if it is none."""
     try:
         return json.loads(text)

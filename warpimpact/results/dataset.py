@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from warpimpact.records.outcomes import Outcomes
     from warpimpact.results.table import AResult, Result
     from warpimpact.scene import Scene, Shots
-    from warpimpact.solver.simulate import Replay
+    from warpimpact.solver.replay import Replay
 
 
 _ATTRIBUTES = {
@@ -80,13 +80,14 @@ def to_table(
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     own = own_columns(scene.target, shots)
     values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    values[v.EDGE_DISTANCE] = scene.target.layers[0].edge_distance(shots.hit_y, shots.hit_z)
     values |= vars(outcomes) | faces(scene.target)
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     variables = (name for name in v.hit_variables() if name in values)
     return Table.of(
-        described(variables, values, () if double else v.computed_variables()),
-        described((name for name in along if name in coordinates), coordinates),
+        stored_columns(variables, values, () if double else v.computed_variables()),
+        stored_columns((name for name in along if name in coordinates), coordinates),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
@@ -105,13 +106,13 @@ def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, 
         double: as in `to_dataset`.
     """
     values: dict[str, Any] = {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
-    return described(v.SOLID_VARIABLES, values, () if double else v.SOLID_VARIABLES)
+    return stored_columns(v.SOLID_VARIABLES, values, () if double else v.SOLID_VARIABLES)
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:
     """A result whose hits have their numbers in the campaign, from `first` on."""
     numbers = np.arange(first, first + dataset.sizes["hit"], dtype=np.int32)
-    return dataset.assign_coords(described((v.HIT,), {v.HIT: numbers}))
+    return dataset.assign_coords(stored_columns((v.HIT,), {v.HIT: numbers}))
 
 
 def hit_numbers(dataset: Result) -> NDArray[np.int64]:
@@ -162,8 +163,8 @@ def study_dataset(values: Mapping[str, Any], attributes: Mapping[str, Any]) -> x
     import xarray
 
     return xarray.Dataset(
-        described(v.STUDY_VARIABLES, values),
-        described(v.STUDY_COORDINATES, values),
+        stored_columns(v.STUDY_VARIABLES, values),
+        stored_columns(v.STUDY_COORDINATES, values),
         _ATTRIBUTES | attr.with_units(attributes),
     )
 
@@ -209,17 +210,17 @@ def history_dataset(
     dataset = (
         hit.drop_dims("vertex", errors="ignore")
         .rename({v.ANGULAR_VELOCITY: v.RESIDUAL_ANGULAR_VELOCITY})
-        .assign_coords(described(v.HISTORY_COORDINATES, coordinates))
+        .assign_coords(stored_columns(v.HISTORY_COORDINATES, coordinates))
     )
     thickness = float(hit.get(v.THICKNESS, plate.thickness))
     layered = (*v.LAYER_FACES, *v.LAYER_SECTIONS) if len(scene.target.layers) > 1 else ()
     layered = (*layered, *(name for name in v.LAYER_FIELDS if name in behind))
-    return dataset.assign(described((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
+    return dataset.assign(stored_columns((*v.HISTORY_VARIABLES, *v.OUTLINE_VARIABLES, *layered), values)).assign_attrs(
         attr.with_units(dict(attributes) | {attr.PLATE_THICKNESS: thickness})
     )
 
 
-def described(
+def stored_columns(
     variables: Iterable[v.Variable], values: Mapping[str, Any], single: Collection[str] = ()
 ) -> dict[str, tuple[Any, ...]]:
     """Values in the units of the Dataset, with dimensions and attributes, as xarray takes them.

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from warpimpact.scene import Scene, Shots, Target
-    from warpimpact.solver.layering import Weakened
+    from warpimpact.solver.replay import Weakened
 
 
 def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:

@@ -9,7 +9,7 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import described, hit_numbers
+from warpimpact.results.dataset import hit_numbers, stored_columns
 
 if TYPE_CHECKING:
     import xarray
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def with_solid_limits(dataset: AResult, quantity: str, limits: Limits) -> AResult:
     """The Dataset with the limits of its first shots at the solid plate, as coordinates."""
     name = v.SOLID_LIMITS[quantity]
-    return dataset.assign_coords(described((name,), {name: limits.value}))
+    return dataset.assign_coords(stored_columns((name,), {name: limits.value}))
 
 
 def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
@@ -48,4 +48,4 @@ def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
         attr.LIMIT_DENSITY: dataset.attrs[attr.SOLID_LIMIT_DENSITY],
     }
     names = v.LIMITS[quantity].value, v.STATUS
-    return xarray.Dataset(described(names, dict(zip(names, (values, status), strict=True))), attrs=attributes)
+    return xarray.Dataset(stored_columns(names, dict(zip(names, (values, status), strict=True))), attrs=attributes)

@@ -28,7 +28,7 @@ _KINDS: dict[str, Any] = {
     quantity(kind).display.stored: kind for kind in (Speed, Angle, Energy, Time, Moment, Stress, Length, Number)
 }
 """Types of the quantities that have these units in the Dataset."""
-_VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in v.SHOT_VARIABLES}
+_VARIABLES = {str(one): one for one in v.HIT_NUMBERS if one not in (*v.SHOT_VARIABLES, v.EDGE_DISTANCE)}
 MEASURED = tuple(_VARIABLES)
 _SIGNED = {v.PITCH, v.YAW, v.BROKEN_X}
 """Those that may be negative."""

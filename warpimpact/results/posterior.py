@@ -11,13 +11,15 @@ best                      the set of smallest misfit
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import netCDF4
+import numpy as np
 
 from warpimpact.results import attributes as attr
-from warpimpact.results.checks import draws_fault, posterior_fault
+from warpimpact.results.checks import parsed_json
 from warpimpact.results.files import ResultError, aside
 from warpimpact.results.interrupts import uninterrupted
 
@@ -51,6 +53,20 @@ CONVERGED = "converged"
 HIT_NOISE = "hit_noise"
 EVIDENCE = "log_evidence"
 SETS = "computed_sets"
+WANTED = "wanted_sample_size"
+ROW_PROBABILITY = "row_probability"
+"""JSON: of every shot the share of rows of another such shot that are less probable than its own."""
+
+_DRAWS, _SHOTS, _OBSERVED = ("chain", "draw"), ("shot",), ("observation",)
+_OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
+    "posterior": {**dict.fromkeys(HITS, _DRAWS + _SHOTS)},
+    "best": {"misfit": _SHOTS, **dict.fromkeys(HITS, _SHOTS)},
+    "observed_data": {MEASURED: _OBSERVED, STD: _OBSERVED},
+    "posterior_predictive": {MEASURED: _DRAWS + _OBSERVED, FITTED: _DRAWS + _OBSERVED},
+}
+"""Numbers of a posterior beside its parameters, by group, and what they are along."""
+_OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
+_NUMBERS = (EFFECTIVE, PARETO_K, HIT_NOISE, CONVERGED, WANTED, SETS)
 
 
 def write(tree: xarray.DataTree, path: Path) -> None:
@@ -86,12 +102,56 @@ def read(path: Path, *, draws_alone: bool = False) -> xarray.DataTree:
         raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
     groups = {name: loaded[name].to_dataset() for name in GROUPS}
     if draws_alone:
-        found = draws_fault(groups["posterior"].drop_vars(HITS, errors="ignore"), loaded.attrs)
+        found = _draws_fault(groups["posterior"].drop_vars(HITS, errors="ignore"), loaded.attrs)
     else:
-        found = posterior_fault(groups, loaded.attrs)
+        found = _fault(groups, loaded.attrs)
     if found:
         raise ResultError(f"{path}: not a posterior of warpimpact identify, or damaged: {found}")
     return loaded
+
+
+def _fault(groups: Mapping[str, xarray.Dataset], attributes: Mapping[Any, Any]) -> str | None:
+    """What keeps the groups of a posterior from being one, as a phrase; None if nothing does.
+
+    Args:
+        attributes: global attributes.
+    """
+    parameters = [str(name) for name in groups["prior"].data_vars]
+    wanted = [(group, name, dims) for name in parameters for group, dims in _OF_A_PARAMETER.items()]
+    wanted += [(group, name, dims) for group, names in _OF_A_POSTERIOR.items() for name, dims in names.items()]
+    if not groups["observed_data"].data_vars:  # of limits and of how shots ended alone
+        wanted = [one for one in wanted if _OBSERVED[0] not in one[2]]
+    for group, name, dims in wanted:
+        array = groups[group].variables.get(name)
+        if array is None or array.dims != dims or array.dtype.kind not in "iuf" or not array.size:
+            return f'its group "{group}" has no numbers "{name}" along {dims}'
+        if set(dims) & {*_SHOTS, *_OBSERVED} - groups[group].coords.keys():
+            return f'its group "{group}" does not name what "{name}" is along'
+    for name in _NUMBERS:
+        if not isinstance(attributes.get(name), int | float | np.number):
+            return f'its attribute "{name}" is no number'
+    shares = parsed_json(attributes.get(ROW_PROBABILITY))
+    if not isinstance(shares, dict) or not all(isinstance(one, int | float) for one in shares.values()):
+        return f'its attribute "{ROW_PROBABILITY}" is not what it should be'
+    return _draws_fault(groups["posterior"][parameters], attributes)
+
+
+def _draws_fault(draws: xarray.Dataset, attributes: Mapping[Any, Any]) -> str | None:
+    """What keeps the draws of parameters from being drawn from, as a phrase; None if nothing does.
+
+    Args:
+        attributes: global attributes of the posterior.
+    """
+    for name, array in draws.data_vars.items():
+        if array.dims != _DRAWS or array.dtype.kind not in "iuf" or not array.size:
+            return f'its group "posterior" has no numbers "{name}" along {_DRAWS}'
+        if not isinstance(parsed_json(array.attrs.get(PATH)), list):
+            return f'its parameter "{name}" has no path as it should'
+    material = parsed_json(attributes.get(MATERIAL))
+    tables = material if isinstance(material, dict) else {}
+    if not all(isinstance(tables.get(one), dict) for one in ("plate", "interaction")):
+        return f'its attribute "{MATERIAL}" is not what it should be'
+    return None
 
 
 def _loaded(path: Path) -> xarray.DataTree:

@@ -51,6 +51,9 @@ LAYER_THICKNESS = LAYER_SCATTER[BY_LAYER.index("thickness")]
 SCATTER_VARIABLES = (*_OF_THE_SCENE, *LAYER_SCATTER)
 """Present only in a campaign in which they differ from shot to shot."""
 
+EDGE_DISTANCE = Variable("edge_distance", HITS, "m", "from the nearest edge of hole or plate; negative in a hole")
+OF_THE_HIT_POINT = (EDGE_DISTANCE,)
+
 POSTERIOR_DRAW = Variable("posterior_draw", HITS, "1", "place of the shot's parameters in the posterior")
 POSTERIOR_VARIABLES = (POSTERIOR_DRAW,)
 """Present only in a campaign with a posterior."""
@@ -97,7 +100,7 @@ hits spreads over the hits; outlines.py says what becomes of the outlines."""
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""
 _MEASURED = tuple(one for group in registry.RECORDS if group.measured for one in group)
-HIT_NUMBERS = tuple(v for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, *_MEASURED) if v.is_number_of_hit)
+HIT_NUMBERS = tuple(v for v in (*LIMIT_VARIABLES, *SHOT_VARIABLES, EDGE_DISTANCE, *_MEASURED) if v.is_number_of_hit)
 """Variables of shots and outcomes with one number per hit, or one per hit and stand-off."""
 
 # --- History of one hit ---
@@ -239,7 +242,7 @@ def hit_variables() -> tuple[Variable, ...]:
     """All that a map of hits may have beside its coordinates, in the order of a file."""
     always, *others = registry.RECORDS
     optional = (one for group in others for one in (*group, *group.beside))
-    return tuple(dict.fromkeys((*SHOT_VARIABLES, *always, *OPTIONAL_SHOT_VARIABLES, *optional)))
+    return tuple(dict.fromkeys((*SHOT_VARIABLES, EDGE_DISTANCE, *always, *OPTIONAL_SHOT_VARIABLES, *optional)))
 
 
 def whole_groups() -> list[tuple[Variable, ...]]:

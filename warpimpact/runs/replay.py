@@ -16,7 +16,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.results.layers import values_of
 from warpimpact.runs.describe import is_double
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver import simulate
+from warpimpact.solver import replay as solver
 from warpimpact.solver.limit import short_steps, with_thickness, with_velocity
 from warpimpact.solver.unfold import image_of
 
@@ -69,7 +69,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     computed, shot = images[: 1 + before], images[image + before :][:1]
     if campaign.drawn is not None:
         ((_, scene),) = campaign.drawn.scenes(scene, computed)
-    again = simulate.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
+    again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
     home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
     period, double = campaign.hits.covered(campaign.plate), is_double(campaign)

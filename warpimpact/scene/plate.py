@@ -99,6 +99,16 @@ class Plate(Model):
         half_y, half_z = (0.5 * side for side in self.size or (np.inf, np.inf))
         return (np.abs(y) <= half_y) & (np.abs(z) <= half_z) & ~self.pattern.is_hole(y, z)
 
+    def edge_distance(self, y: Array, z: Array) -> Array:
+        """Distance of points y, z [m] from the nearest edge, that of a hole or the rim of a finite plate, of their
+        broadcast shape: positive in material, negative in a hole and off the plate, NaN where there is no edge."""
+        of_holes = self.pattern.edge_distance(y, z)
+        if self.size is None:
+            return np.where(np.isinf(of_holes), np.nan, of_holes)
+        beyond_y, beyond_z = np.abs(y) - 0.5 * self.size[0], np.abs(z) - 0.5 * self.size[1]
+        off = np.hypot(np.maximum(beyond_y, 0.0), np.maximum(beyond_z, 0.0))
+        return np.where(off > 0.0, -off, np.minimum(of_holes, -np.maximum(beyond_y, beyond_z)))
+
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
         """`Pattern.has_edge`, where the rim of the plate is an edge, too."""
         near_y, near_z = (

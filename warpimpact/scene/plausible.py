@@ -63,6 +63,7 @@ USUAL = {
     "plate.shear_coefficient": Bounds(0.0, 1.0, ""),
     "plate.degradation_interval": Bounds(1e-9, 1e-3, "s", (("us", 1e-6), ("ns", 1e-9))),
     "plate.degradation_length": _length(0.01, 20.0),
+    "plate.degradation_depth": _length(0.1, 200.0),
     "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", (("g/cm^3", 1e3),)),
     "plate.pattern.cell": _length(0.5, 500.0),
     "layer.gap": _length(0.05, 3_000.0),

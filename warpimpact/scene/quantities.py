@@ -90,6 +90,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "degradation_interval": _of_material("plate", PositiveTime),
     "degradation_distance": _of_material("plate", PositiveLength),
     "degradation_length": _of_material("plate", PositiveLength),
+    "degradation_depth": _of_material("plate", PositiveLength),
     "density": Quantity("plate", PositiveDensity, scatters=False, listed=False),
     "static": _of_material("interaction", NonNegativeNumber),
     "linear": _of_material("interaction", NonNegativeNumber),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene.quantities import OF_THE_SCENE, QUANTITIES
-from warpimpact.solver.resolution import decay_rate
+from warpimpact.solver.materials import decay_rate
 
 if TYPE_CHECKING:
     from warpimpact.scene import Plate

@@ -1,22 +1,27 @@
-"""What each layer of a target resists with, shot by shot."""
+"""What each layer of a target resists with, shot by shot, and which layers weaken together (docs/model.md §4.8)."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.solver.resolution import decay_rate
-
 if TYPE_CHECKING:
-    from warpimpact.scene import Core, Scene, Shots
+    from warpimpact.scene import Core, Plate, Scene, Shots, Target
 
 Array = NDArray[np.float64]
 
 ONSET = 0.02
 """Onset speed of contact in units of what full contact of a wall as deep as the plate does in one step."""
+FASTEST_DECAY = 1.0e30
+"""Of the resistance [1/s]: β = 0 takes all of it at the first touch, a rate beyond any exposure, yet finite (0 × it
+is 0)."""
+ROUNDING = 1e-9
+"""Of a thickness in degradation depths, which may be a sum."""
 
 
 @dataclass(frozen=True)
@@ -26,17 +31,22 @@ class Materials:
     Attributes:
         front: its front face behind that of the target.
         thickness: of the layer.
+        together: thickness of its laminate.
+        deep: 1 where that is more than the degradation depth, so that it remembers how deep a contact was, else 0.
         offset_y, offset_z: place of its origin in the plane of the plate.
         a0, a1, friction, degradation, decay_rate: of the law (kernels/interaction.py).
         onset_jump: of the law if the core touches this layer alone; all the layers that it touches add theirs.
         most_jump: that of a layer of this material as thick as the core is long, which is the most that all can add.
         a2: likewise, one number.
         by_path: whether exposure counts the path of the core, not the time.
-        weakens: whether β is below 1 in any shot.
+        laminate: the first layer of those with which it shares the memory of contact.
+        weakens: whether it keeps such a memory.
     """
 
     front: Array
     thickness: Array
+    together: Array
+    deep: Array
     offset_y: Array
     offset_z: Array
     a0: Array
@@ -48,26 +58,66 @@ class Materials:
     most_jump: Array
     a2: float
     by_path: bool
+    laminate: int
     weakens: bool
 
 
 def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
     """Those of all layers of a scene, front to back."""
     target = scene.target
-    fronts = target.fronts([shots.own_of(target, "thickness", k) for k in range(len(target.layers))])
-    return [_material(scene, shots, k, front) for k, front in enumerate(fronts)]
+    weakening = weakens(target, shots)
+    thickness = [shots.own_of(target, "thickness", k) for k in range(len(target.layers))]
+    fronts, laminates = target.fronts(thickness), _laminates(target, weakening)
+    rears = {k: front + h for k, front, h in zip(laminates, fronts, thickness, strict=True)}  # those of the last layers
+    return [
+        _material(scene, shots, k, fronts[k], thickness[k], rears[first] - fronts[first], first, weakens)
+        for k, (first, weakens) in enumerate(zip(laminates, weakening, strict=True))
+    ]
 
 
-def _material(scene: Scene, shots: Shots, layer: int, front: Array) -> Materials:
+def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
+    """Whether each layer weakens; one that differs from shot to shot may."""
+    return [
+        layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
+        for k, layer in enumerate(target.layers)
+    ]
+
+
+def _laminates(target: Target, weakening: Sequence[bool]) -> list[int]:
+    """For every layer, the first one of its laminate: of layers that weaken, touch each other and remember alike. A
+    laminate of one material is the plate of its thickness."""
+    first = [0]
+    for k, (before, layer) in enumerate(pairwise(target.layers), start=1):
+        both = weakening[k - 1] and weakening[k] and target.gaps[k] == 0.0
+        first.append(first[-1] if both and _memory(before) == _memory(layer) else k)
+    return first
+
+
+def _memory(plate: Plate) -> tuple[float, float, bool]:
+    return plate.degradation_length, plate.degradation_depth, plate.degradation_distance is None
+
+
+def _material(
+    scene: Scene,
+    shots: Shots,
+    layer: int,
+    front: Array,
+    thickness: Array,
+    together: Array,
+    laminate: int,
+    weakens: bool,
+) -> Materials:
     core, plate, mass = scene.core, scene.target.layers[layer], shots.own("mass", scene.core.mass_properties.mass)
-    thickness, resistance, friction, degradation, offset_y, offset_z = (
+    resistance, friction, degradation, offset_y, offset_z = (
         shots.own_of(scene.target, name, layer)
-        for name in ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
+        for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
     )
     a0, a1, a2 = scene.interaction.coefficients(resistance, plate.density)
     return Materials(
         front=front,
         thickness=thickness,
+        together=together,
+        deep=np.asarray(weakens & (together > (1.0 + ROUNDING) * plate.degradation_depth), dtype=np.float64),
         offset_y=offset_y,
         offset_z=offset_z,
         a0=a0,
@@ -79,7 +129,8 @@ def _material(scene: Scene, shots: Shots, layer: int, front: Array) -> Materials
         most_jump=onset_jump(core, np.array([core.length]), mass, a0),
         a2=a2,
         by_path=plate.degradation_distance is not None,
-        weakens=bool((degradation < 1.0).any()),
+        laminate=laminate,
+        weakens=weakens,
     )
 
 
@@ -88,3 +139,9 @@ def onset_jump(core: Core, thickness: Array, mass: Array, static_stress: Array) 
     static stresses [Pa], of their shape; positive, also for a plate without resistance."""
     wall = 2.0 * core.max_radius * np.minimum(thickness, core.length)
     return np.maximum(ONSET * static_stress * wall / mass, 1.0)
+
+
+def decay_rate(degradation: Array, unit: float) -> Array:
+    """ln(β)/Δt_β [1/s], or ln(β)/Δs_β [1/m], for some β, of their shape."""
+    log = np.log(degradation, where=degradation > 0.0, out=np.full_like(degradation, -np.inf))
+    return np.maximum(log / unit, -FASTEST_DECAY)

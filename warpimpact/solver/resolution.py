@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import Core, Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene.quantities import BY_LAYER
+from warpimpact.solver.materials import Materials, decay_rate
 
 Array = NDArray[np.float64]
 
@@ -51,6 +53,16 @@ SLOWING = 0.25
 """Share of the core's energy that a step may take if the plate acts on the whole cross section of the core, per unit of
 `travel`: near the limit velocity a core would else lose most of its energy in one step. No step of the paper's shots is
 shortened by it."""
+
+SLOWEST_DECAY = 1.0e-30
+"""Below which nothing weakens [1/s]."""
+SMALLEST_STRESS = 1.0
+"""Below which nothing slows down [Pa]."""
+
+STEP_ALLOWANCE = 200
+"""How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+UNBREAKABLE = 1.0e30
+"""Strength of a core that has none [Pa], beyond any stress."""
 
 LADDER = (
     Level(14, 16, 1.0, 0.5),
@@ -128,11 +140,11 @@ class Resolution:
         return np.minimum(acting, self.slender)
 
     def longest_time(
-        self, degradation: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
+        self, decay: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
     ) -> Array:
-        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some β,
-        impact velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
-        longest = self.weakening / np.maximum(-decay_rate(degradation, plate.degradation_unit), SLOWEST_DECAY)
+        """Time [s] in which contact weakens a plate, and slows down a core, by as much as a step may, for some rates
+        of decay (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
+        longest = self.weakening / np.maximum(-decay, SLOWEST_DECAY)
         weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
         slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / np.maximum(static_stress, SMALLEST_STRESS)
         return np.asarray(np.minimum(weakened, slowed))
@@ -150,7 +162,8 @@ class Resolution:
     def step_of(self, impact: Impact, plate: Plate) -> float:
         """Time step [s] of a plate that stands alone, or where it scatters, of its means."""
         stress = self.static * plate.resistance
-        longest_time = self.longest_time(np.array(plate.degradation), plate, impact.velocity, self.mass, stress)
+        decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
+        longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
         passage = self.passage(plate.thickness, plate, weakens=plate.degradation < 1.0)
         return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time))
 
@@ -178,8 +191,6 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     }
     if nodal:
         defaults = NODAL
-        by_path = plate.degradation_distance is not None
-        asked.check_together({asked.NODAL: True, asked.LAYERS: len(scene.target.layers) > 1, asked.BY_PATH: by_path})
     given = {name: getattr(numerics, name) for name in defaults if getattr(numerics, name) is not None}
     travel = level.travel if numerics.travel is None else numerics.travel
     return Resolution(
@@ -198,24 +209,36 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
     )
 
 
-def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
-    """Whether each layer weakens; one that differs from shot to shot may."""
-    return [
-        layer.degradation < 1.0 or (shots is not None and shots.differs("degradation", k))
-        for k, layer in enumerate(target.layers)
-    ]
+def conditions_of(
+    core: Core, target: Target, shots: Shots, materials: Sequence[Materials], resolution: Resolution
+) -> dict[str, Array]:
+    """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
+
+    The layer that needs the shortest step sets the step.
+    """
+    body = core.mass_properties
+    mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
+    passage = _least(
+        resolution.passage(material.thickness, layer, weakens=material.weakens)
+        for material, layer in zip(materials, target.layers, strict=True)
+    )
+    times = (
+        resolution.longest_time(material.decay_rate, layer, shots.velocity, mass, material.a0)
+        for material, layer in zip(materials, target.layers, strict=True)
+    )
+    scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
+    gaps = sum(target.gaps)
+    return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
+        "mass": mass,
+        "inertia_axial": scale * body.inertia_axial,
+        "inertia_transverse": scale * body.inertia_transverse,
+        "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
+        "way": resolution.travel * passage,
+        "longest_time": _least(times),
+        "longest_step": passage,
+        "longest_way": STEP_ALLOWANCE * (depth - gaps + 2.0 * len(materials) * core.bounding_radius) + gaps,
+    }
 
 
-FASTEST_DECAY = 1.0e30
-"""Of the resistance [1/s]: β = 0 takes all of it at the first touch, a rate beyond any exposure, yet finite (0 × it
-is 0)."""
-SLOWEST_DECAY = 1.0e-30
-"""Below which nothing weakens [1/s]."""
-SMALLEST_STRESS = 1.0
-"""Below which nothing slows down [Pa]."""
-
-
-def decay_rate(degradation: Array, unit: float) -> Array:
-    """ln(β)/Δt_β [1/s], or ln(β)/Δs_β [1/m], for some β, of their shape."""
-    log = np.log(degradation, where=degradation > 0.0, out=np.full_like(degradation, -np.inf))
-    return np.maximum(log / unit, -FASTEST_DECAY)
+def _least(values: Iterable[Array]) -> Array:
+    return np.asarray(reduce(np.minimum, values))

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Symmetry
-from warpimpact.solver.layering import Weakened
-from warpimpact.solver.simulate import Replay
+from warpimpact.solver.replay import Replay, Weakened
 
 Array = NDArray[np.float64]
 

@@ -29,7 +29,8 @@ from warpimpact.results.dataset import study_dataset
 from warpimpact.scene import Hits, Numerics, Shots, make_shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.resolution import Level, Resolution, resolve, weakens
+from warpimpact.solver.materials import weakens
+from warpimpact.solver.resolution import Level, Resolution, resolve
 from warpimpact.solver.simulate import simulate
 
 Array = NDArray[np.float64]

@@ -17,7 +17,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plates import read_plates
 from warpimpact.kernels.status import Status
 from warpimpact.plotting import comparison_figure, weight_figure
-from warpimpact.results.dataset import described
+from warpimpact.results.dataset import stored_columns
 from warpimpact.results.files import ResultError
 from warpimpact.results.variables import LIMITS, STATUS
 from warpimpact.runs.task import Task
@@ -146,7 +146,7 @@ def limits(result: xarray.Dataset, thickness: np.ndarray, elsewhere: float) -> x
     """The result of a search of the limit thickness of a base [m] behind so many kg/m²."""
     ends = (thickness, thickness, np.ones(len(thickness)), np.ones(len(thickness), dtype=bool))
     found = result.assign(
-        described(LIMITS["thickness"], dict(zip(LIMITS["thickness"], (thickness, *ends), strict=True)))
+        stored_columns(LIMITS["thickness"], dict(zip(LIMITS["thickness"], (thickness, *ends), strict=True)))
     )
     told = {"limit": "thickness", "limit_layer": 1, "limit_highest": 20e-3, "limit_density": 8000.0}
     return found.assign_attrs(told | {"limit_elsewhere": elsewhere})

@@ -78,7 +78,7 @@ def test_failed_shots_are_listed_with_their_inputs_and_count_in_no_number(make_r
 def test_a_run_goes_on_and_ends_with_3_when_too_many_failed(
     allowed: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("warpimpact.solver.prepare.STEP_ALLOWANCE", 0.01)  # no shot ends so soon
+    monkeypatch.setattr("warpimpact.solver.resolution.STEP_ALLOWANCE", 0.01)  # no shot ends so soon
     text = DRAFT.replace("count = 512", "count = 300") + f"failed_share = {allowed}\n"
     (tmp_path / "a.toml").write_text(text, encoding="utf-8")
     output = tmp_path / "a.nc"

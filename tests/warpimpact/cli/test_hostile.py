@@ -28,7 +28,7 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.runs.shards import folder_of
 from warpimpact.scene.patterns.mask_files import read_mask
 from warpimpact.scene.units import Length, quantity, quoted
-from warpimpact.solver.tile import tile_of
+from warpimpact.solver.grid import tile_of
 
 SHIPPED = Path(__file__).parents[3] / "campaigns"
 BASE = (SHIPPED / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -83,7 +83,11 @@ CAMPAIGNS = {
     "a long key": (BASE + "\n[interaction]\n" + "k" * 100_000 + " = 1\n", "got the unknown key"),
     "a tiny length": (
         re.sub("degradation_length *= .*", 'degradation_length = "1 nm"', BASE),
-        "must be at least 1/1000",
+        "at least 1/1000 of its radius",
+    ),
+    "a tiny depth": (
+        re.sub("(degradation_length *= .*)", '\\1\ndegradation_depth = "1 nm"', BASE),
+        "must be at least 1/100 of the thickness",
     ),
 }
 FILES: dict[str, tuple[str, str | bytes, str]] = {
@@ -263,7 +267,7 @@ def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_p
 
 
 def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.solver.tile.free_memory", lambda: 2**20)
+    monkeypatch.setattr("warpimpact.solver.grid.free_memory", lambda: 2**20)
     plate = Campaign.from_text(BASE, name="a", folder=Path()).plate
     with pytest.raises(MemoryError, match=r"numerics.grid_spacing or plate.degradation_length, .* is too small"):
         tile_of(plate, 1e-6)

@@ -40,14 +40,19 @@ def test_the_picture_of_a_plate_is_not_replaced_unasked(tmp_path: Path, capsys: 
     assert main([*command, "--overwrite"]) == 0
 
 
-def test_every_probability_has_a_picture_of_its_own(make_result: ResultMaker, tmp_path: Path) -> None:
+def test_what_is_asked_for_has_a_picture_of_its_own(
+    make_result: ResultMaker, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     files.write(make_result(100), tmp_path / "a.nc")
     for quantity in ("P(tilt@130mm > 30 deg)", "P(tilt@130mm < 30 deg)", "P(perforated)"):
         assert main(["plot", str(tmp_path / "a.nc"), "--probability", quantity]) == 0
+    assert main(["plot", str(tmp_path / "a.nc"), "--variable", "edge_distance"]) == 0
+    assert "--variable: " in refusal(["plot", str(tmp_path / "a.nc"), "--variable", "edges"], capsys)
     assert {path.name for path in tmp_path.glob("*.png")} == {
         "a_P_tilt_130mm_above_30_deg.png",
         "a_P_tilt_130mm_below_30_deg.png",
         "a_P_perforated.png",
+        "a_edge_distance.png",
     }
 
 

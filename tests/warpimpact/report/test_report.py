@@ -25,7 +25,7 @@ from warpimpact.report import hits, report
 from warpimpact.results import files
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.solver.marching import March
+from warpimpact.solver import replay as solver
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 TRAJECTORIES = 6
@@ -358,9 +358,9 @@ def test_a_page_computes_each_trajectory_once(folder: Path, tmp_path: Path, monk
         raise AssertionError("what is left of the plate was computed")
 
     marches = []
-    march = March.march
-    monkeypatch.setattr(March, "plate_after", refused)
-    monkeypatch.setattr(March, "march", lambda *given: marches.append(1) or march(*given))
+    traced = solver.traced
+    monkeypatch.setattr(solver, "_left_after", refused)
+    monkeypatch.setattr(solver, "traced", lambda *given: marches.append(1) or traced(*given))
     with files.opened(folder / "narrow.nc") as narrow:
         report.write_report({"narrow": narrow}, tmp_path / "a.html", folders={"narrow": folder}, trajectories=5)
     assert len(marches) == 5

@@ -35,6 +35,7 @@ CONTRACT = {
     "impact_pitch": (("hit",), "degree"),
     "impact_yaw": (("hit",), "degree"),
     "spin": (("hit",), "rad s-1"),
+    "edge_distance": (("hit",), "m"),
     "status": (("hit",), "1"),
     "residual_velocity": (("hit",), "m s-1"),
     "deflection": (("hit",), "degree"),

@@ -14,9 +14,10 @@ from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics
-from warpimpact.solver import device, marching, simulate
-from warpimpact.solver.layering import material_about
+from warpimpact.solver import device, replay, simulate
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.replay import material_about
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
 
@@ -90,9 +91,9 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
     def computed() -> Outcomes:
         return simulate.simulate(campaign.scene, shots, numerics=campaign.numerics, device="cpu", threads=4)
 
-    plenty, granted, original = computed(), 0, marching.March._scratch
+    plenty, granted, original = computed(), 0, Memory.scratch
 
-    def scarce(task: Any, *arguments: int) -> Any:
+    def scarce(task: Any, *arguments: Any) -> Any:
         """Memory for one slot in the first two attempts and for two later."""
         nonlocal granted
         granted += 1
@@ -100,7 +101,7 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
             raise RuntimeError("Failed to allocate 1000 bytes on device 'cpu'")
         return original(task, *arguments)
 
-    monkeypatch.setattr(marching.March, "_scratch", scarce)
+    monkeypatch.setattr(Memory, "scratch", scarce)
     little = computed()
     assert granted >= 5  # 4 slots fail at the second, 2 at the second, 1 does not; wider windows come after these
     assert np.array_equal(plenty.residual_velocity, little.residual_velocity)
@@ -109,11 +110,11 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
 
 def test_a_replay_that_does_not_fit_is_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     shots, numerics = campaign.sampler().shots(0, 1), Numerics(level=0)
-    march, contact = simulate.traced(campaign.scene, shots, numerics)
-    assert march.arrays.rows == contact.steps.numpy().max() + 1  # a shot may take thousands of times as many
-    monkeypatch.setattr(simulate, "free_memory", lambda: 2**16)
+    march, contact = replay.traced(campaign.scene, shots, numerics)
+    assert march.memory.prepared.rows == contact.steps.numpy().max() + 1  # a shot may take thousands of times as many
+    monkeypatch.setattr(replay, "free_memory", lambda: 2**16)
     with pytest.raises(MemoryError, match=r"history of \d+ steps with 6 snapshots of \d+ cells needs .* GiB are free"):
-        simulate.replay(campaign.scene, shots, numerics=numerics)
+        replay.replay(campaign.scene, shots, numerics=numerics)
 
 
 @pytest.mark.parametrize("size", [None, (10e-3, 10e-3)])

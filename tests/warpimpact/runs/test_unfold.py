@@ -14,6 +14,7 @@ from warpimpact.analysis.summary import estimated
 from warpimpact.campaign.campaign import Output
 from warpimpact.campaign.stop import Stop
 from warpimpact.cli import main
+from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
@@ -22,8 +23,10 @@ from warpimpact.runs import shards
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
+from warpimpact.solver import replay as replaying
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
+from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -55,14 +58,14 @@ def every_hit_computed(campaign: Campaign, unfolded: xarray.Dataset, folder: Pat
 
 @pytest.fixture
 def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many shots each call of `simulate` computed."""
+    """How many shots each computation had."""
     counts: list[int] = []
 
-    def counting(scene: Any, shots: Any, **how: Any) -> Any:
-        counts.append(len(shots))
-        return simulation.simulate(scene, shots, **how)
+    def counting(prepared: Prepared, *how: Any) -> Outcomes:
+        counts.append(len(prepared.shots))
+        return simulation.computed(prepared, *how)
 
-    monkeypatch.setattr(computing, "simulate", counting)
+    monkeypatch.setattr(computing, "computed", counting)
     return counts
 
 
@@ -144,7 +147,7 @@ def test_the_history_of_an_image_is_that_of_its_own_shot(impact: Impact) -> None
     asked = campaign(impact=impact, count=8)
     group = symmetries_used(asked.impact, asked.hits, asked.plate)
     shots = make_shots(asked.impact, asked.hits, asked.plate)
-    alone = [simulation.replay(asked.scene, shots[k : k + 1], numerics=asked.numerics) for k in range(len(group))]
+    alone = [replaying.replay(asked.scene, shots[k : k + 1], numerics=asked.numerics) for k in range(len(group))]
     for k, symmetry in enumerate(group):
         home, image = ((shots.hit_y[at], shots.hit_z[at]) for at in (0, k))
         folded = image_of(alone[0], symmetry, home=home, image=image)

@@ -129,6 +129,8 @@ def test_shapes_of_a_drawing_are_those_of_the_lattice(tmp_path: Path) -> None:
     at = (np.arange(160) - 79.5) * 0.1 * MM
     assert np.array_equal(mask.is_hole(at[:, None], at), lattice.is_hole(at[:, None], at))
     assert mask.ligament() == pytest.approx(lattice.ligament(), abs=mask.resolution)
+    here = mask.edge_distance(at[:, None], at)
+    assert np.allclose(here, lattice.edge_distance(at[:, None], at), rtol=0, atol=mask.resolution)
 
 
 def test_islands_in_a_path_are_material(tmp_path: Path) -> None:

@@ -97,6 +97,24 @@ def test_outlines_enclose_the_holes(pattern: LatticePattern) -> None:
     assert all(np.allclose(outline[0], outline[-1], atol=1e-12) for outline in outlines)
 
 
+@LATTICES
+def test_an_edge_is_as_far_as_the_nearest_outline(pattern: LatticePattern) -> None:
+    y, z = np.random.default_rng(3).uniform(-20 * MM, 20 * MM, (2, 2000))
+    found = pattern.edge_distance(y, z)
+    assert np.array_equal(found < 0, pattern.is_hole(y, z))
+    around = shapely.MultiLineString(pattern.outlines((-40 * MM, 40 * MM), (-40 * MM, 40 * MM)))
+    assert np.allclose(abs(found), shapely.distance(around, shapely.points(y, z)), rtol=0, atol=1e-12)
+
+
+def test_distances_from_the_edge_have_closed_forms() -> None:
+    at = np.array([0, 1, 4, 5]) * MM
+    circle = CirclePattern(diameter="5 mm", spacing=["9 mm", "9 mm"])
+    chord = 2.51 * (1 - np.cos(np.pi / 64))
+    assert np.allclose(circle.edge_distance(at, 0 * at) / MM, [-2.5, -1.5, 1.5, 1.5], rtol=0, atol=chord)
+    assert np.allclose(SLOT.edge_distance(0 * at, at) / MM, [-2, -2, -2, -1], rtol=0, atol=chord)
+    assert np.isinf(NoPattern().edge_distance(at, at)).all()
+
+
 def test_a_solid_plate_has_no_hole() -> None:
     solid = NoPattern()
     assert not solid.is_hole(np.zeros((3, 1)), np.zeros(4)).any()

@@ -71,6 +71,14 @@ def test_a_margin_counts_in_the_figures_of_the_plate() -> None:
     assert Plate(**STEEL, **RIMMED).ligament == math.inf
 
 
+def test_the_rim_of_a_finite_plate_is_an_edge() -> None:
+    y, z = np.array([[0.0, 24e-3, 26e-3, 28e-3], [0.0, 20e-3, 0.0, 26e-3]])
+    solid = Plate(**STEEL, size=["50 mm", "44 mm"])
+    assert solid.edge_distance(y, z) == pytest.approx([22e-3, 1e-3, -1e-3, -5e-3])
+    assert Plate(**STEEL, pattern=SLOTS, **RIMMED).edge_distance(y, z) == pytest.approx([-2e-3, 1e-3, -1e-3, -5e-3])
+    assert np.isnan(Plate(**STEEL).edge_distance(y, z)).all()
+
+
 def test_a_plate_with_a_margin_is_read_back_as_it_was() -> None:
     plate = Plate(**STEEL, pattern=SLOTS, **RIMMED)
     again = Plate.model_validate_json(plate.model_dump_json())

@@ -14,15 +14,13 @@ from warpimpact.scene import (
     Scene,
 )
 from warpimpact.solver import materials
-from warpimpact.solver.materials import onset_jump
+from warpimpact.solver.materials import FASTEST_DECAY, decay_rate, onset_jump
 from warpimpact.solver.resolution import (
-    FASTEST_DECAY,
     LADDER,
     NODAL,
     SLENDER,
     WEAKENING,
     Resolution,
-    decay_rate,
     resolve,
 )
 
@@ -105,7 +103,7 @@ def test_way_per_step_follows_the_plate_or_a_core_shorter_than_it() -> None:
 
 def test_step_is_bounded_by_what_contact_takes_off_the_resistance() -> None:
     resolution, velocity = resolved(level=2), 800.0
-    free = resolution.step_at(velocity, 0.0, PLATE.thickness, np.inf)
+    free = resolution.step_at(velocity, 0.0, resolution.passage(PLATE.thickness, PLATE, weakens=False), np.inf)
     for degradation, interval in ((1.0, 1e-6), (0.9, 1e-6), (0.05, 1e-6), (0.05, 1e-9), (0.0, 1e-6)):
         plate = PLATE.model_copy(update={"degradation": degradation, "degradation_interval": interval})
         step = resolution.step_of(Impact(velocity=velocity), plate)

@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
-from warpimpact import Campaign, simulate
-from warpimpact.solver.marching import CPU_CHUNK, March
+from warpimpact import Campaign, Numerics, simulate
+from warpimpact.solver.marching import CPU_CHUNK
+from warpimpact.solver.memory import Memory
 
 CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
@@ -14,15 +15,16 @@ CAMPAIGN = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 @pytest.mark.parametrize("hits", [24, 700])
 @pytest.mark.parametrize("threads", [2, 3])
 def test_launches_begin_and_end_with_single_shots(hits: int, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    campaign, counts, launch = Campaign.from_toml(CAMPAIGN), [], March._launch
+    campaign, counts, launch = Campaign.from_toml(CAMPAIGN), [], Memory.launch
 
-    def recorded(self: March, *arguments: Any) -> int:
+    def recorded(self: Memory, *arguments: Any) -> int:
         counts.append(arguments[-1])
         return launch(self, *arguments)
 
-    monkeypatch.setattr(March, "_launch", recorded)
+    monkeypatch.setattr(Memory, "launch", recorded)
     monkeypatch.setattr("warpimpact.solver.marching.CPU_LAUNCH", 1e9)  # however slow the machine
-    simulate(campaign.scene, campaign.sampler().shots(0, hits), device="cpu", threads=threads)
+    shots = campaign.sampler().shots(0, hits)
+    simulate(campaign.scene, shots, numerics=Numerics(level=2), device="cpu", threads=threads)
     first_windows = counts[: next(k + 1 for k in range(len(counts)) if sum(counts[: k + 1]) >= hits)]
     assert sum(first_windows) == hits
     assert max(first_windows) <= max(1, min(CPU_CHUNK, hits // (2 * threads)))

@@ -14,7 +14,7 @@ from warpimpact.scene import (
     SlotPattern,
     TrianglePattern,
 )
-from warpimpact.solver.tile import BLUR, FINER, SUBSAMPLES, nearest_wall, tent_taps, tile_of
+from warpimpact.solver.grid import BLUR, FINER, SUBSAMPLES, nearest_wall, tent_taps, tile_of
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 PATTERNS = [

@@ -20,19 +20,3 @@ AnyPattern = Annotated[
     | MaskPattern,
     Field(discriminator="shape"),
 ]
-
-__all__ = [
-    "AnyPattern",
-    "BoolArray",
-    "CirclePattern",
-    "EllipsePattern",
-    "HexagonPattern",
-    "LatticePattern",
-    "MaskPattern",
-    "NoPattern",
-    "Pattern",
-    "Place",
-    "SlotPattern",
-    "SquarePattern",
-    "TrianglePattern",
-]

@@ -2,12 +2,14 @@
 
 import math
 from abc import ABC, abstractmethod
-from typing import Literal, Self
+from functools import cached_property
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, Model
+from .roundings import distance_to, pieces
 
 BoolArray = NDArray[np.bool_]
 Range = tuple[float, float]
@@ -53,6 +55,20 @@ class Pattern(Model, ABC):
         Where it is False, there is certainly no edge.
         """
         return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
+
+    def edge_distance(self, y: Array, z: Array) -> Array:
+        """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
+        inf where there is none. The chords of an outline lie within 0.13 % of the radius of its arcs."""
+        y, z = (at - side * np.round(at / side) for at, side in zip((y, z), self.period, strict=True))
+        apart = distance_to(self._edges, y, z)
+        return np.where(self.is_hole(y, z), -apart, apart)
+
+    @cached_property
+    def _edges(self) -> Any:
+        """Outlines around a period, cut into pieces. Those along the end of the rectangle are no nearer to a point of
+        the period than its own."""
+        sides = np.array(self.period)
+        return pieces(self.outlines(*((-reach, reach) for reach in 0.5 * (sides + np.hypot(*sides)))))
 
     @abstractmethod
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:

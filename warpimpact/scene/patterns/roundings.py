@@ -2,6 +2,7 @@
 convex polygon, a line or a point. Areas, distances and extents are exact. Spines are arrays of shape [corners, 2] [m].
 """
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -56,6 +57,18 @@ def outline(spine: Array, rounding: float) -> Array:
     return np.array(shapely.get_coordinates(shapely.buffer(shape, rounding, quad_segs=_QUARTER) if rounding else shape))
 
 
+def distance_to(geometries: Any, y: Array, z: Array) -> Array:
+    """Distance of points y, z from the nearest geometry [m], of their broadcast shape; inf if there is none."""
+    import shapely
+
+    points: Any = shapely.points(*np.broadcast_arrays(y, z))
+    if not len(geometries):
+        return np.full(points.shape, np.inf)
+    tree = shapely.STRtree(geometries, node_capacity=2)  # 1.5 us per point; 6 us with the default
+    _, apart = tree.query_nearest(points.ravel(), all_matches=False, return_distance=True)
+    return apart.reshape(points.shape)
+
+
 def neighbours(geometries: Any, first: int) -> tuple[float, int, int]:
     """The two nearest geometries, one of them among the `first`: their distance [m] and their indices.
 
@@ -85,16 +98,9 @@ def smallest_gap(shapes: Sequence[Sequence[Array]]) -> float:
     """
     import shapely
 
-    pieces: list[Array] = []
-    owners: list[int] = []
-    for number, rings in enumerate(shapes):
-        for ring in rings:
-            pieces += [ring[at : at + _PIECE + 1] for at in range(0, len(ring) - 1, _PIECE)]
-        owners += [number] * (len(pieces) - len(owners))
-    lines: Any = shapely.linestrings(
-        np.concatenate([*pieces, np.empty((0, 2))]), indices=np.repeat(np.arange(len(pieces)), list(map(len, pieces)))
-    )
-    owner, least = np.array(owners, dtype=int), np.inf
+    lines = pieces([ring for rings in shapes for ring in rings])
+    counts = [sum(math.ceil((len(ring) - 1) / _PIECE) for ring in rings) for rings in shapes]
+    owner, least = np.repeat(np.arange(len(shapes)), counts), np.inf
     for digit in range((len(shapes) - 1).bit_length() if shapes else 0):
         has = (owner >> digit & 1).astype(bool)
         limit = least if np.isfinite(least) and least > 0.0 else None
@@ -103,6 +109,15 @@ def smallest_gap(shapes: Sequence[Sequence[Array]]) -> float:
         )[1]
         least = min(least, float(gaps.min(initial=np.inf)))
     return least
+
+
+def pieces(rings: Sequence[Array]) -> Any:
+    """Closed outlines, each of shape [points, 2] [m], as an array of shapely geometries: short pieces of them."""
+    import shapely
+
+    parts = [ring[at : at + _PIECE + 1] for ring in rings for at in range(0, len(ring) - 1, _PIECE)]
+    numbers = np.repeat(np.arange(len(parts)), list(map(len, parts)))
+    return shapely.linestrings(np.concatenate([*parts, np.empty((0, 2))]), indices=numbers)
 
 
 def geometries(spines: Array) -> Any:

@@ -1,16 +1,24 @@
-"""The pristine plate as one period of material fractions, and the filter of its exposure."""
+"""Plates as the kernels see them: one period of material fractions, the grid of the exposure with its filter, and the
+first window about a hit."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.scene import Pattern, Plate
 from warpimpact.solver.device import free_memory
+from warpimpact.solver.materials import ROUNDING
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Core, Pattern, Plate, Shots
+    from warpimpact.solver.materials import Materials
+    from warpimpact.solver.resolution import Resolution
 
 Array = NDArray[np.float64]
 
@@ -27,6 +35,19 @@ SUBSAMPLES = 6
 """Points per cell and direction from which a material fraction is computed."""
 AT_A_TIME = 2**13
 """Cells of the tile that are computed together."""
+
+
+FEWEST_PLANES, PLANES = 3, 1.6
+"""Per degradation depth: at least, and times the square root of its steps, as planes err by the fourth order of their
+distance and steps by the second of theirs. Twice as many change no answer by a tenth of its error (oblique, slots)."""
+SPARE = 4
+"""Planes beyond those within a laminate: one on each side, the one behind the last whole spacing, and its neighbour."""
+SIZES = (1024, 2048, 3072, 4096, 6144)
+"""Windows that blocks have [nodes]; each is compiled by itself. Two fields of float32 of the largest fill the 48 KiB of
+shared memory that a block of every CUDA device has."""
+WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
+"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
+its fine grid, large windows cost more time than the repetition of some shots."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +74,116 @@ class Tile:
         # narrower.
         kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
         return np.asarray(np.repeat(np.repeat(kept, block[0], axis=0), block[1], axis=1)[:rows, :columns])
+
+
+class Planes(NamedTuple):
+    """Planes of a window through the thickness: their number, the `spacing` between two [m], and how many of them a
+    degradation depth has. One stands for the whole thickness."""
+
+    number: int = 1
+    spacing: float = math.inf
+    reach: int = 0
+
+
+WHOLE = Planes()
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A plate as the kernels see it.
+
+    Attributes:
+        tile: one period of it.
+        period, half_size: extents (y, z) of the period, and half of those of the plate [m]; infinite without a rim.
+        spacing: of the window's grid [m].
+        taps: the tent's filter from its middle on, and one 0.
+        planes: of the window's grid through the thickness.
+    """
+
+    tile: Tile
+    period: tuple[float, float]
+    half_size: tuple[float, float]
+    spacing: float
+    taps: Array
+    planes: Planes = WHOLE
+
+    @property
+    def reach(self) -> int:
+        """Reach of the filter [nodes], at least 1."""
+        return max(1, len(self.taps) - 2)
+
+
+def grids_of(
+    layers: Sequence[Plate], materials: Sequence[Materials], resolution: Resolution, *, deep: bool
+) -> list[Grid]:
+    """The grids of some layers, whose cells are as wide as their degradation lengths have it.
+
+    Args:
+        deep: whether windows have planes through the thickness.
+
+    Raises:
+        MemoryError: as `tile_of`.
+    """
+    return [
+        _grid(
+            plate,
+            resolution,
+            plate.degradation_length / layers[0].degradation_length,
+            _planes(plate, material, resolution) if deep else WHOLE,
+        )
+        for plate, material in zip(layers, materials, strict=True)
+    ]
+
+
+def _grid(plate: Plate, resolution: Resolution, wider: float, planes: Planes) -> Grid:
+    """The grid of a layer, whose cells are so many times as wide as those of the plate."""
+    nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
+    tile = tile_of(plate, spacing if nodal else min(spacing / FINER, plate.degradation_length / FINEST), sharp=nodal)
+    if nodal:  # its nodes are the tile's cells, which fit the period
+        spacing = min(tile.dy, tile.dz)
+    size_y, size_z = plate.size or (math.inf, math.inf)
+    return Grid(
+        tile=tile,
+        period=plate.pattern.period,
+        half_size=(0.5 * size_y, 0.5 * size_z),
+        spacing=spacing,
+        taps=half_taps(0.0 if nodal else plate.degradation_length, spacing),
+        planes=planes,
+    )
+
+
+def half_taps(length: float, spacing: float) -> Array:
+    """The filter of a degradation length [m] on a grid as the kernels read it: from its middle on, and one 0."""
+    taps = tent_taps(length, spacing)
+    return np.append(taps[len(taps) // 2 :], 0.0)
+
+
+def _planes(plate: Plate, material: Materials, resolution: Resolution) -> Planes:
+    """Those of a layer, which the step of a plate as thick as the degradation depth refines."""
+    depth = plate.degradation_depth
+    way = resolution.travel * float(resolution.passage(depth, plate, weakens=True))
+    reach = max(FEWEST_PLANES, math.ceil(PLANES * math.sqrt(depth / way)))
+    most = float(material.together.max()) / depth if material.weakens else 0.0
+    return Planes(math.floor(most * reach + ROUNDING) + SPARE, depth / reach, reach)
+
+
+def first_window(core: Core, shots: Shots, material: Materials, grid: Grid, *, nodal: bool) -> int:
+    """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
+    plate, or the laminate that it begins. Layers farther away have windows of their own.
+
+    Args:
+        material, grid: of the plate.
+    """
+    slack = NODAL_SLACK if nodal else WINDOW_SLACK
+    steepest, thickness = float(shots.obliquity.max()), float(material.together.max())
+    turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
+    half = slack * core.max_radius / math.cos(steepest) + thickness * math.tan(steepest) + core.bounding_radius * turned
+    return 2 * (math.ceil(half / grid.spacing) + 2 * grid.reach + 3)
+
+
+def block_window(cells: int) -> int:
+    """Nodes of the window of a block that holds so many in each direction; 0 if none does."""
+    return next((size for size in SIZES if size >= cells**2), 0)
 
 
 def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:

@@ -1,0 +1,299 @@
+"""What was prepared, in the memory of one device: the inputs of the kernels, the scratch of the shots that are
+computed at a time, and what the kernels fill."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.kernels import free_flight, march
+from warpimpact.kernels.lanes import LANES
+from warpimpact.kernels.trace import WIDTH
+from warpimpact.records.group import Returned
+from warpimpact.solver.device import free_memory, load
+from warpimpact.solver.grid import Grid, Tile
+from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.rings import Rings
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Core
+
+Array = NDArray[np.float64]
+Cells = tuple[int, int]
+"""Of a window, along y and z."""
+
+LARGEST_ONSET = 0.02
+"""Bound of the onset speed, as a share of the impact velocity."""
+
+
+DEEP = 0.6
+"""Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
+the core's surface from its centre of mass: the core arrives turned."""
+CUDA_CHUNK = 65536
+MEMORY_SHARE = 0.5
+"""Share of the free memory that scratch may take."""
+
+
+@dataclass(frozen=True)
+class Put:
+    """Puts values on the named device, by default in the floating-point type `real` of the kernels."""
+
+    device: str
+    real: Any
+
+    def __call__(self, values: NDArray[Any], dtype: Any = None) -> Any:
+        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.real, device=self.device)
+
+
+class Memory:
+    """What was prepared, on one device, with all that a launch of the march needs (kernels/march.py).
+
+    Attributes:
+        prepared: what is there.
+        device: where.
+        stage: the build of the march that the scene needs.
+        put: puts values on the device.
+        at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
+        surface, sections, target, law, shots, pace: structs of the inputs.
+        bending, passage, history: what the march fills beside the outcomes.
+    """
+
+    def __init__(self, prepared: Prepared, device: Any) -> None:
+        variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
+        self.prepared, self.device, self.variant = prepared, device, variant
+        self.stage, self.put = march.build(variant), Put(device.alias, variant.real)
+        self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
+        self.surface = surface_of(self.stage.Surface, scene.core, prepared.rings, prepared.azimuths, self.put)
+        self.target, self.sections, self.shots = self._target(prepared), self._sections(prepared), self._shots(prepared)
+        self.law, self.pace = self.stage.Law(), self.stage.Pace()
+        self.law.onset_share, self.law.onset_limit = scene.interaction.onset, LARGEST_ONSET
+        self.pace.time_step, self.pace.way_along = prepared.resolution.time_step or 0.0, prepared.resolution.way_along
+        self.pace.rows = prepared.rows
+        self.free = scene.record.flies_free(scene.core, scene.target)
+        self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
+        self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)
+        layers, standoffs = self.free.shape
+        recorded = count if variant.layered else 0
+        sizes = (recorded,), (recorded, layers), (recorded, layers, standoffs)
+        self.passage = self.empty(self.stage.Passage, *sizes)
+
+    def _target(self, prepared: Prepared) -> Any:
+        """The Target (kernels/target.py)."""
+        target, materials = self.stage.Target(), prepared.materials
+        target.count = len(materials)
+        # Kept, as an array of structs does not keep what its members point to.
+        self.plates = [plate_of(self.stage.Plate, grid, self.put) for grid in prepared.grids]
+        layered = prepared.variant.layered
+        target.plates = wp.array(self.plates, dtype=self.stage.Plate, device=self.device) if layered else self.plates[0]
+        target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
+        target.laminate = self.put(np.array([one.laminate for one in materials]), wp.int32)
+        target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
+        target.a2 = self.put(np.array([one.a2 for one in materials]))
+        record = prepared.scene.record
+        target.standoffs, target.ahead = self.put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
+        for name, variable in self.stage.Target.vars.items():
+            if getattr(variable.type, "ndim", 1) == 2:
+                rows = np.broadcast_arrays(*(getattr(one, name) for one in materials))
+                setattr(target, name, self.put(np.stack(rows), variable.type.dtype))
+        return target
+
+    def _sections(self, prepared: Prepared) -> Any:
+        struct = self.stage.Sections()
+        if prepared.sections is not None:
+            for name in self.stage.Sections.vars:
+                setattr(struct, name, self.put(getattr(prepared.sections, name)))
+        return struct
+
+    def _shots(self, prepared: Prepared) -> Any:
+        shots = self.stage.Shots()
+        for name, variable in self.stage.Shots.vars.items():
+            setattr(shots, name, self.put(prepared.conditions[name], variable.type.dtype))
+        return shots
+
+    def give_up_after(self, way: float) -> None:
+        """Give up the last shot after this distance [m] at impact velocity."""
+        longest_way = self.shots.longest_way.numpy()
+        ways = np.resize(longest_way, max(len(longest_way), len(self.prepared.shots)))
+        ways[-1] = way
+        self.shots.longest_way = self.put(ways, wp.float64)
+
+    def empty(self, struct: Any, *shapes: tuple[int, ...]) -> Any:
+        """A struct of empty arrays; each has the shape with its number of dimensions."""
+        filled = struct()
+        for name, variable in struct.vars.items():
+            kind = variable.type
+            setattr(filled, name, wp.empty(shapes[kind.ndim - 1], dtype=kind.dtype, device=self.device))
+        return filled
+
+    def outcomes(self) -> Any:
+        """Room for the outcomes of all shots."""
+        return self.empty(self.stage.Outcomes, (len(self.prepared.shots),))
+
+    def windows(self, cells: Cells) -> list[Cells]:
+        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        materials, grids, scene = self.prepared.materials, self.prepared.grids, self.prepared.scene
+        steepest, own = math.tan(float(self.prepared.shots.obliquity.max())), [cells]
+        for material, grid in zip(materials[1:], grids[1:], strict=True):
+            thicker = max(0.0, float(material.together.max() - materials[0].together.max()))
+            half = 0.5 * cells[0] * grids[0].spacing + DEEP * scene.core.bounding_radius + thicker * steepest
+            count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3) if material.weakens else 0
+            own.append((count, count))
+        return [own[material.laminate] for material in materials]
+
+    def nodes(self, cells: Cells) -> list[int]:
+        """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""
+        prepared = self.prepared
+        return [
+            grid.planes.number * math.prod(own) if material.laminate == k else 0
+            for k, (material, grid, own) in enumerate(
+                zip(prepared.materials, prepared.grids, self.windows(cells), strict=True)
+            )
+        ]
+
+    def firsts(self, cells: Cells) -> NDArray[np.int64]:
+        """The first node of every layer's field among those of its slot."""
+        before = np.cumsum([0, *self.nodes(cells)[:-1]])
+        return np.asarray(before[[material.laminate for material in self.prepared.materials]])
+
+    @property
+    def fields(self) -> list[str]:
+        """Names of the fields that a slot needs."""
+        if not (self.variant.nodal or self.variant.degrades):
+            return []
+        if self.variant.window and self.device.is_cuda:  # the others are in shared memory
+            return ["filtered"]
+        members, real = self.stage.Fields.vars.items(), self.variant.real
+        return [name for name, member in members if getattr(member.type, "dtype", None) is real]
+
+    @property
+    def _patches(self) -> int:
+        """Patches of a slot's touches."""
+        return 0 if self.variant.nodal else self.surface.rings * self.surface.around
+
+    def slots(self, cells: Cells, threads: int) -> int:
+        """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
+        count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
+        size = 8 if self.variant.double else 4
+        per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
+        earlier = count * (nodes * size + 17 * layers) if count > 1 else 0
+        patches = self._patches * (7 * size + 2 * 4)
+        slot = len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring
+        free = free_memory() if self.device.is_cpu else self.device.free_memory
+        wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
+        return min(wanted, int(MEMORY_SHARE * free / slot), (2**31 - 1) // (count * nodes))
+
+    def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
+        """Fields, touches, layers and earlier hits of some slots."""
+        stage, put, nodes = self.stage, self.put, self.nodes(cells)
+        empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
+        fields, touches = stage.Fields(), stage.Touches()
+        fields.nodes, fields.first = sum(nodes), put(self.firsts(cells), wp.int32)
+        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.windows(cells)).T)
+        for name in self.fields:
+            setattr(fields, name, empty(slots * fields.nodes))
+        patches, rings = slots * self._patches, slots * self.surface.rings
+        for name in ("area", "slope", "shift", "gain", "y", "z", *(["x"] if self.variant.deep else [])):
+            setattr(touches, name, empty(patches))
+        for name in ("tile", "cell"):
+            setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
+        touches.ring_area = empty(rings)
+        if self.variant.bends:
+            touches.sums = wp.empty(rings, dtype=stage.Sums, device=self.device)
+            touches.total_area = empty(rings)
+        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,))
+        return fields, touches, stack, self._earlier(slots, nodes)
+
+    def _earlier(self, slots: int, nodes: list[int]) -> Any:
+        """Scratch of the earlier hits on a plate (kernels/earlier.py); one shot at a plate needs none."""
+        earlier, count, layers = self.stage.Earlier(), self.at_a_plate, len(nodes)
+        if count > 1:
+            earlier.count, earlier.nodes, earlier.layers = count, sum(nodes), layers
+            places = dict.fromkeys(("y", "z", "open"), slots * count * layers)
+            for name, size in ({"exposure": slots * count * sum(nodes)} | places).items():
+                kind = self.stage.Earlier.vars[name].type.dtype
+                setattr(earlier, name, wp.empty(size, dtype=kind, device=self.device))
+        return earlier
+
+    def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:
+        """March `count` shots from order[first] on; returns `count`."""
+        inputs = [self.surface, self.sections, self.target, self.law, self.shots, self.pace, *scratch]
+        launch = partial(wp.launch, dim=count)
+        if self.variant.window:
+            launch = partial(wp.launch_tiled, dim=[count], block_dim=LANES)
+        launch(
+            self.stage.kernel,
+            inputs=[first, slots, order, *inputs],
+            outputs=[outcomes, self.passage, self.bending, self.history],
+            device=self.device,
+        )
+        return count
+
+    def report(self, contact: Any) -> Returned:
+        """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
+        scene, count = self.prepared.scene, len(self.prepared.shots)
+        flight, standoffs = free_flight.build(self.variant), np.array(scene.record.standoffs, dtype=np.float64)
+        report = self.empty(flight.Report, (count,), (count, len(standoffs)))
+        load(flight.kernel, self.device)
+        ahead = scene.record.ahead(scene.core)
+        inputs = [self.shots, self.target, contact, self.put(standoffs, wp.float64), ahead]
+        wp.launch(flight.kernel, count, inputs=inputs, outputs=[report], device=self.device)
+        status = contact.status.numpy().astype(np.int8)
+        return Returned(status, contact, report, self.bending.numpy(), self.passage, self.free)
+
+
+def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
+    """The Surface (kernels/core_surface.py) of a core in rings of patches."""
+    surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
+    azimuth = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
+    values = {name: getattr(rings, name) for name in _OF_A_RING} | {
+        "area": area,
+        "normal_axial": rings.area_axial / area,
+        "normal_radial": rings.area_radial / area,
+        "cosine": np.cos(azimuth),
+        "sine": np.sin(azimuth),
+    }
+    values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
+    for name, array in values.items():
+        setattr(surface, name, put(array))
+    surface.rings, surface.around = len(area), around
+    surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
+    return surface
+
+
+_OF_A_PATCH = (
+    "station",
+    "radius",
+    "area",
+    "normal_axial",
+    "normal_radial",
+    "half_axial",
+    "half_radial",
+    "turn_axial",
+    "turn_radial",
+)
+_OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
+
+
+def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
+    """The Plate (kernels/plate_grid.py) of a grid."""
+    plate = struct()
+    plate.tile, plate.clear = _on_device(grid.tile, put)
+    plate.tile_y, plate.tile_z = grid.tile.material.shape
+    plate.period_y, plate.period_z = grid.period
+    plate.half_y, plate.half_z = grid.half_size
+    plate.spacing = grid.spacing
+    plate.taps, plate.reach = put(grid.taps), grid.reach
+    plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
+    return plate
+
+
+@lru_cache(maxsize=16)
+def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
+    """Material and clearance of a tile. No kernel changes them, so they are kept for later shots at the same plate."""
+    return put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))

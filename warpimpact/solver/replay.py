@@ -1,0 +1,259 @@
+"""One shot computed again with its history, and with what is left of the layers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.kernels.trace import WIDTH
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.scene import MassProperties, Numerics, Scene, Shots
+from warpimpact.solver.device import find_device, free_memory
+from warpimpact.solver.grid import AT_A_TIME, WHOLE
+from warpimpact.solver.history import History
+from warpimpact.solver.marching import March
+from warpimpact.solver.memory import Cells, Memory
+from warpimpact.solver.prepare import Prepared, prepare
+from warpimpact.solver.simulate import outcomes_of
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Plate
+
+Array = NDArray[np.float64]
+
+HISTORY_BYTES = 1000
+"""That a step of a history takes until it is written [bytes]: its trace, and twice the columns of its Dataset."""
+SNAPSHOT_COPIES, OTHER_COPIES = 3, 8
+"""Numbers for every cell that each snapshot takes until it is written, and that computing any takes."""
+THROUGH = 16
+"""Depths at which the mean through a layer is taken."""
+
+
+class Weakened(NamedTuple):
+    """What is left of a layer behind the plate, in the window where a core reached it.
+
+    Attributes:
+        cell_y, cell_z: centres of the cells in the plane of the plate [m], shapes [cells_y] and [cells_z].
+        material: share of material in each cell, shape [cells_y, cells_z].
+        share: resistance left, as a share of Y, the mean through the thickness; 0 in holes.
+    """
+
+    cell_y: Array
+    cell_z: Array
+    material: Array
+    share: Array
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One shot with its full history: SI, float64.
+
+    Attributes:
+        outcomes: how it ended; of one shot.
+        history: the core at every step, and at the end.
+        plate_time: instants at which the plate is shown [s], shape [snapshots]; 0 is the first touch.
+        resistance_share: resistance left, as a share of Y, in the cells of the plate that the core may reach: 0 in
+            holes, shape [snapshots, cells_y, cells_z].
+        cell_y, cell_z: centres of those cells in the plate [m], shapes [cells_y] and [cells_z].
+        behind: the same of every layer behind the plate that weakens and is reached, by its number, with `share` of
+            shape [snapshots, cells_y, cells_z].
+    """
+
+    outcomes: Outcomes
+    history: History
+    plate_time: Array
+    resistance_share: Array
+    cell_y: Array
+    cell_z: Array
+    behind: dict[int, Weakened]
+
+
+def trace(scene: Scene, shots: Shots, *, numerics: Numerics) -> list[Array]:
+    """Histories of shots on the CPU: one array [steps + 1, WIDTH] per shot (kernels/trace.py)."""
+    march, contact = traced(scene, shots, numerics)
+    return traces_of(march.memory, contact)
+
+
+def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6) -> Replay:
+    """Compute one shot again on the CPU, with its history. The outcome equals that of `simulate` on the same CPU, bit
+    for bit.
+
+    Args:
+        shots: the shot, after those that hit the same plate before it.
+        numerics: the resolution with which `simulate` computed it.
+        snapshots: number of instants at which the plate is shown, evenly from the first touch to the end. Each computes
+            the shot again up to there; 0 computes no field of any layer.
+
+    Raises:
+        MemoryError: history and snapshots do not fit; the message is for the user.
+    """
+    march, contact = traced(scene, shots, numerics, snapshots)
+    memory, trace = march.memory, traces_of(march.memory, contact)[-1]
+    time_step = 2.0 * trace[0, 0]
+    steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
+    home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
+    cell_y, cell_z = nodes_about(home, march.cells, spacing)
+    material = material_about(scene.target.layers[0], cell_y, cell_z, spacing) if len(steps) else np.empty((0, 0))
+    left = [_left_after(memory, march.cells, count, time_step, material) for count in steps]
+    return Replay(
+        outcomes=outcomes_of(memory, contact)[-1:],
+        history=History.from_trace(trace, _body(memory.prepared)),
+        plate_time=trace[steps, 0] - 0.5 * time_step if memory.variant.layered else steps * time_step,
+        resistance_share=np.array([share for share, _ in left]).reshape(-1, len(cell_y), len(cell_z)),
+        cell_y=cell_y,
+        cell_z=cell_z,
+        behind={number: _over_time(number, [behind for _, behind in left]) for number in (left[-1][1] if left else ())},
+    )
+
+
+def _over_time(number: int, left: list[dict[int, Weakened]]) -> Weakened:
+    """A layer at all snapshots, in its last window: before the core came there it was as new."""
+    last = left[-1][number]
+
+    def share(one: Weakened | None) -> Array:
+        if one is None or not (np.array_equal(one.cell_y, last.cell_y) and np.array_equal(one.cell_z, last.cell_z)):
+            return last.material
+        return one.share
+
+    return last._replace(share=np.stack([share(one.get(number)) for one in left]))
+
+
+def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -> tuple[March, Any]:
+    """March shots on the CPU with their histories; returns what marched, and the outcomes on the device.
+
+    They march twice: the most steps that a shot may take are thousands of times those that it takes.
+
+    Raises:
+        MemoryError: the histories, and so many snapshots, do not fit.
+    """
+    prepared = prepare(scene, shots, numerics)
+    device = find_device("cpu")
+    first = March(Memory(prepared, device))
+    steps = int(first.march().steps.numpy().max())
+    cells = sum(math.prod(own) for own in first.memory.windows(first.cells))
+    of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
+    needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells
+    if needed > (free := free_memory()):
+        raise MemoryError(
+            f"the history of {steps} steps with {snapshots} snapshots of {cells} cells needs {needed / 2**30:.3g} GiB, "
+            f"and {free / 2**30:.3g} GiB are free"
+        )
+    march = March(Memory(replace(prepared, rows=steps + 1), device))
+    return march, march.march()
+
+
+def traces_of(memory: Memory, contact: Any) -> list[Array]:
+    """The trace of every shot of a traced march, with the state at its end."""
+    prepared = memory.prepared
+    rows = memory.history.numpy().reshape(len(prepared.shots), prepared.rows, WIDTH)
+    return [row[: steps + 1].astype(np.float64) for row, steps in zip(rows, contact.steps.numpy(), strict=True)]
+
+
+def _hit(prepared: Prepared) -> tuple[float, float]:
+    """Hit point of the last shot [m]."""
+    return float(prepared.shots.hit_y[-1]), float(prepared.shots.hit_z[-1])
+
+
+def _body(prepared: Prepared) -> MassProperties:
+    """Mass properties of the last shot."""
+    names = ("mass", "inertia_axial", "inertia_transverse")
+    own = {name: float(prepared.conditions[name][-1]) for name in names}
+    return prepared.scene.core.mass_properties._replace(**own)
+
+
+def _left_after(
+    memory: Memory, cells: Cells, steps: int, time_step: float, material: Array
+) -> tuple[Array, dict[int, Weakened]]:
+    """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of its
+    march, and what is left of the layers behind it by their numbers. All shots hit one plate.
+
+    Args:
+        cells: of the plate's window.
+        material: share of material about every node of it.
+    """
+    prepared, variant = memory.prepared, memory.variant
+    scratch, before, outcomes = memory.scratch(1, cells), len(prepared.shots) - 1, memory.outcomes()
+    order = memory.put(np.arange(before + 1), wp.int32)
+    if variant.layered and before:
+        steps = max(1, steps)  # the window of a layer opens with the first step
+    memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
+    if before:
+        memory.launch(order, outcomes, scratch, 1, 0, before)
+    for name in memory.fields:  # the window of a layer that is not reached stays closed
+        getattr(scratch[0], name).zero_()
+    memory.launch(order, outcomes, scratch, 1, before, 1)
+    if variant.nodal:
+        return np.asarray(scratch[0].share.numpy().astype(np.float64).reshape(cells)), {}
+    left = np.ones(cells)
+    if variant.degrades and prepared.materials[0].weakens:
+        left = _share_left(memory, 0, scratch[0].exposure.numpy(), cells)
+    return np.asarray(material * left), _behind(memory, scratch, cells) if variant.layered and variant.degrades else {}
+
+
+def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int, Weakened]:
+    """The layers behind the plate that weaken and that the last shot reached, after a march of one slot.
+
+    Args:
+        scratch: of the slot.
+        plate: cells of the plate's window.
+    """
+    prepared, (fields, _, stack, _), hit = memory.prepared, scratch, _hit(memory.prepared)
+    is_open, homes, exposure = stack.open.numpy(), stack.home.numpy(), fields.exposure.numpy()
+    found = {}
+    for k, (cells, material) in enumerate(zip(memory.windows(plate), prepared.materials, strict=True)):
+        if k > 0 and cells != (0, 0) and is_open[k]:
+            spacing, place = prepared.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
+            y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), cells, spacing)
+            offset = float(material.offset_y[-1]), float(material.offset_z[-1])
+            solid = material_about(prepared.scene.target.layers[k], y - offset[0], z - offset[1], spacing)
+            found[k] = Weakened(y, z, solid, solid * _share_left(memory, k, exposure, plate))
+    return found
+
+
+def _share_left(memory: Memory, layer: int, exposure: NDArray[Any], plate: Cells) -> Array:
+    """Share of the resistance that is left of a layer in its window, the mean through its thickness, of the last shot.
+
+    Args:
+        exposure: of one slot.
+        plate: cells of the plate's window.
+    """
+    materials, cells = memory.prepared.materials, memory.windows(plate)[layer]
+    leader = materials[layer].laminate
+    planes = memory.prepared.grids[layer].planes if materials[layer].deep[-1] else WHOLE
+    first = memory.firsts(plate)[layer]
+    field = exposure[first : first + planes.number * cells[0] * cells[1]].reshape(planes.number, *cells)
+    depth = materials[layer].front[-1] - materials[leader].front[-1]
+    depth = depth + materials[layer].thickness[-1] * (np.arange(THROUGH) + 0.5) / THROUGH
+    place = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
+    below = np.floor(place).astype(int)
+    share = np.zeros(field.shape[1:])
+    for at, low in zip(place - below, below, strict=True):
+        exposed = (1.0 - at) * field[low] + at * field[min(low + 1, planes.number - 1)]
+        share += np.exp(materials[layer].decay_rate[-1] * np.maximum(exposed, 0.0))
+    return share / THROUGH
+
+
+def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:
+    """Coordinates of the nodes of a window about its home, along y and z [m]."""
+    y, z = (np.asarray(at + (np.arange(n) - n // 2) * spacing) for at, n in zip(home, cells, strict=True))
+    return y, z
+
+
+def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:
+    """Share of material about every node, shape [nodes_y, nodes_z]; points are taken where an edge may be."""
+    samples = 16
+    fine = ((np.arange(samples) + 0.5) / samples - 0.5) * spacing
+    share, rows = np.empty((len(y), len(z))), max(1, AT_A_TIME // len(z))
+    for first in range(0, len(y), rows):
+        along_y = y[first : first + rows, None]
+        share[first : first + rows] = plate.is_solid(along_y, z)
+        row, column = np.nonzero(plate.has_edge(along_y, z, spacing))
+        points = along_y[row, :, None] + fine[:, None], z[column, None, None] + fine
+        share[first + row, column] = plate.is_solid(*points).mean(axis=(1, 2))
+    return share
