@@ -208,7 +208,7 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
     if (found := next(filter(None, differing), None)) is not None:
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
     if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
-        yield f"The numerics are less exact than the fidelity promises: {', '.join(broken)} (warpimpact inspect)."
+        yield f"The numerics are less exact than promised: {', '.join(broken)} (warpimpact inspect)."
     solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
     alike = len(set(solid.values())) == 1
     yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)
