@@ -8,6 +8,7 @@ The table is made from the results when the pages are built. A result that is mi
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -281,8 +282,10 @@ def _kind(way: str) -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw the figure; with "all", measure first. Returns 1 if a benchmark failed."""
+    parser = argparse.ArgumentParser(description="draw the figure of the benchmark page from the results that are there")
+    parser.add_argument("measure", nargs="?", choices=("all",), help="measure everything first")
     failed = []
-    for name, (script, *arguments) in RUNS.items() if "all" in (sys.argv[1:] if argv is None else argv) else ():
+    for name, (script, *arguments) in RUNS.items() if parser.parse_args(argv).measure else ():
         begin = time.monotonic()
         done = subprocess.run([sys.executable, script, *arguments], cwd=HERE, check=False)
         print(f"{name}: {time.monotonic() - begin:.0f} s", flush=True)

@@ -85,7 +85,7 @@ def promise_text(dataset: Result) -> str | None:
 
 
 def breaks_promise(dataset: Result) -> bool:
-    """Whether the numerics of a result are less exact than its fidelity promises."""
+    """Whether the numerics of a result are less exact than promised."""
     return bool(dataset.attrs.get(attr.PROMISE_KEPT) == 0)
 
 

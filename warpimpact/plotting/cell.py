@@ -123,7 +123,7 @@ def shots_text(dataset: xarray.Dataset) -> str:
     velocity, obliquity = (range_text(dataset[name]) for name in (v.IMPACT_VELOCITY, v.OBLIQUITY))
     share = float(passed(dataset).mean())
     some = "" if share == 1.0 else f" ({share:.1%} passed the {struck(dataset)})"
-    broken = "; numerics less exact than the fidelity promises" if breaks_promise(dataset) else ""
+    broken = "; numerics less exact than promised" if breaks_promise(dataset) else ""
     return f"{dataset.sizes['hit']} hits{some}, {velocity}, obliquity {obliquity}{broken}"
 
 

@@ -95,7 +95,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     """
     march, contact = traced(scene, shots, numerics, snapshots)
     memory, trace = march.memory, traces_of(march.memory, contact)[-1]
-    outcomes = outcomes_of(memory, contact)[-1:]  # snapshots march in the same memory
+    outcomes = outcomes_of(memory, contact)[-1:]  # a snapshot writes over what the march has filled
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing

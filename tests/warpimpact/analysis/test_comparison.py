@@ -12,8 +12,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.comparison import Comparison, Difference, compare
-from warpimpact.analysis.comparison_text import comparison_text
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import Comparison, Difference, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates
@@ -273,7 +273,7 @@ def test_plates_that_were_asked_something_else_are_refused(change: dict, sentenc
 def test_what_makes_a_comparison_less_than_fair_is_said(make_plate_result) -> None:
     inexact = make_plate_result(np.full(64, 800.0), promise_kept=0)
     text = comparison_text(compare([make_plate_result(np.full(64, 700.0)), inexact], ["kept", "broken"]))
-    assert "less exact than the fidelity promises: broken;" in text
+    assert "less exact than promised: broken (warpimpact inspect)." in text
     plate = make_plate_result(velocities(np.linspace(0.5, 1.0, 100)), sampling="sobol", replicates=1)
     finer = '{"fidelity": "reference", "time_step": null}'
     notes = compare([plate, plate.assign_attrs(areal_density=30.0, numerics_given=finer)], ["a", "b"]).notes

@@ -339,7 +339,7 @@ def test_a_figure_says_of_how_many_hits_and_whether_a_promise_is_broken(covered,
     assert "512 hits (50.0% passed the plate), " in cell.shots_text(covered)
     told = cell.shots_text(perforated.assign_attrs(promise_kept=0))
     assert "512 hits, " in told
-    assert told.endswith("numerics less exact than the fidelity promises")
+    assert told.endswith("numerics less exact than promised")
 
 
 def test_a_layer_has_its_own_holes(perforated):
