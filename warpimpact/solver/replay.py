@@ -95,6 +95,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     """
     march, contact = traced(scene, shots, numerics, snapshots)
     memory, trace = march.memory, traces_of(march.memory, contact)[-1]
+    outcomes = outcomes_of(memory, contact)[-1:]  # a snapshot writes over what the march has filled
     time_step = 2.0 * trace[0, 0]
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
@@ -102,7 +103,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     material = material_about(scene.target.layers[0], cell_y, cell_z, spacing) if len(steps) else np.empty((0, 0))
     left = [_left_after(memory, march.cells, count, time_step, material) for count in steps]
     return Replay(
-        outcomes=outcomes_of(memory, contact)[-1:],
+        outcomes=outcomes,
         history=History.from_trace(trace, _body(memory.prepared)),
         plate_time=trace[steps, 0] - 0.5 * time_step if memory.variant.layered else steps * time_step,
         resistance_share=np.array([share for share, _ in left]).reshape(-1, len(cell_y), len(cell_z)),

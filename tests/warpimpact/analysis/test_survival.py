@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact.analysis.comparison import Comparison, Difference, compare
-from warpimpact.analysis.comparison_text import comparison_text
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import Comparison, Difference, comparison_text
 
 MEAN = "residual_energy_fraction"
 DRAWS, HITS = 50, 2000
