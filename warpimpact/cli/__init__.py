@@ -17,6 +17,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .accuracy import add_study, add_validate
 from .compare import add_compare
 from .export import add_export, add_report
+from .firing import add_test
 from .identify import add_identify
 from .limit import add_limit
 from .mistakes import bug_report, implausible_told, told
@@ -44,6 +45,7 @@ _COMMANDS = (
     add_study,
     add_validate,
     add_identify,
+    add_test,
     add_schema,
     add_completion,
 )
