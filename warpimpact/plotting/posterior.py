@@ -26,7 +26,7 @@ _BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.6"
 _MM = 1e3
 _POINTS = 600
 _CELLS = 5.0
-"""Cells of holes that a figure shows at most, on either side of the middle: hits that a fit looks for lie in the first."""
+"""Cells of holes that a figure shows at most on either side of the middle; a fit looks for hits in the first."""
 
 
 def save_posterior(tree: xarray.DataTree, folder: Path, stem: str) -> Iterator[Path]:

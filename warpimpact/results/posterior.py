@@ -23,6 +23,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.checks import parsed_json
 from warpimpact.results.files import ResultError, aside
 from warpimpact.results.interrupts import uninterrupted
+from warpimpact.scene.units import LARGEST
 
 if TYPE_CHECKING:
     import xarray
@@ -68,8 +69,6 @@ _OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
 """Numbers of a posterior beside its parameters, by group, and what they are along."""
 _MAY_LACK = (("best", "misfit"), ("posterior_predictive", MEASURED), ("posterior_predictive", FITTED))
 """NaN where a core does not come through."""
-_MOST = 1e30
-"""Of all sizes that are read."""
 _OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
 _OF_A_REPORT = (attr.TITLE, attr.HISTORY, attr.DEVICE)
 _NUMBERS = (EFFECTIVE, PARETO_K, HIT_NOISE, CONVERGED, WANTED, SETS)
@@ -132,8 +131,8 @@ def _fault(groups: Mapping[str, xarray.Dataset], attributes: Mapping[Any, Any]) 
         array = groups[group].variables.get(name)
         if array is None or array.dims != dims or array.dtype.kind not in "iuf" or not array.size:
             return f'its group "{group}" has no numbers "{name}" along {dims}'
-        if (group, name) not in _MAY_LACK and not (np.abs(array.values) <= _MOST).all():
-            return f'its group "{group}" has a number "{name}" that is not finite, or is more than {_MOST:g}'
+        if (group, name) not in _MAY_LACK and not (np.abs(array.values) <= LARGEST).all():
+            return f'its group "{group}" has a number "{name}" that is not finite, or is more than {LARGEST:g}'
         if set(dims) & {*_SHOTS, *_OBSERVED} - groups[group].coords.keys():
             return f'its group "{group}" does not name what "{name}" is along'
     for name in _NUMBERS:
