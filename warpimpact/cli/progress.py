@@ -139,10 +139,10 @@ class _Log:
         line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - step.resumed
         if fresh <= 0:
             return line
-        if elapsed > 0.0:
-            left = (step.total - step.done) * elapsed / fresh
-            line += f", {fresh / elapsed:.4g} {self._unit}s/s, {left:.0f} s left"
-        return f"{line}; {step.text}".removesuffix("; ")
+        if elapsed <= 0.0:
+            return f"{line}; {step.text}".removesuffix("; ")
+        left = (step.total - step.done) * elapsed / fresh
+        return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s, {left:.0f} s left; {step.text}".removesuffix("; ")
 
 
 @contextmanager
