@@ -12,7 +12,7 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from warpimpact.analysis.survival import over_draws
+from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.campaign.text import CampaignError
@@ -45,6 +45,7 @@ from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import LimitErrors, limits_pilot_size
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.of_groups import of_quantile
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -224,7 +225,8 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     for name, share in QUANTILES.items():
         estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
         ends = (estimate.value, estimate.low, estimate.high)
-        estimate = over_draws(dataset, estimate, counted, units=_UNITS_OF[quantity], kind="quantile")
+        drawn = by_draws(dataset, counted, of_quantile(share))
+        estimate = over_draws(dataset, estimate, drawn, units=_UNITS_OF[quantity])
         value_, low, high = (math.inf if end >= highest else end for end in ends)
         found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
     return found
