@@ -8,7 +8,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .analysis.comparison import Comparison, compare
+    from .analysis.comparison import compare
+    from .analysis.comparison_text import Comparison
     from .analysis.hit_map import hit_map
     from .campaign.campaign import Campaign, Output
     from .campaign.plates import read_plates
@@ -113,7 +114,7 @@ _HOMES = {
     "Campaign": ".campaign.campaign",
     "CampaignError": ".campaign.text",
     "ClusterError": ".runs.team",
-    "Comparison": ".analysis.comparison",
+    "Comparison": ".analysis.comparison_text",
     "DeviceError": ".solver.device",
     "Outcomes": ".records.outcomes",
     "Output": ".campaign.campaign",

@@ -52,8 +52,8 @@ def near_bursts() -> Shots:
     return bursts_of(*rng.normal(0.0, 2e-3, (2, SAMPLES, COUNT)), **arrival)
 
 
-def scene_of(plate: Plate, behind: tuple[Layer, ...] = ()) -> Scene:
-    return Scene(core=PAPER_CORE, target=Target(layers=(plate, *behind)), record=Record(standoffs=STANDOFFS))
+def scene_of(plate: Plate, behind: tuple[Layer, ...] = (), **record: Any) -> Scene:
+    return Scene(core=PAPER_CORE, target=Target(layers=(plate, *behind)), record=Record(standoffs=STANDOFFS, **record))
 
 
 def simulate(
@@ -206,10 +206,10 @@ def test_every_shot_of_a_failed_burst_behind_the_failure_fails() -> None:
 @TARGETS
 @pytest.mark.parametrize("order", [0, 2])
 def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
-    shots, numerics = near_bursts(), Numerics(level=0)
+    shots, numerics, scene = near_bursts(), Numerics(level=0), scene_of(solid_plate(), behind, bending=True)
     at = 5 * COUNT + order
-    again = replay.replay(scene_of(solid_plate(), behind), shots[5 * COUNT : at + 1], numerics=numerics)
-    for name, values in vars(simulate(solid_plate(), shots, behind)).items():
+    again = replay.replay(scene, shots[5 * COUNT : at + 1], numerics=numerics)
+    for name, values in vars(simulation.simulate(scene, shots, numerics=numerics, device="cpu")).items():
         np.testing.assert_array_equal(getattr(again.outcomes, name)[0], values[at], err_msg=name)
     found = again.resistance_share[0]
     assert found.max() == 1.0

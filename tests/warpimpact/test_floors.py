@@ -61,6 +61,18 @@ def test_an_import_upwards_is_found(installed: Path, file: str, line: str, sente
     assert sentence in done.stdout
 
 
+def test_no_files_import_each_other_in_a_circle(installed: Path) -> None:
+    """Imports for type checkers and those inside functions count."""
+    search = """
+import grimp
+graph = grimp.build_graph("warpimpact", cache_dir=None)
+imports = [(file, other) for file in sorted(graph.modules) for other in graph.find_modules_directly_imported_by(file)]
+print(*(f"{file} -> {way}" for file, other in imports if (way := graph.find_shortest_chain(other, file))), sep="\\n")
+"""
+    done = subprocess.run([sys.executable, "-c", search], cwd=installed, capture_output=True, text=True, check=True)
+    assert not done.stdout.strip()
+
+
 def test_every_room_has_its_floor_and_its_package() -> None:
     tables = tomllib.loads((CHECKOUT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
     floors = {name.strip() for layer in tables["importlinter"]["contracts"][0]["layers"] for name in layer.split("|")}

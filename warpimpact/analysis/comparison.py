@@ -16,8 +16,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from html import escape
+from dataclasses import replace
 from itertools import combinations, pairwise
 from typing import Any, NamedTuple
 
@@ -25,11 +24,20 @@ import numpy as np
 import xarray
 
 from warpimpact.analysis.base import base_thickness, has_base, solid_note, solid_plate
-from warpimpact.analysis.effectiveness import ANGLE, EffectMeasure, Evidence, depth_note, effect_names, gather
+from warpimpact.analysis.comparison_text import Comparison, Contestant, Difference, Pair
+from warpimpact.analysis.effectiveness import (
+    ANGLE,
+    EffectMeasure,
+    Evidence,
+    depth_note,
+    effect_names,
+    gather,
+    ratio_of_draws,
+)
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.questions import check_same_question, other_shots
 from warpimpact.analysis.summary import breaks_promise, sampling_note
-from warpimpact.analysis.survival import Survival, draws_note, survival_of, why_not_by_draws
+from warpimpact.analysis.survival import draws_note, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import dealing
 from warpimpact.runs.shards import first_difference
@@ -46,107 +54,6 @@ from warpimpact.statistics.intervals import Array, Estimate, estimate_of
 
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
-
-
-@dataclass(frozen=True)
-class Contestant:
-    """A plate and how well it protects; areal density [kg/m²], open area as a share, and what the solid plate of equal
-    areal density is."""
-
-    name: str
-    hits: int
-    areal_density: float
-    open_area: float
-    measures: tuple[EffectMeasure, ...]
-    solid: str = ""
-
-
-@dataclass(frozen=True)
-class Difference:
-    """By how much a measure of one plate exceeds that of another, with its interval; NaN where there is none.
-
-    `survival` tells whether its sign holds for the true parameters, too; None without a posterior.
-    """
-
-    measure: str
-    one: str
-    other: str
-    value: float
-    low: float
-    high: float
-    survival: Survival | None = None
-
-    @property
-    def told_apart(self) -> bool:
-        """Whether the interval leaves out 0."""
-        return self.low > 0.0 or self.high < 0.0
-
-
-@dataclass(frozen=True)
-class Pair:
-    """How the hits of two plates were used.
-
-    Attributes:
-        paired: so many first hits of each are the same shots, and compared shot by shot.
-        independent: why the plates were compared as independent; empty where they were hit by the same shots.
-    """
-
-    one: str
-    other: str
-    paired: int
-    independent: str
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Plates side by side.
-
-    Attributes:
-        plates: in the order in which they were given; all have the same measures.
-        differences: of every pair of plates in every measure that has intervals.
-        pairs: how the hits of every pair were used.
-        at_equal_weight: names of the measures in which the plates, of different weight, were compared by their ratios
-            to the solid plate; None where their weights are the same.
-        confidence: at which the intervals of a measure's differences hold together.
-        notes: what else there is to say, a sentence each.
-    """
-
-    plates: tuple[Contestant, ...]
-    differences: tuple[Difference, ...]
-    pairs: tuple[Pair, ...]
-    at_equal_weight: frozenset[str] | None
-    confidence: float
-    notes: tuple[str, ...]
-
-    def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        from warpimpact.analysis.comparison_text import comparison_text  # it knows this class
-
-        return f"<pre>{escape(comparison_text(self))}</pre>"
-
-    def ranks(self, measure: str) -> dict[str, int]:
-        """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
-        the rank of a group is one more than the number of plates before it."""
-        told = {(pair.one, pair.other) for pair in self.differences if pair.measure == measure and pair.told_apart}
-        group: list[str] = []
-        ranks: dict[str, int] = {}
-        for place, name in enumerate(self.ordered(measure), start=1):
-            if not group or any({(name, other), (other, name)} & told for other in group):
-                group, rank = [], place
-            group.append(name)
-            ranks[name] = rank
-        return ranks
-
-    def ordered(self, measure: str) -> list[str]:
-        """Names of the plates, the best value first: of the ratio to the solid plate where that counts."""
-        by_ratio = measure in (self.at_equal_weight or ())
-
-        def worse(plate: Contestant) -> float:
-            (told,) = (told for told in plate.measures if told.name == measure)
-            value = told.ratio if by_ratio else told.value
-            return math.inf if math.isnan(value) else -value if told.higher_is_better else value
-
-        return [plate.name for plate in sorted(self.plates, key=worse)]
 
 
 def compare(
@@ -192,9 +99,10 @@ def compare(
             dealt = [dealing(datasets[k]) | {"confidence": each} for k in (i, j)]
             sides = [_side(evidences[k], of, by_ratio=name in by_ratio) for k, of in zip((i, j), dealt, strict=True)]
             interval = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
-            numbers = sides[0].numbers, sides[1].numbers
-            why = why_not_by_draws(name, numbers, independent=pair.independent, by_ratio=name in by_ratio)
-            survival = survival_of((datasets[i], datasets[j]), numbers, interval[0], reason=why, confidence=confidence)
+            drawn = sides[0].drawn, sides[1].drawn
+            why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=name in by_ratio)
+            both = datasets[i], datasets[j]
+            survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, each))
             differences.append(Difference(name, names[i], names[j], *interval, survival))
     plates = tuple(
         Contestant(
@@ -252,27 +160,30 @@ def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str
 
 class _Side(NamedTuple):
     """What of a plate is compared: whether it is a share or made of one, whether it is a ratio to the solid plate,
-    numbers whose mean it is, and its estimate."""
+    numbers whose mean it is, those whose mean over the shots of a draw is that of the draw, and its estimate."""
 
     is_share: bool
     by_ratio: bool
     numbers: Array
+    drawn: Array
     estimate: Estimate
 
 
 def _side(evidence: Evidence, dealt: dict[str, Any], *, by_ratio: bool) -> _Side:
     assert evidence.numbers is not None
+    assert evidence.drawn is not None
     estimate = estimate_of(evidence.kind, evidence.numbers, **dealt)
     if math.isnan(evidence.measure.low):  # as of a worst tenth of few hits
         estimate = replace(estimate, low=math.nan, high=math.nan)
     if not by_ratio:
-        return _Side(evidence.kind == "share", False, evidence.numbers, estimate)
+        return _Side(evidence.kind == "share", False, evidence.numbers, evidence.drawn, estimate)
     assert evidence.solid is not None
+    assert evidence.solid_drawn is not None
     ratio = Ratio.of(estimate, evidence.numbers, evidence.solid, dealt)
     numbers = ratio_numbers(evidence.numbers, evidence.solid, ratio.value)
-    return _Side(
-        evidence.kind == "share", True, numbers, replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
-    )
+    drawn = ratio_of_draws(evidence.drawn, evidence.solid_drawn)
+    estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
+    return _Side(evidence.kind == "share", True, numbers, drawn, estimate)
 
 
 def _difference(one: _Side, other: _Side, dealt: dict[str, Any], *, paired: bool) -> tuple[float, float, float]:

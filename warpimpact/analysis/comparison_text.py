@@ -1,19 +1,122 @@
-"""A comparison of plates in words: who is best at what, then every measure as a ranking with its differences."""
+"""A comparison of plates: its values and ranks, and its words. Who is best at what comes first, then every measure as a
+ranking with its differences."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass
+from html import escape
+from typing import NamedTuple
 
-from warpimpact.analysis.effectiveness import SHOWN_UNITS
-from warpimpact.analysis.numbers import interval_text, intervals_text, of_each
+from warpimpact.analysis.effectiveness import SHOWN_UNITS, EffectMeasure
+from warpimpact.analysis.numbers import intervals_text, of_each
 from warpimpact.analysis.numbers import number_text as number
-from warpimpact.analysis.survival import survival_text
+from warpimpact.analysis.survival import Survival, survival_text
 
-if TYPE_CHECKING:
-    from warpimpact.analysis.comparison import Comparison, Difference
-    from warpimpact.analysis.effectiveness import EffectMeasure
+
+@dataclass(frozen=True)
+class Contestant:
+    """A plate and how well it protects; areal density [kg/m²], open area as a share, and what the solid plate of equal
+    areal density is."""
+
+    name: str
+    hits: int
+    areal_density: float
+    open_area: float
+    measures: tuple[EffectMeasure, ...]
+    solid: str = ""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """By how much a measure of one plate exceeds that of another, with its interval; NaN where there is none.
+
+    `survival` tells whether its sign holds for the true parameters, too; None without a posterior.
+    """
+
+    measure: str
+    one: str
+    other: str
+    value: float
+    low: float
+    high: float
+    survival: Survival | None = None
+
+    @property
+    def parameters(self) -> tuple[float, float] | None:
+        """Its interval by the parameters as of an `Estimate`."""
+        return None if self.survival is None else self.survival.interval
+
+    @property
+    def told_apart(self) -> bool:
+        """Whether the interval leaves out 0."""
+        return self.low > 0.0 or self.high < 0.0
+
+
+@dataclass(frozen=True)
+class Pair:
+    """How the hits of two plates were used.
+
+    Attributes:
+        paired: so many first hits of each are the same shots, and compared shot by shot.
+        independent: why the plates were compared as independent; empty where they were hit by the same shots.
+    """
+
+    one: str
+    other: str
+    paired: int
+    independent: str
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Plates side by side.
+
+    Attributes:
+        plates: in the order in which they were given; all have the same measures.
+        differences: of every pair of plates in every measure that has intervals.
+        pairs: how the hits of every pair were used.
+        at_equal_weight: names of the measures in which the plates, of different weight, were compared by their ratios
+            to the solid plate; None where their weights are the same.
+        confidence: at which the intervals of a measure's differences hold together.
+        notes: what else there is to say, a sentence each.
+    """
+
+    plates: tuple[Contestant, ...]
+    differences: tuple[Difference, ...]
+    pairs: tuple[Pair, ...]
+    at_equal_weight: frozenset[str] | None
+    confidence: float
+    notes: tuple[str, ...]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return f"<pre>{escape(comparison_text(self))}</pre>"
+
+    def ranks(self, measure: str) -> dict[str, int]:
+        """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
+        the rank of a group is one more than the number of plates before it."""
+        told = {(pair.one, pair.other) for pair in self.differences if pair.measure == measure and pair.told_apart}
+        group: list[str] = []
+        ranks: dict[str, int] = {}
+        for place, name in enumerate(self.ordered(measure), start=1):
+            if not group or any({(name, other), (other, name)} & told for other in group):
+                group, rank = [], place
+            group.append(name)
+            ranks[name] = rank
+        return ranks
+
+    def ordered(self, measure: str) -> list[str]:
+        """Names of the plates, the best value first: of the ratio to the solid plate where that counts."""
+        by_ratio = measure in (self.at_equal_weight or ())
+
+        def worse(plate: Contestant) -> float:
+            (told,) = (told for told in plate.measures if told.name == measure)
+            value = told.ratio if by_ratio else told.value
+            return math.inf if math.isnan(value) else -value if told.higher_is_better else value
+
+        return [plate.name for plate in sorted(self.plates, key=worse)]
 
 
 class Ranking(NamedTuple):
@@ -138,10 +241,9 @@ def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
     rows: list[tuple[str, ...]] = []
     for plate in (plates[name] for name in ranks):
         told = plate.measures[place]
-        against = "" if math.isnan(told.ratio_low) else interval_text(told.ratio_low, told.ratio_high)
         value = (f"{plate.areal_density:.2f}", number(told.value), intervals_text(told.low, told.high, told.parameters))
         rank = str(ranks[plate.name]) if is_ranked(comparison, measure.name) else "-"
-        rows.append((rank, plate.name, *value, number(told.ratio), against))
+        rows.append((rank, plate.name, *value, number(told.ratio), told.ratio_text))
     what = " in the ratio to the solid plate" if by_ratio else ""
     return Ranking(
         f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}",
@@ -174,9 +276,17 @@ def _in_words(pair: Difference, measure: EffectMeasure, what: str) -> str:
         told = f"difference{what} {number(pair.value)}"
         return f"{pair.one} and {pair.other}: {told}, of which these hits give no interval"
     if not pair.told_apart:
-        interval = f"({interval_text(pair.low, pair.high)})"
+        interval = f"({intervals_text(pair.low, pair.high, pair.parameters)})"
         return f"{pair.one} and {pair.other} cannot be told apart: difference{what} {number(pair.value)} {interval}"
     names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
-    low, high = sorted((abs(pair.low), abs(pair.high)))
-    verdict = f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval_text(low, high)})"
+    by_hits, by_parameters = (pair.low, pair.high), pair.parameters
+    if pair.value < 0.0:
+        by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
+    interval = intervals_text(*by_hits, by_parameters)
+    verdict = f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
+
+
+def _negative(interval: tuple[float, float]) -> tuple[float, float]:
+    """The interval of the negative number."""
+    return -interval[1], -interval[0]

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..scene import Burst, Hits, Impact, Scatter, Scene
 from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible
 from ..scene.quantities import SCATTERED
-
-if TYPE_CHECKING:
-    from .campaign import Campaign
 
 _OF_A_PLATE = (
     "thickness",
@@ -25,25 +22,26 @@ _OF_A_PLATE = (
 )
 
 
-def warn_of(campaign: Campaign) -> None:
-    """Warn (`Implausible`) of every value that is possible, but far from what such campaigns have."""
-    usual = USUAL | {"hits": hit_bounds(campaign.plate.sampled_cell, campaign.plate.size)}
-    for sentence in implausible(_values(campaign), usual):
+def warn_of(scene: Scene, impact: Impact, hits: Hits, scatter: Scatter, burst: Burst | None) -> None:
+    """Warn (`Implausible`) of every value of a campaign that is possible, but far from what such campaigns have."""
+    plate = scene.target.layers[0]
+    usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
+    for sentence in implausible(_values(scene, impact, hits), usual):
         warnings.warn(sentence, Implausible, stacklevel=2)
-    if campaign.burst is not None and campaign.plate.degradation == 1.0 and not campaign.scatter.degradation:
+    if burst is not None and plate.degradation == 1.0 and not scatter.degradation:
         message = "burst: the plate does not weaken (plate.degradation = 1), so earlier hits change nothing"
         warnings.warn(message, Implausible, stacklevel=2)
 
 
-def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:
+def _values(scene: Scene, impact: Impact, hits: Hits) -> Iterator[tuple[str, str, float]]:
     """Place, kind and value of all that has bounds."""
-    core = campaign.core
+    core, target = scene.core, scene.target
     yield "core: length", "core.length", core.length
     yield "core: largest diameter", "core.diameter", 2.0 * core.max_radius
     if core.density is not None:
         yield "core.density", "core.density", core.density
     yield "core: mass", "core.mass", core.mass_properties.mass
-    for place, plate in campaign.target.named:
+    for place, plate in target.named:
         for name in _OF_A_PLATE:
             if getattr(plate, name) is not None:
                 yield f"{place}.{name}", f"plate.{name}", getattr(plate, name)
@@ -52,14 +50,14 @@ def _values(campaign: Campaign) -> Iterator[tuple[str, str, float]]:
         if plate.open_area > 0.0:
             for side in plate.pattern.unit_cell:
                 yield f"{place}.pattern: cell", "plate.pattern.cell", side
-    for k, layer in enumerate(campaign.layer):
-        yield f"layer[{k}].gap", "layer.gap", layer.gap
-    for name, value in campaign.impact:
+    for k, gap in enumerate(target.gaps[1:]):
+        yield f"layer[{k}].gap", "layer.gap", gap
+    for name, value in impact:
         yield f"impact.{name}", f"impact.{name}", value
     for name in ("standoffs", "layer_standoffs"):
-        for standoff in getattr(campaign.output, name):
+        for standoff in getattr(scene.record, name):
             yield f"output.{name}", "output.standoffs", standoff
-    for name, column in (campaign.hits.listed or {}).items():
+    for name, column in (hits.listed or {}).items():
         kind = f"{SCATTERED[name].table}.{name}" if name in SCATTERED else "hits"
         ends = [float(column[np.abs(column).argmax()])]
         if kind != "hits":  # which may be as small as it likes

@@ -107,4 +107,5 @@ def parser() -> argparse.ArgumentParser:
     commands = program.add_subparsers(metavar="COMMAND", required=True)
     for add in _COMMANDS:
         add(commands)
+    program.set_defaults(program=program)  # from which completion is made
     return program

@@ -145,10 +145,7 @@ def add_completion(commands: Commands) -> None:
 def _completion(arguments: argparse.Namespace) -> None:
     import shtab
 
-    from . import parser
-
-    program = parser()
-    for command in _commands(program):
+    for command in _commands(arguments.program):
         for action in command._actions:
             if command.prog.endswith(" new") and action.dest == "name":
                 action.choices = list(_campaigns())
@@ -156,7 +153,7 @@ def _completion(arguments: argparse.Namespace) -> None:
                 action.choices = ("auto", "cpu", "cuda:0")
             if action.type is Path:
                 vars(action)["complete"] = shtab.FILE
-    print(shtab.complete(program, arguments.shell))
+    print(shtab.complete(arguments.program, arguments.shell))
 
 
 def _commands(program: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:

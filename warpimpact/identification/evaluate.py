@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.identification.aim import Aim, aim
 from warpimpact.identification.fit import Fit, MeasuredShot
-from warpimpact.identification.hits import Aim, Place, aim
+from warpimpact.identification.hits import Place
 from warpimpact.identification.likelihood import Data, Score, score
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots

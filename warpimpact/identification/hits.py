@@ -1,31 +1,23 @@
-"""Where a measured shot hit: a place, a place with its uncertainty, a class of places, or unknown.
-
-What is not known of the hit is integrated out over points that every set of parameters shares (`Aim`).
-"""
+"""Where a measured shot hit: a place, a place with its uncertainty, a class of places, or unknown."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.identification.parameters import is_distribution, read_distribution
-from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmetries_used
+from warpimpact.scene import Core, Plate
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Array
 from warpimpact.scene.units import Length, quantity, quoted
 
-if TYPE_CHECKING:
-    from warpimpact.identification.fit import MeasuredShot, Sampling
-
 _AROUND = 24
 """Points of the core's largest circle that tell whether it crosses the edge of a hole."""
-REPLICATES = 8
-"""Independent scramblings of the hit points: their spread tells how well the hits are integrated out."""
 
 BoolArray = NDArray[np.bool_]
 
@@ -110,50 +102,3 @@ def _coordinate(value: Any, axis: str) -> float | Distribution:
         return float(read(value))
     except ValueError as error:
         raise ValueError(f"{axis}: {error}") from None
-
-
-@dataclass(frozen=True)
-class Aim:
-    """The points over which one shot is integrated, at one scene.
-
-    Attributes:
-        shots: with all images, shape [points].
-        group: symmetries, by which the images of a shot follow each other; `computed` are the first of each group.
-        weight: 1 where a point is of the shot's class, else 0, shape [points].
-        replicates: the computed shots are dealt out to so many independent scramblings in turn.
-    """
-
-    shots: Shots
-    group: tuple[Symmetry, ...]
-    weight: Array
-    replicates: int
-
-    @property
-    def computed(self) -> Shots:
-        return self.shots[:: len(self.group)]
-
-    def of(self, hit: str | Place, plate: Plate, core: Core) -> Aim:
-        """The same points for another class."""
-        inside = CLASSES[hit](plate, core, self.shots.hit_y, self.shots.hit_z) if isinstance(hit, str) else None
-        weight = np.ones(len(self.shots)) if inside is None else inside.astype(np.float64)
-        return replace(self, weight=weight)
-
-
-def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling) -> Aim:
-    """Points for a shot: the same numbers at every set of parameters, spread over the cell of the plate."""
-    placed = isinstance(shot.hit, Place)
-    turned = any(name != "velocity" for name, _ in shot.scatter.given)
-    solid = plate.open_area == 0.0 and plate.size is None
-    alone = not shot.scatter.given and (solid or (isinstance(shot.hit, Place) and shot.hit.is_exact))
-    count = 1 if alone else sampling.hits
-    replicates = 1 if alone else REPLICATES
-    hits = Hits(count=count, seed=sampling.seed, irreducible=not (placed or turned or alone), replicates=replicates)
-    group = symmetries_used(shot.impact, hits, plate)
-    hits = hits.model_copy(update={"count": count * len(group)})
-    sampler = Sampler(shot.impact, hits, plate, shot.scatter, replicates)
-    shots = sampler.shots(0, len(sampler))
-    if isinstance(shot.hit, Place):
-        shares = (at / side + 0.5 for at, side in zip((shots.hit_y, shots.hit_z), plate.sampled_cell, strict=True))
-        hit_y, hit_z = shot.hit.at(*shares)
-        shots = replace(shots, hit_y=hit_y, hit_z=hit_z)
-    return Aim(shots, group, np.ones(len(shots)), replicates).of(shot.hit, plate, core)

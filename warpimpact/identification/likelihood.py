@@ -16,7 +16,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.hits import Aim
+from warpimpact.identification.aim import Aim
 from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes

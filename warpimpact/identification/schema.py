@@ -18,8 +18,10 @@ def fit_schema() -> Schema:
     whole = campaign_schema()
     for definition in whole["$defs"].values():
         definition["required"] = [name for name in definition.get("required", []) if name in ("shape", "distribution")]
+        if definition.get("if") == {"required": ["areal_density"]}:  # a prior may give the thickness
+            del definition["if"], definition["then"], definition["else"]
     keys = whole["properties"]
-    keys["plate"] = {"description": keys["plate"]["description"], **keys["plate"]["else"]}
+    keys["plate"] = {"description": keys["plate"]["description"], **keys["plate"]["then"]}
     tables = {name: keys[name] for name in ("core", "plate", "interaction")}
     free: Schema = {"type": "object"}
     shot = {"name": {"type": "string"}, "hit": {}, "impact": keys["impact"], "measured": free, **tables}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from warpimpact.analysis.comparison import Comparison, Difference
+    from warpimpact.analysis.comparison_text import Comparison, Difference
     from warpimpact.analysis.effectiveness import EffectMeasure
 
 # Colours of Okabe and Ito: they differ in every kind of colour blindness. Markers differ for a print in grey.

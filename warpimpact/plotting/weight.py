@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-    from warpimpact.analysis.comparison import Comparison, Contestant
+    from warpimpact.analysis.comparison_text import Comparison, Contestant
     from warpimpact.analysis.effectiveness import EffectMeasure
 
 # Colours of Okabe and Ito, as in the figure of a comparison.

@@ -3,15 +3,16 @@
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
-from .exclusions import BY_PATH, BY_TIME, MARGIN, SIZE, check_together
+from .exclusions import AREAL_DENSITY, BY_PATH, BY_TIME, MARGIN, SIZE, THICKNESS, check_together
 from .model import Array, Model
 from .patterns import AnyPattern, BoolArray, NoPattern, Pattern
 from .units import (
     NonNegativeNumber,
     NonNegativeStress,
     Number,
+    PositiveArealDensity,
     PositiveDensity,
     PositiveLength,
     PositiveTime,
@@ -21,11 +22,16 @@ INTERVAL = 1.0e-6
 """Δt_β where neither it nor Δs_β is given [s]: that of the paper's rows (docs/model.md §4)."""
 
 
+class _Weight(BaseModel):
+    areal_density: PositiveArealDensity
+
+
 class Plate(Model):
     """A perforated plate. It is unbounded, or rectangular if `size` is given.
 
     Attributes:
         thickness: that of the plate, h [m].
+        areal_density: mass per area of the plate with its holes [kg/m²], in place of the thickness, which follows.
         resistance: Y, the stress of the material against the core [Pa].
         shear_coefficient: η, friction per normal stress.
         degradation: β, the share of Y that is left after contact for `degradation_interval` or over
@@ -55,6 +61,22 @@ class Plate(Model):
     size: tuple[PositiveLength, PositiveLength] | None = None
     margin: PositiveLength | None = None
     pattern: AnyPattern = NoPattern()
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _has_its_weight(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if not isinstance(values, dict) or values.get("areal_density") is None:
+            return read(values)
+        check_together({THICKNESS: "thickness" in values, AREAL_DENSITY: True})
+        rest = {name: value for name, value in values.items() if name != "areal_density"}
+        weight = _Weight(areal_density=values["areal_density"]).areal_density
+        plate = read(rest | {"thickness": 1.0})
+        object.__setattr__(plate, "thickness", weight / plate.areal_density)  # which was that of 1 m
+        return plate
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [*super()._keys(), "areal_density"]
 
     @field_validator("pattern")
     @classmethod

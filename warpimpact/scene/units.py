@@ -174,6 +174,7 @@ COMMON = {
     ("MPa", "Pa"): 1e6,
     ("GPa", "Pa"): 1e9,
     ("kg/m^3", "kg/m^3"): 1.0,
+    ("kg/m^2", "kg/m^2"): 1.0,
     ("m/s", "m/s"): 1.0,
     ("rad", "rad"): 1.0,
     ("deg", "rad"): math.pi / 180.0,
@@ -287,6 +288,7 @@ Time = Annotated[Read, _quantity("a time", "s", "1 us")]
 Stress = Annotated[Read, _quantity("a stress", "Pa", "2600 MPa")]
 Moment = Annotated[Read, _quantity("a moment", "N m", "50 N m")]
 Density = Annotated[Read, _quantity("a density", "kg/m^3", "7850 kg/m^3")]
+ArealDensity = Annotated[Read, _quantity("an areal density", "kg/m^2", "31.4 kg/m^2")]
 Speed = Annotated[Read, _quantity("a speed", "m/s", "825 m/s")]
 Angle = Annotated[
     Read,
@@ -324,6 +326,7 @@ NonNegativeLength = Annotated[Length, Field(ge=0)]
 PositiveMass = Annotated[Mass, Field(gt=0)]
 PositiveTime = Annotated[Time, Field(gt=0)]
 PositiveDensity = Annotated[Density, Field(gt=0)]
+PositiveArealDensity = Annotated[ArealDensity, Field(gt=0)]
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 PositiveSpeed = Annotated[Speed, Field(gt=0)]
 PositiveInertia = Annotated[Inertia, Field(gt=0)]

@@ -4,6 +4,7 @@ computed at a time, and what the kernels fill."""
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -116,6 +117,13 @@ class Memory:
             setattr(shots, name, self.put(prepared.conditions[name], variable.type.dtype))
         return shots
 
+    def build(self) -> float:
+        """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
+        begin = time.perf_counter()
+        for kernel in (self.stage.kernel, free_flight.build(self.variant).kernel):
+            load(kernel, self.device)
+        return time.perf_counter() - begin
+
     def give_up_after(self, way: float) -> None:
         """Give up the last shot after this distance [m] at impact velocity."""
         longest_way = self.shots.longest_way.numpy()
@@ -181,7 +189,7 @@ class Memory:
         count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        earlier = count * (nodes * size + 17 * layers) if count > 1 else 0
+        earlier = count * (nodes * size + 17 * layers) if self.variant.burst else 0
         patches = self._patches * (7 * size + 2 * 4)
         slot = len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring
         free = free_memory() if self.device.is_cpu else self.device.free_memory
@@ -210,9 +218,9 @@ class Memory:
         return fields, touches, stack, self._earlier(slots, nodes)
 
     def _earlier(self, slots: int, nodes: list[int]) -> Any:
-        """Scratch of the earlier hits on a plate (kernels/earlier.py); one shot at a plate needs none."""
+        """Scratch of the earlier hits on a plate (kernels/earlier.py)."""
         earlier, count, layers = self.stage.Earlier(), self.at_a_plate, len(nodes)
-        if count > 1:
+        if self.variant.burst:
             earlier.count, earlier.nodes, earlier.layers = count, sum(nodes), layers
             places = dict.fromkeys(("y", "z", "open"), slots * count * layers)
             for name, size in ({"exposure": slots * count * sum(nodes)} | places).items():

@@ -78,7 +78,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     resolution = resolve(scene, numerics, weakening)
     conditions = conditions_of(core, target, shots, materials, resolution)
     deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
-    plates, at_a_plate = list(enumerate(target.layers)), shots.at_a_plate
+    plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
     asked.check_together(
         {
             asked.NODAL: resolution.nodal,
@@ -87,7 +87,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
             asked.BENDING: record.bending,
             asked.LAYERS: len(plates) > 1,
             asked.BY_PATH: any(one.by_path for one in materials),
-            asked.BURST: at_a_plate > 1,
+            asked.BURST: burst,
             asked.DEEP: deep,
         }
     )
@@ -105,7 +105,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         bends=record.bending,
         layered=len(plates) > 1,
         deep=deep,
-        burst=any(weakening) and at_a_plate > 1,
+        burst=any(weakening) and burst,  # also of one shot, as a replay of the first one of several is
         window=block_window(cells) if resolution.block else 0,
     )
     axial, around = resolution.patches_axial, resolution.patches_around

@@ -12,8 +12,8 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
-from warpimpact.analysis.comparison import Comparison, Difference, compare
-from warpimpact.analysis.comparison_text import comparison_text
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import Comparison, Difference, comparison_text
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.campaign.plates import read_plates

@@ -110,7 +110,6 @@ def test_bash_completes_commands_and_options(capsys: pytest.CaptureFixture[str])
         ([], "64 of 64 hits", "warpimpact.solver"),
         (["-q"], "", "of 64 hits"),
         (["-v"], "warpimpact.solver.pilot: pilot at level", "warpimpact.solver.device"),
-        (["-vv"], "warpimpact.solver.device: march on cpu: loaded in", "nothing of the kind"),
     ],
 )
 def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -118,6 +117,13 @@ def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys:
     shown = capsys.readouterr().err
     assert told in shown
     assert untold not in shown
+
+
+def test_what_is_loaded_is_told_at_the_highest_verbosity() -> None:
+    command = [sys.executable, "-c", "from warpimpact.cli import command; command()"]
+    arguments = ["run", str(CAMPAIGNS / "slotted_plate.toml"), "--count", "4", "--device", "cpu", "-vv"]
+    done = subprocess.run(command + arguments, capture_output=True, text=True, check=True)
+    assert "warpimpact.solver.device: march on cpu: loaded in" in done.stderr
 
 
 INTERRUPTED = """

@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpimpact.identification.aim import Aim, aim
 from warpimpact.identification.evaluate import benches, data_of, evaluate, runs
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.hits import CLASSES, Aim, aim
+from warpimpact.identification.hits import CLASSES
 from warpimpact.identification.likelihood import Data, holds, score
 from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status

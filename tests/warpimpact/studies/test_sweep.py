@@ -73,6 +73,15 @@ def test_points_with_other_standoffs_are_joined(standoffs: list[list[str]], tmp_
         assert one.drop_sel(standoff=own).isnull().all()
 
 
+def test_plates_of_some_weights_are_swept(tmp_path: Path) -> None:
+    text = TEXT.replace('thickness = "4 mm"', "") + '[sweep]\nareal_density = ["20 kg/m^2", 25]\n'
+    (tmp_path / "a.toml").write_text(text.replace("count = 24", "count = 2"), encoding="utf-8")
+    sweep = read_sweep(tmp_path / "a.toml")
+    found = joined(sweep, [run(one, device="cpu") for one in sweep.campaigns.values()])
+    np.testing.assert_allclose(found["areal_density"], [20.0, 25.0], rtol=1e-14)
+    assert found["areal_density"].attrs["units"] == "kg m-2"
+
+
 def test_a_point_is_a_result_and_a_sweep_says_that_it_is_one(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     points = sorted(folder_of(folder / "a.nc").glob("*.nc"))
     assert len(points) == 6
