@@ -95,16 +95,8 @@ class Posterior:
         chosen: NDArray[np.int64] = used[places[first - blocks.start * self.draws :][:count]]
         return chosen
 
-    def scenes(self, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:
-        """Places of the shots that share a scene, and that scene."""
-        draw = shots.posterior_draw
-        if draw is None or not self.of_scene:
-            yield np.arange(len(shots)), scene
-            return
-        for one in np.unique(draw):
-            yield np.flatnonzero(draw == one), self._scene(scene, int(one))
-
-    def _scene(self, scene: Scene, draw: int) -> Scene:
+    def scene(self, scene: Scene, draw: int) -> Scene:
+        """A scene with those parameters of a draw that need a scene of their own."""
         own: dict[str, dict[str, float]] = {"plate": {}, "interaction": {}}
         for table, key in self.of_scene:
             own[str(table)][str(key)] = float(self.values[table, key][draw])
@@ -113,6 +105,16 @@ class Posterior:
         return scene.model_copy(
             update={"target": target, "interaction": scene.interaction.model_copy(update=own["interaction"])}
         )
+
+
+def scenes_of(drawn: Posterior | None, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:
+    """Places of the shots that share a scene, and that scene: one for all, but where draws need scenes of their own."""
+    draw = shots.posterior_draw
+    if drawn is None or draw is None or not drawn.of_scene:
+        yield np.arange(len(shots)), scene
+        return
+    for one in np.unique(draw):
+        yield np.flatnonzero(draw == one), drawn.scene(scene, int(one))
 
 
 class DrawnSampler(Sampler):
