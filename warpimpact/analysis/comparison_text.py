@@ -253,10 +253,10 @@ def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
 
 
 def _ranking_lines(ranking: Ranking) -> list[str]:
-    width = max(5, *(len(row[1]) for row in ranking.rows))
+    width, wide = (max(least, *(len(row[at]) for row in ranking.rows)) for at, least in ((1, 5), (4, 18)))
     lines = [ranking.title]
     for rank, plate, density, value, interval, ratio, against in (RANKING_HEAD, *ranking.rows):
-        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<20}{ratio}"
+        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<{wide}}  {ratio}"
         lines.append(f"{start}  {against}" if against else start)
     return lines + ranking.differences
 

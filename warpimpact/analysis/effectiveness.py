@@ -72,7 +72,7 @@ class EffectMeasure:
     @property
     def ratio_text(self) -> str:
         """The interval of the ratio, or both; empty where there is none."""
-        if self.ratio_parameters is None and math.isnan(self.ratio_low):
+        if math.isnan(self.ratio) or (self.ratio_parameters is None and math.isnan(self.ratio_low)):
             return ""
         return intervals_text(self.ratio_low, self.ratio_high, self.ratio_parameters)
 
@@ -247,13 +247,13 @@ def effectiveness_text(
     """The measures of `effectiveness` as a table, beside those of the solid plate of equal areal density."""
     measures = effectiveness(dataset, angle=angle, standoff=standoff)
     labels = [measure.label + SHOWN_UNITS[measure.units] for measure in measures]
-    width = max(map(len, labels))
+    width, wide = max(map(len, labels)), max(18, *(len(_second(measure)) for measure in measures))
     title = f"effectiveness{plate_text(dataset)}"
-    head = f"{title:<{width}}{'':>10}   {'95 % interval':<18}"
+    head = f"{title:<{width}}{'':>10}   {'95 % interval':<{wide}}"
     with_solid = any(not math.isnan(measure.solid) for measure in measures)
     rows = [head + f"{'solid plate':>12}   ratio to it" if with_solid else head.rstrip()]
     for label, measure in zip(labels, measures, strict=True):
-        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
+        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<{wide}}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
     if note := depth_note(measures):
         rows.append(note)
