@@ -38,6 +38,7 @@ from ..scene.files import InputFile
 from ..scene.model import Model
 from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range
+from ..scene.shots import FARTHEST
 from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
@@ -49,8 +50,6 @@ from .scatter_tables import with_scatter_apart
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
 
-_FARTHEST = 100.0
-"""Of hits from the origin [m]."""
 _MOST_LENGTHS = 1000
 """Degradation lengths in the radius of a core: its surface has patches of about that length."""
 _MOST_DEPTHS = 100
@@ -296,7 +295,7 @@ class Campaign(Model):
         farthest += 0.0 if self.burst is None else self.burst.reach
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
-        allowed = min(_FARTHEST, 2**30 * cell)
+        allowed = min(FARTHEST, 2**30 * cell)
         if farthest > allowed:
             raise ValueError(
                 f"got hits up to {farthest:.6g} m from the origin, but they are exact up to {allowed:.4g} m; a pattern "

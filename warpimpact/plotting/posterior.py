@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.6"
 _MM = 1e3
 _POINTS = 600
+_CELLS = 5.0
+"""Cells of holes that a figure shows at most on either side of the middle; a fit looks for hits in the first."""
 
 
 def save_posterior(tree: xarray.DataTree, folder: Path, stem: str) -> Iterator[Path]:
@@ -150,8 +152,9 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
         axes = panels[place]
         scene = fit.scene_of(shot, medians)
         y, z = (_MM * posterior[name].values[..., place].ravel() for name in files.HITS)
-        half = [0.55 * side * _MM for side in scene.target.layers[0].sampled_cell]
-        half = [max(one, float(np.abs(at).max()) * 1.05) for one, at in zip(half, (y, z), strict=True)]
+        cell = [side * _MM for side in scene.target.layers[0].sampled_cell]
+        far = [float(np.abs(at).max()) * 1.05 for at in (y, z)]
+        half = [min(max(0.55 * side, most), _CELLS * side) for side, most in zip(cell, far, strict=True)]
         ranges = [(-one / _MM, one / _MM) for one in half]
         axes.set_facecolor("0.85")
         for outline in scene.target.layers[0].pattern.outlines(*ranges):
