@@ -45,6 +45,7 @@ from ..scene.units import Number, PositiveLength, Title
 from .plausible import warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
+from .published import Published
 from .scatter_tables import with_scatter_apart
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
@@ -88,6 +89,7 @@ class Campaign(Model):
         posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
+        published: published limits, which `warpimpact limit` puts beside its own: a table `[[published]]` each.
     """
 
     title: Title
@@ -103,6 +105,7 @@ class Campaign(Model):
     posterior: InputFile | None = None
     stop: Stop | None = None
     burst: Burst | None = None
+    published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
     _source: str = PrivateAttr("")
 
     @property
