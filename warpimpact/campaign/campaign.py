@@ -29,9 +29,9 @@ from ..scene import (
     Scene,
     Symmetry,
     Target,
+    exclusions,
     symmetries_used,
 )
-from ..scene import exclusions as asked
 from ..scene.distributions import EDGE
 from ..scene.exclusions import check_together
 from ..scene.files import InputFile
@@ -45,6 +45,7 @@ from ..scene.units import Number, PositiveLength, Title
 from .plausible import warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
+from .published import Published
 from .scatter_tables import with_scatter_apart
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
@@ -88,6 +89,7 @@ class Campaign(Model):
         posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
+        published: published limits, which `warpimpact limit` puts beside its own: a table `[[published]]` each.
     """
 
     title: Title
@@ -103,6 +105,7 @@ class Campaign(Model):
     posterior: InputFile | None = None
     stop: Stop | None = None
     burst: Burst | None = None
+    published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
     _source: str = PrivateAttr("")
 
     @property
@@ -216,7 +219,7 @@ class Campaign(Model):
         scattered = [name for name, layer in self.scatter.given if not layer]
         given = [name for name in scattered if ("plate", name) in drawn.values or name == "degradation"]
         found = bool(given) and f"a distribution of plate.{given[0]}"
-        check_together({asked.POSTERIOR: True, asked.SCATTER_OF_MATERIAL: found})
+        check_together({exclusions.POSTERIOR: True, exclusions.SCATTER_OF_MATERIAL: found})
         return self
 
     @model_validator(mode="before")
@@ -247,22 +250,22 @@ class Campaign(Model):
         check_together(
             unsymmetric(self.scatter, self.layer)
             | {
-                asked.STOP: stop is not None,
-                asked.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
-                asked.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
-                asked.STOP_BENDING: variable in BENDING_VARIABLES and told,
-                asked.STOP_BROKEN: variable in BROKEN_VARIABLES and told,
-                asked.IMAGES: hits.irreducible,
-                asked.LISTED_STRENGTH: "strength" in (hits.listed or {}),
-                asked.BURST: self.burst is not None,
-                asked.POSTERIOR: self.posterior is not None,
-                asked.LAYERS: bool(self.layer),
-                asked.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
-                asked.BENDING: self.output.bending,
-                asked.STRENGTH: self.core.strength is not None or "strength" in (hits.listed or {}),
-                asked.NODAL: numerics.scheme == "nodal",
-                asked.BLOCK: numerics.layout == "block",
-                asked.DOUBLE: numerics.precision == "double",
+                exclusions.STOP: stop is not None,
+                exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
+                exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
+                exclusions.STOP_BENDING: variable in BENDING_VARIABLES and told,
+                exclusions.STOP_BROKEN: variable in BROKEN_VARIABLES and told,
+                exclusions.IMAGES: hits.irreducible,
+                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
+                exclusions.BURST: self.burst is not None,
+                exclusions.POSTERIOR: self.posterior is not None,
+                exclusions.LAYERS: bool(self.layer),
+                exclusions.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
+                exclusions.BENDING: self.output.bending,
+                exclusions.STRENGTH: self.core.strength is not None or "strength" in (hits.listed or {}),
+                exclusions.NODAL: numerics.scheme == "nodal",
+                exclusions.BLOCK: numerics.layout == "block",
+                exclusions.DOUBLE: numerics.precision == "double",
             }
         )
         return self
