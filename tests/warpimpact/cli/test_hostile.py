@@ -262,7 +262,7 @@ def test_a_result_shows_no_control_characters(
 @pytest.mark.usefixtures("unrendered")
 def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> None:
     path = tmp_path / "a.nc"
-    files.write(make_result(100).assign_attrs(title=r"costs 5 $ or $\notacommand{"), path)
+    files.write(make_result(100).assign_attrs(title=r"costs 5 $ or \frac{1}{ $"), path)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 0
 
 
@@ -282,6 +282,8 @@ def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) ->
         lambda d: d.assign_attrs(sampling="sobol"),
         lambda d: d.assign_attrs(title=7),
         lambda d: d.assign(status=d["status"].astype(str)),
+        lambda d: d.assign_coords(hit_z=d["hit_z"] + 1e30),
+        lambda d: d.assign_coords(standoff=d["standoff"] * 1e300),
         lambda d: d.assign(tilt=("standoff", np.zeros(2)), deflection=("standoff", np.zeros(2))),
         lambda d: d.assign(tilt=d["tilt"].assign_attrs(units="furlong")),
     ],
