@@ -23,8 +23,8 @@ def add_examples(commands: Commands) -> None:
         "examples",
         _examples,
         summary="list the campaigns, fits and tests that come with warpimpact",
-        description="List the campaigns, fits and tests that come with warpimpact, each with the question that it answers. "
-        "warpimpact new NAME copies an example.",
+        description="List the campaigns, fits and tests that come with warpimpact, each with the question that it "
+        "answers. warpimpact new NAME copies an example.",
         example="examples",
     )
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.firing.procedures import Estimate, Estimated, Optimal, Procedure, Shot, Steps
+from warpimpact.firing.procedures import Procedure
 from warpimpact.firing.response import Response
+from warpimpact.firing.steps import Estimate, Estimated, Optimal, Shot, Steps
 from warpimpact.scene.sampling import stream
 from warpimpact.statistics.quantal import d_optimal, fit_quantal, information
 

@@ -4,17 +4,8 @@ from collections.abc import Sequence
 
 import pytest
 
-from warpimpact.firing.procedures import (
-    Estimated,
-    Langlie,
-    MilStd662F,
-    Neyer,
-    Optimal,
-    Procedure,
-    Shot,
-    ThreePod,
-    UpAndDown,
-)
+from warpimpact.firing.procedures import Langlie, MilStd662F, Neyer, Procedure, ThreePod, UpAndDown
+from warpimpact.firing.steps import Estimate, Estimated, Optimal, Shot
 
 
 def aims(procedure: Procedure, answers: Sequence[int]) -> list[float | Optimal]:
@@ -66,8 +57,6 @@ def test_the_velocities_follow_the_published_rules(
 
 def test_the_third_phase_approaches_a_quantile() -> None:
     """Perforations pull down by more than stops push up, for a quantile of few perforations."""
-    from warpimpact.firing.procedures import Estimate
-
     procedure = ThreePod(**RANGE, spread=20.0, shots=2, quantile_shots=3, quantile=0.1)
     steps = procedure.steps()
     next(steps)
