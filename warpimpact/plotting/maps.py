@@ -22,6 +22,7 @@ from warpimpact.plotting.distribution import (
     mean_and_spread,
     uncertainty,
 )
+from warpimpact.plotting.heading import add_heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
@@ -216,7 +217,7 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure,
 
 def _inscribe(figure: Figure, title: str, note: str) -> None:
     height = figure.get_figheight()
-    figure.suptitle(title, y=1.0 - 0.12 / height, va="top", wrap=True)
+    add_heading(figure, title)
     figure.supxlabel(note, y=0.12 / height, va="bottom", fontsize="small", color="0.3")
 
 
