@@ -1,4 +1,4 @@
-"""Procedures: which velocity the next shot of a test is fired at, by the answers of the shots before it (`steps.py`)."""
+"""Procedures: which velocity the next shot of a test is fired at, by the answers before it (`steps.py`)."""
 
 from __future__ import annotations
 

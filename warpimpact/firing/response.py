@@ -11,7 +11,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import xarray
@@ -25,7 +24,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import dealing
 from warpimpact.results.outlines import outlines
-from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.intervals import Dealing, Estimate, estimate_of
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -53,7 +52,7 @@ class Response:
     hit_z: Array
     yaw: Array
     cell: tuple[float, float] | None
-    dealt: dict[str, Any]
+    dealt: Dealing
     outline: tuple[Array, Array] = (np.empty(0), np.empty(0))
 
     def __len__(self) -> int:

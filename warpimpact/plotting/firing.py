@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.firing.text import verdict
+from warpimpact.plotting.heading import add_heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 
@@ -45,7 +45,7 @@ def firing_figure(dataset: xarray.Dataset) -> Figure:
         draw(one, dataset, settings)
     for one in axes[len(panels) :]:
         one.set_axis_off()
-    figure.suptitle(f"{fill(str(dataset.attrs[attr.TITLE]), 100)}\n{dataset.attrs[f.DISCLAIMER]}", fontsize=11)
+    add_heading(figure, f"{dataset.attrs[attr.TITLE]}\n{dataset.attrs[f.DISCLAIMER]}")
     return figure
 
 
