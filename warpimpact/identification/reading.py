@@ -26,8 +26,7 @@ from warpimpact.identification.parameters import (
     with_medians,
 )
 from warpimpact.results.measures import Measure, place_of_standoff
-from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene, exclusions
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
@@ -267,7 +266,9 @@ def _check_scenes(fit: Fit, name: str) -> None:
         where = f"{name}: shot[{place}]"
         try:
             scene = fit.scene_of(shot)
-            asked.check_together({asked.BENDING: fit.record.bending, asked.NODAL: fit.numerics.scheme == "nodal"})
+            exclusions.check_together(
+                {exclusions.BENDING: fit.record.bending, exclusions.NODAL: fit.numerics.scheme == "nodal"}
+            )
         except ValueError as error:
             raise FitError(f"{where}: {_reason(error, shot)}") from None
         _check_hit(shot, scene, where)

@@ -54,7 +54,11 @@ def comparison_figure(comparison: Comparison) -> Figure:
     legend = {label: handle for some in entries for label, handle in some}  # each entry once
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
     used = "\n".join(hits_used(comparison))
-    figure.suptitle(f"{used}\n95 % intervals; hollow marker: cannot be told apart", fontsize="medium")
+    drawn = any(pair.parameters for pair in comparison.differences)
+    both = "by hits (thin lines) and by parameters (broad ones)" if drawn else ""
+    figure.suptitle(
+        f"{used}\n95 % intervals {both}".rstrip() + "; hollow marker: cannot be told apart", fontsize="medium"
+    )
     return figure
 
 
@@ -118,8 +122,10 @@ def _draw_interval(
     label: str | None = None,
     hollow: bool = False,
 ) -> None:
-    """Draw a number with its interval."""
+    """Draw a number with its interval, or with both."""
     value, (marker, colour) = number.value, style
+    if number.parameters is not None and not math.isnan(sum(number.parameters)):
+        axes.plot(number.parameters, [line, line], color=colour, linewidth=7.0, alpha=0.3, solid_capstyle="butt")
     ends = None if math.isnan(number.low) else [[max(0.0, value - number.low)], [max(0.0, number.high - value)]]
     axes.errorbar(
         value,

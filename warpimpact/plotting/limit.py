@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from itertools import cycle
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -18,11 +20,13 @@ from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
 from warpimpact.studies.limit import QUANTILES, quantiles
 from warpimpact.studies.limit_text import promise_line, shown_unit
+from warpimpact.studies.published import published_beside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
+_OTHERS = ("#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
@@ -56,6 +60,8 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
 def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
     note = fill(f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", 110)
     figure.suptitle(f"{heading(dataset)}\n{note}", fontsize=10)
+    if sources := dict.fromkeys(row.published.source for row in published_beside(dataset)):
+        figure.supxlabel(fill("published: " + "; ".join(sources), 110), fontsize=8)
 
 
 def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
@@ -75,6 +81,8 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
         law = growth if quantity == "velocity" else 1.0 / growth
         label = "as 1/cos(obliquity)" if quantity == "velocity" else "as cos(obliquity)"
         axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=label)
+    if not yawed:
+        _draw_published(axes, dataset)
     across = "between axis and line of fire on impact" if yawed else "obliquity"
     reference = solid_limits(dataset)
     if reference is not None:
@@ -88,12 +96,45 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
     return figure
 
 
+def _draw_published(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Published limits against the obliquity, rows of one label alike."""
+    rows = published_beside(dataset)
+    for (label, marker), colour in zip(
+        zip(dict.fromkeys(row.label for row in rows), "s^vP*", strict=False), _OTHERS, strict=False
+    ):
+        some = [row.published for row in rows if row.label == label]
+        axes.errorbar(
+            [math.degrees(one.obliquity) for one in some],
+            [one.velocity for one in some],
+            yerr=[one.standard_deviation or math.nan for one in some]
+            if any(one.standard_deviation for one in some)
+            else None,
+            fmt=marker,
+            color=colour,
+            fillstyle="none",
+            capsize=3.0,
+            label=label,
+        )
+
+
 def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
     """Of the solid plate; its thickness stands for the whole target, not for the layer that was searched."""
     several = ", mean" if dataset.sizes.get("solid_hit", 1) > 1 and quantity == "velocity" else ""
     if quantity == "velocity":
         return f"solid plate of equal areal density{several}"
     return "solid plate in place of the whole target"
+
+
+def _mark_published(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Published limits at the obliquity of the hits, as lines across the share of the hits."""
+    for row, colour in zip((one for one in published_beside(dataset) if not math.isnan(one.computed)), cycle(_OTHERS)):
+        velocity, error = row.published.velocity, row.published.standard_deviation
+        axes.axvline(velocity, color=colour, linewidth=1.2, linestyle=":", label=row.label)
+        if error:
+            axes.axvspan(velocity - error, velocity + error, color=colour, alpha=0.12)
+        low, high = axes.get_xlim()
+        axes.set_xlim(min(low, velocity - 0.03 * (high - low)), max(high, velocity + 0.03 * (high - low)))
+        axes.legend(loc="lower right", frameon=False, fontsize="small")
 
 
 def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
@@ -126,6 +167,7 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
             margin = 0.03 * (high - low)
             axes.set_xlim(min(low, mean - margin), max(high, mean + margin))
             axes.legend(loc="lower right", frameon=False, fontsize="small")
+    _mark_published(axes, dataset)
     layer = int(dataset.attrs[attr.LIMIT_LAYER])
     whose, share_label = _CURVE[quantity]
     label = whose.format(f"layer {layer}" if layer else "the plate")

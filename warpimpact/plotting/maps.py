@@ -45,7 +45,7 @@ _BELOW_NO_LEGEND, _FOOT_WITH_LEGEND = 0.65, 0.85
 _MOST_COLUMNS = 3
 
 
-def hit_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """Map of one variable of the Dataset over the hit points; hits without a value are grey.
 
     Where hits draw their parameters from a posterior, it shows the mean and the spread at every place. Args and errors
@@ -58,11 +58,11 @@ def hit_map(dataset: xarray.Dataset, variable: str, standoff: float | None = Non
     return figure
 
 
-def hit_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
+def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
     """The same map of several results side by side, in the same colours and to the same scale.
 
     Args:
-        datasets: results by the names that their maps get; the others as in `hit_map`.
+        datasets: results by the names that their maps get; the others as in `variable_map`.
     """
     figure, panels = _sheet(list(datasets.values()), columns=min(_MOST_COLUMNS, len(datasets)))
     columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
@@ -145,7 +145,7 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
         at_standoffs = v.STANDOFF in variable.dims
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoffs else [None]:
             name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
-            figures[name] = hit_map(dataset, variable, standoff)
+            figures[name] = variable_map(dataset, variable, standoff)
     figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
     if dataset.sizes["standoff"]:
         figures["dispersion"] = dispersion(dataset)
@@ -168,7 +168,7 @@ def save_beside(
     """
     there = all(dataset.sizes["standoff"] for dataset in datasets.values())
     figures: dict[str, Figure] = {
-        variable: hit_maps(datasets, variable) for variable in _MAIN if variable != v.TILT or there
+        variable: variable_maps(datasets, variable) for variable in _MAIN if variable != v.TILT or there
     }
     return _saved(figures, folder, stem, overwrite=overwrite)
 

@@ -55,7 +55,7 @@ class Row(NamedTuple):
     interval: str
 
 
-def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
+def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
     promise = promise_text(dataset)

@@ -11,6 +11,8 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.scene.shots import FARTHEST
+from warpimpact.scene.units import LARGEST
 
 if TYPE_CHECKING:
     import xarray
@@ -91,12 +93,12 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
     if not all(np.isin(status[at : at + _SLICE].values, codes).all() for at in range(0, len(status), _SLICE)):
         return f'its variable "{v.STATUS}" has unknown codes'
     for place in (dataset[name] for name in (v.HIT_Y, v.HIT_Z) if name in dataset.variables):
-        if not all(np.isfinite(place[at : at + _SLICE].values).all() for at in range(0, place.size, _SLICE)):
-            return f'its variable "{place.name}" has values that are not numbers'
+        if not all((np.abs(place[at : at + _SLICE].values) <= FARTHEST).all() for at in range(0, place.size, _SLICE)):
+            return f'its variable "{place.name}" has values that are not numbers, or are more than {FARTHEST:g} m'
     if v.STANDOFF in dataset.coords:
         standoffs = dataset[v.STANDOFF].values
-        if not (np.isfinite(standoffs).all() and np.unique(standoffs).size == standoffs.size):
-            return f'its variable "{v.STANDOFF}" has values that are not numbers, or one of them twice'
+        if not ((np.abs(standoffs) <= LARGEST).all() and np.unique(standoffs).size == standoffs.size):
+            return f'its variable "{v.STANDOFF}" has values that are no lengths, or one of them twice'
     return None
 
 

@@ -282,6 +282,8 @@ def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) ->
         lambda d: d.assign_attrs(sampling="sobol"),
         lambda d: d.assign_attrs(title=7),
         lambda d: d.assign(status=d["status"].astype(str)),
+        lambda d: d.assign_coords(hit_z=d["hit_z"] + 1e30),
+        lambda d: d.assign_coords(standoff=d["standoff"] * 1e300),
         lambda d: d.assign(tilt=("standoff", np.zeros(2)), deflection=("standoff", np.zeros(2))),
         lambda d: d.assign(tilt=d["tilt"].assign_attrs(units="furlong")),
     ],
