@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -12,12 +11,11 @@ from pydantic import TypeAdapter, ValidationError
 from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat, Velocity
 from ..scene import AnyCore, Core, Layer, Plate
-from ..scene.units import Obliquity, quoted
+from ..scene.units import quoted
 from .text import CampaignError
 
 _Table = dict[str, Any]
 _CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
-_OBLIQUITY: TypeAdapter[float] = TypeAdapter(Obliquity)
 _OF_ANY_CORE = set(Core.model_fields)
 _LAW = ("linear", "quadratic", "onset")
 """Keys of [interaction] that belong to a material."""
@@ -159,14 +157,14 @@ def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Ta
             yield f"layer[{k}]", "layer", k, layer
 
 
-def plate_of(material: Material, given: Mapping[str, Any], way: float | None) -> _Table:
+def plate_of(material: Material, given: Mapping[str, Any], thickness: float | None) -> _Table:
     """The table of a plate of a material, under the keys that are given.
 
     Args:
-        way: length of the way through the plate, in diameters of the core; None where it is not known.
+        thickness: of the plate in diameters of the core; None where it is not known.
     """
     base = {
-        "resistance": material.resistance_at(1.0 if way is None else way),
+        "resistance": material.resistance_at(1.0 if thickness is None else thickness),
         "shear_coefficient": material.shear_coefficient,
         "density": material.density,
     }
@@ -174,26 +172,19 @@ def plate_of(material: Material, given: Mapping[str, Any], way: float | None) ->
 
 
 def calibres(data: Mapping[str, Any], plate: Mapping[str, Any]) -> float | None:
-    """Way through a plate along the line of fire, in diameters of the core; None if something of it is not valid."""
-    impact = data.get("impact", {})
+    """Thickness of a plate in diameters of the core; None if something of either is not valid."""
     solid = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
     try:
         core = _CORE.validate_python(data.get("core"))
         model = Layer if {"gap", "offset"} & set(plate) else Plate
-        thickness = model.model_validate({"resistance": 1.0} | solid).thickness
-        obliquity = _OBLIQUITY.validate_python(impact.get("obliquity", 0.0) if isinstance(impact, dict) else 0.0)
+        return calibres_of(core, model.model_validate({"resistance": 1.0} | solid))
     except ValidationError:
         return None  # which the validation of the whole campaign says better
-    return _way(core, thickness, obliquity)
 
 
-def way_in(core: Core, plate: Plate, obliquity: float) -> float:
-    """Way through a plate along the line of fire, in diameters of the core; `obliquity` is in radians."""
-    return _way(core, plate.thickness, obliquity)
-
-
-def _way(core: Core, thickness: float, obliquity: float) -> float:
-    return thickness / (2.0 * core.max_radius * math.cos(obliquity))
+def calibres_of(core: Core, plate: Plate) -> float:
+    """Thickness of a plate in diameters of the core."""
+    return plate.thickness / (2.0 * core.max_radius)
 
 
 def _law(found: Mapping[str, Material], given: Mapping[str, Any], name: str) -> dict[str, float]:

@@ -11,7 +11,7 @@ from ..catalogue.catalogue import Catalogue
 from ..catalogue.entries import Material, Threat
 from ..results.attributes import NOT_TESTED
 from ..scene import Core, Plate
-from .catalogued import way_in
+from .catalogued import calibres_of
 
 if TYPE_CHECKING:
     from .campaign import Campaign
@@ -54,7 +54,7 @@ def _of_material(campaign: Campaign, place: str, plate: Plate, catalogue: Catalo
     material = catalogue.all(Material).get(str(plate.material))
     if material is None:
         return f"{place}: {plate.material}, which is not in the catalogue"
-    resistance = material.resistance_at(way_in(campaign.core, plate, campaign.impact.obliquity))
+    resistance = material.resistance_at(calibres_of(campaign.core, plate))
     expected = {
         "resistance": (plate.resistance, resistance),
         "shear_coefficient": (plate.shear_coefficient, material.shear_coefficient),
@@ -88,7 +88,7 @@ def _beyond(campaign: Campaign, place: str, plate: Plate, material: Material) ->
     if not material.rows:
         return
     core, obliquity = campaign.core, math.degrees(campaign.impact.obliquity)
-    ratio = plate.thickness / (2.0 * core.max_radius)
+    ratio = calibres_of(core, plate)
     if not _within(plate.thickness, material.thickness_low, material.thickness_high):
         yield (
             f"{place} is {1e3 * plate.thickness:.4g} mm thick, but the limit velocities of {material.name} are of "

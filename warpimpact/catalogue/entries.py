@@ -95,15 +95,14 @@ class Threat(Model):
 class Material(Model):
     """A material of plates, with the law that its strength was found with.
 
-    The law of resistance is Y·(h / (d cos θ))^thickness_exponent: h is the thickness, d the largest diameter of the
-    core, θ the obliquity.
+    The law of resistance is Y·(h / d)^thickness_exponent: h is the thickness, d the largest diameter of the core.
 
     Attributes:
         name: as `[plate] material` gives it.
         density: [kg/m³].
-        resistance: Y of a way of one calibre through the plate [Pa].
+        resistance: Y of a plate as thick as the core is wide [Pa].
         resistance_low, resistance_high: ends of its 90 % interval [Pa].
-        thickness_exponent: how Y grows with that way.
+        thickness_exponent: how Y grows with the thickness.
         shear_coefficient, linear, quadratic, onset: η, C, B and κ of the law.
         rows: published limit velocities that it was found from, by projectile.
         sources: keys of their sources.
@@ -141,7 +140,7 @@ class Material(Model):
     assumed: dict[str, Title] = Field(default_factory=dict)
 
     def resistance_at(self, calibres: float) -> float:
-        """Y of a plate whose way is so many diameters of the core long [Pa]."""
+        """Y of a plate so many diameters of the core thick [Pa]."""
         return float(self.resistance * calibres**self.thickness_exponent)
 
     @property

@@ -51,14 +51,14 @@ def threat_text(threat: Threat) -> str:
 def material_text(material: Material) -> str:
     """A material: its strength and law with their uncertainty, the rows that they come from, and its evidence."""
     law = (
-        f"Y = {material.resistance / 1e9:.3g} GPa · (h / (d cos θ))^{material.thickness_exponent:.3g}, "
+        f"Y = {material.resistance / 1e9:.3g} GPa · (h / d)^{material.thickness_exponent:.3g}, "
         f"η = {material.shear_coefficient:g}, B = {material.quadratic:g}, C = {material.linear:g}, "
         f"κ = {material.onset:g}"
     )
     lines = [material.name, _row("density", f"{material.density:g} kg/m³"), _row("law", law)]
     if material.resistance_low is not None and material.resistance_high is not None:
         low, high = material.resistance_low / 1e9, material.resistance_high / 1e9
-        lines.append(_row("Y, 90 %", f"{low:.3g} to {high:.3g} GPa, of a way of one calibre"))
+        lines.append(_row("Y, 90 %", f"{low:.3g} to {high:.3g} GPa, of a plate one calibre thick"))
     if material.hardness is not None:
         lines.append(_row("hardness", f"{material.hardness:g} HV"))
     lines += list(_rows(material))

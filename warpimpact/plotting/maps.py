@@ -22,7 +22,12 @@ from warpimpact.plotting.distribution import (
     mean_and_spread,
     uncertainty,
 )
+<<<<<<< HEAD
 from warpimpact.plotting.heading import heading, names
+=======
+from warpimpact.plotting.heading import add_heading
+from warpimpact.results import attributes as attr
+>>>>>>> main
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.files import OutputError
@@ -218,7 +223,7 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int, lines: int = 0) 
 
 def _inscribe(figure: Figure, title: str, note: str) -> None:
     height = figure.get_figheight()
-    figure.suptitle(title, y=1.0 - 0.12 / height, va="top", wrap=True)
+    add_heading(figure, title)
     figure.supxlabel(note, y=0.12 / height, va="bottom", fontsize="small", color="0.3")
 
 

@@ -77,7 +77,6 @@ def test_names_stand_for_their_values(folder: Path) -> None:
         ({"interaction": {"quadratic": 0.0}}, "interaction.quadratic", 0.0),
         ({"plate": TABLES["plate"] | {"resistance": "3 GPa"}}, "plate.resistance", 3e9),
         ({"plate": TABLES["plate"] | {"thickness": "24.992 mm"}}, "plate.resistance", 4e9),  # four calibres
-        ({"impact": {"obliquity": "60 deg"}}, "plate.resistance", 2e9 * 2**0.5),  # the way is twice as long
         ({"plate": {"material": "plate A", "areal_density": 7800.0 * 24.992e-3}}, "plate.resistance", 4e9),
     ],
 )  # fmt: skip

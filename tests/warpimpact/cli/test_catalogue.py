@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact.cli import main
-from warpimpact.plotting import hit_map
+from warpimpact.plotting.maps import hit_map
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 

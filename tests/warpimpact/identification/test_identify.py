@@ -12,6 +12,7 @@ from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
 from warpimpact.identification.posterior import learnt, parameters_of
+from warpimpact.identification.store import Store
 from warpimpact.identification.text import posterior_text
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
@@ -92,6 +93,19 @@ def test_a_resumed_fit_equals_an_undisturbed_one(
     for group in posterior_file.GROUPS:
         assert one[group].to_dataset().equals(other[group].to_dataset()), group
     assert not path.with_name("posterior.nc.parts").exists()
+
+
+def test_a_batch_with_a_flipped_bit_is_whole_or_none(tmp_path: Path) -> None:
+    store, arrays = Store(tmp_path / "a.nc", {"fit": "a"}), {"points": np.arange(3.0), "misfit_0": np.ones(2)}
+    store.save(0, arrays)
+    path = store.folder / "batch_000000.npz"
+    whole = path.read_bytes()
+    for place in range(whole.index(b"PK\x01\x02"), len(whole)):  # the directory of the archive
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 8]) + whole[place + 1 :])
+        loaded = store.load(0)
+        assert loaded is None or loaded.keys() == arrays.keys()
+    path.write_bytes(whole)
+    np.testing.assert_equal(store.load(0), arrays)
 
 
 def test_rounds_are_whole_blocks(make_fit: FitMaker, small: tuple[str, str]) -> None:
