@@ -22,12 +22,7 @@ from warpimpact.plotting.distribution import (
     mean_and_spread,
     uncertainty,
 )
-<<<<<<< HEAD
-from warpimpact.plotting.heading import heading, names
-=======
-from warpimpact.plotting.heading import add_heading
-from warpimpact.results import attributes as attr
->>>>>>> main
+from warpimpact.plotting.heading import add_heading, heading, names
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.files import OutputError

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from warpimpact.cli import main
-from warpimpact.plotting.maps import hit_map
+from warpimpact.plotting import variable_map
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 
@@ -45,7 +45,7 @@ def test_names_are_carried_along(
         assert [line for line in LINES if line not in told] == []
     dataset = files.read(Path("named.nc"))
     assert dataset.attrs[attr.EVIDENCE].splitlines() == list(LINES)
-    over = hit_map(dataset, "residual_velocity").get_suptitle().splitlines()
+    over = variable_map(dataset, "residual_velocity").get_suptitle().splitlines()
     assert over[:2] == ["named", "core: 7.62x51 P80 AP (assumed, as second-hand: bullet mass,"]
     assert main(["report", "named.nc", "-o", "named.html"]) == 0
     page = Path("named.html").read_text(encoding="utf-8")
