@@ -15,6 +15,7 @@ from warpimpact import __version__
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .accuracy import add_study, add_validate
+from .catalogue import add_catalogue
 from .compare import add_compare
 from .export import add_export, add_report
 from .firing import add_test
@@ -32,6 +33,7 @@ from .sweep import add_sweep
 _COMMANDS = (
     add_examples,
     add_new,
+    add_catalogue,
     add_run,
     add_limit,
     add_sweep,
