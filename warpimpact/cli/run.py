@@ -60,6 +60,8 @@ def _run(arguments: argparse.Namespace) -> int:
             print(symmetry_text(dataset))
         if (promise := promise_text(dataset)) is not None:
             print(promise)
+        if attr.EVIDENCE in dataset.attrs:
+            print(dataset.attrs[attr.EVIDENCE])
         print(f"{dataset.attrs[attr.HITS_PER_SECOND]:.4g} hits per second on {dataset.attrs[attr.DEVICE]}")
         print(f"written to {output}")
         return failure_code(dataset, output)

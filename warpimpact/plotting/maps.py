@@ -22,8 +22,7 @@ from warpimpact.plotting.distribution import (
     mean_and_spread,
     uncertainty,
 )
-from warpimpact.plotting.heading import add_heading
-from warpimpact.results import attributes as attr
+from warpimpact.plotting.heading import add_heading, heading, names
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import status_codes
 from warpimpact.results.files import OutputError
@@ -41,6 +40,7 @@ _LONGER_SIDE = 4.2
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.75, 1.15, 0.55, 1.2
 _NARROWEST_PANEL = 5.4  # holds the legend
 _HEAD, _FOOT = 0.5, 0.3
+_LINE, _NAMES = 0.2, 60  # of the names: height, and the most characters
 _BELOW_NO_LEGEND, _FOOT_WITH_LEGEND = 0.65, 0.85
 _MOST_COLUMNS = 3
 
@@ -185,15 +185,15 @@ def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite:
 
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
     """A sheet of several maps of one result, which says what it shows."""
-    figure, panels = _sheet([dataset] * maps, columns=columns)
+    figure, panels = _sheet([dataset] * maps, columns=columns, lines=len(names(dataset, _NAMES)))
     folded = "; all hits of the bursts, folded into the cell" if is_folded(dataset) else ""
     told = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}"
-    _inscribe(figure, dataset.attrs.get(attr.TITLE, ""), told)
+    _inscribe(figure, heading(dataset, _NAMES), told)
     return figure, panels
 
 
-def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure, list[Axes]]:
-    """Figure with a place for a map of each result, row by row, all to one scale.
+def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int, lines: int = 0) -> tuple[Figure, list[Axes]]:
+    """Figure with a place for a map of each result, row by row, all to one scale; `lines` of text follow the title.
 
     The maps show the whole cell and every hit. Their size follows from that extent; the room round them is
     the same on every figure, so that maps of one plate can be laid side by side.
@@ -204,7 +204,8 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure,
     rows, (widest, tallest) = -(-len(datasets) // columns), sizes.max(axis=0)
     panel_width = max(_LEFT + widest + _RIGHT, _NARROWEST_PANEL)
     panel_height = _ABOVE + tallest + below
-    width, height = columns * panel_width, _HEAD + rows * panel_height + foot
+    head = _HEAD + _LINE * lines
+    width, height = columns * panel_width, head + rows * panel_height + foot
     figure = Figure(figsize=(width, height))
     panels = []
     for number, (map_width, map_height) in enumerate(sizes):
