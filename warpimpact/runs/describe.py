@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -99,7 +98,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     ligament = campaign.plate.ligament
     told = {
         attr.TITLE: campaign.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        attr.HISTORY: attr.history_line("run"),
         attr.CAMPAIGN: campaign.text,
         attr.SAMPLING: campaign.hits.sampling,
         attr.SEED: campaign.hits.seed,
