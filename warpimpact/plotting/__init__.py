@@ -9,6 +9,7 @@ import matplotlib as mpl
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
+from warpimpact.plotting.limit import limit_figure
 from warpimpact.plotting.maps import hit_map, hit_maps, layers_figure, overview, save_beside, save_maps, status_map
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.study import study_figure
@@ -28,6 +29,7 @@ __all__ = [
     "hit_maps",
     "largest_load",
     "layers_figure",
+    "limit_figure",
     "marginals",
     "overview",
     "passage",
