@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.scene import Interaction, Plate, Sampler, Scene, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
@@ -145,11 +145,11 @@ def read_posterior(path: FilePath) -> Posterior:
 
 @lru_cache(maxsize=4)
 def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
-    tree = files.read(path, draws_alone=True)
+    tree = posterior_file.read(path, draws_alone=True)
     draws = tree["posterior"].to_dataset()
     values: dict[Path, Array] = {}
     for array in draws.data_vars.values():
-        at = tuple(json.loads(str(array.attrs.get(files.PATH, "[]"))))
+        at = tuple(json.loads(str(array.attrs.get(posterior_file.PATH, "[]"))))
         if at in OF_THE_MATERIAL:
             values[at] = array.values.ravel().astype(np.float64)
     if not values:
@@ -158,7 +158,7 @@ def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
     for (table, key), column in values.items():
         for value in (column.min(), column.max()) if np.isfinite(column).all() else (math.nan,):
             _check_value(str(table), str(key), float(value), path.name)
-    return Posterior(values, json.loads(str(tree.attrs[files.MATERIAL])))
+    return Posterior(values, json.loads(str(tree.attrs[posterior_file.MATERIAL])))
 
 
 def _check_value(table: str, key: str, value: float, name: str) -> None:

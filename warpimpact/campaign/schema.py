@@ -44,7 +44,7 @@ def campaign_schema() -> Schema:
     definitions["Stop"]["properties"]["half_width"]["type"] = ["number", "string"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **_decided(schema, definitions),
+        **_named(_decided(schema, definitions)),
         "title": "warpimpact campaign",
         "description": "A campaign of warpimpact: what is shot at what, where, how finely it is computed.",
     }
@@ -130,6 +130,30 @@ def _take_weights(definitions: Schema) -> None:
         one["required"].remove("thickness")
         one |= {"if": {"required": ["areal_density"]}, "then": {"properties": {"thickness": {"not": {}}}}}
         one["else"] = {"required": ["thickness"]}
+
+
+def _named(schema: Schema) -> Schema:
+    """A schema in which a threat stands for the keys of a core and for the velocity, a material for a resistance."""
+    definitions = schema["$defs"]
+    cores = [one["then"]["$ref"].rpartition("/")[2] for one in schema["properties"]["core"]["allOf"]]
+    for name in cores:
+        required = definitions[name]["required"]
+        definitions[name] |= {"required": ["shape"], "allOf": [_unless("threat", {"required": required})]}
+    for name in ("Plate", "Layer", "NamedPlate"):
+        definitions[name]["required"] = [key for key in definitions[name]["required"] if key != "resistance"]
+        definitions[name]["allOf"] = [_unless("material", {"required": ["resistance"]})]
+    core = schema["properties"]["core"]
+    core["allOf"].append(_unless("threat", {"required": core.pop("required")}))
+    del definitions["Impact"]["required"]
+    without = {"required": ["impact"], "properties": {"impact": {"required": ["velocity"]}}}
+    named = {"properties": {"core": {"required": ["threat"]}}}
+    required = [key for key in schema["required"] if key != "impact"]
+    return schema | {"required": required, "if": named, "else": without}
+
+
+def _unless(key: str, rest: Schema) -> Schema:
+    """What holds of a table without a key."""
+    return {"if": {"required": [key]}, "else": rest}
 
 
 def _take_distributions(schema: Schema) -> None:

@@ -23,7 +23,7 @@ from warpimpact.plotting.distribution import (
     mean_and_spread,
     uncertainty,
 )
-from warpimpact.results import attributes as attr
+from warpimpact.plotting.heading import add_heading, heading, names
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed, status_codes
 from warpimpact.results.files import OutputError
@@ -41,12 +41,13 @@ _LONGER_SIDE = 4.2
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.75, 1.15, 0.55, 1.2
 _NARROWEST_PANEL = 5.4  # holds the legend
 _HEAD, _FOOT = 0.5, 0.3
+_LINE, _NAMES = 0.2, 60  # of the names: height, and the most characters
 _BELOW_NO_LEGEND, _FOOT_WITH_LEGEND = 0.65, 0.85
 _MOST_COLUMNS = 3
 _LETTERS = 15  # of a note in an inch
 
 
-def hit_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """Map of one variable of the Dataset over the hit points; hits without a value are grey.
 
     Where hits draw their parameters from a posterior, it shows the mean and the spread at every place. Args and errors
@@ -59,11 +60,11 @@ def hit_map(dataset: xarray.Dataset, variable: str, standoff: float | None = Non
     return figure
 
 
-def hit_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
+def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
     """The same map of several results side by side, in the same colours and to the same scale.
 
     Args:
-        datasets: results by the names that their maps get; the others as in `hit_map`.
+        datasets: results by the names that their maps get; the others as in `variable_map`.
     """
     figure, panels = _sheet(list(datasets.values()), columns=min(_MOST_COLUMNS, len(datasets)))
     columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
@@ -159,7 +160,7 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoffs else [None]:
             name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
             if np.isfinite(shown(dataset, variable, standoff).values).any():
-                figures[name] = hit_map(dataset, variable, standoff)
+                figures[name] = variable_map(dataset, variable, standoff)
     behind = bool(passed(dataset).any())
     if behind:
         figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
@@ -184,7 +185,7 @@ def save_beside(
     """
     there = all(dataset.sizes["standoff"] for dataset in datasets.values())
     figures: dict[str, Figure] = {
-        variable: hit_maps(datasets, variable) for variable in _MAIN if variable != v.TILT or there
+        variable: variable_maps(datasets, variable) for variable in _MAIN if variable != v.TILT or there
     }
     return _saved(figures, folder, stem, overwrite=overwrite)
 
@@ -201,15 +202,15 @@ def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite:
 
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
     """A sheet of several maps of one result, which says what it shows."""
-    figure, panels = _sheet([dataset] * maps, columns=columns)
+    figure, panels = _sheet([dataset] * maps, columns=columns, lines=len(names(dataset, _NAMES)))
     folded = "; all hits of the bursts, folded into the cell" if is_folded(dataset) else ""
     told = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}"
-    _inscribe(figure, dataset.attrs.get(attr.TITLE, ""), told)
+    _inscribe(figure, heading(dataset, _NAMES), told)
     return figure, panels
 
 
-def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure, list[Axes]]:
-    """Figure with a place for a map of each result, row by row, all to one scale.
+def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int, lines: int = 0) -> tuple[Figure, list[Axes]]:
+    """Figure with a place for a map of each result, row by row, all to one scale; `lines` of text follow the title.
 
     The maps show the whole cell and every hit. Their size follows from that extent; the room round them is
     the same on every figure, so that maps of one plate can be laid side by side.
@@ -220,7 +221,8 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure,
     rows, (widest, tallest) = -(-len(datasets) // columns), sizes.max(axis=0)
     panel_width = max(_LEFT + widest + _RIGHT, _NARROWEST_PANEL)
     panel_height = _ABOVE + tallest + below
-    width, height = columns * panel_width, _HEAD + rows * panel_height + foot
+    head = _HEAD + _LINE * lines
+    width, height = columns * panel_width, head + rows * panel_height + foot
     figure = Figure(figsize=(width, height))
     panels = []
     for number, (map_width, map_height) in enumerate(sizes):
@@ -233,7 +235,7 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure,
 
 def _inscribe(figure: Figure, title: str, note: str) -> None:
     height = figure.get_figheight()
-    figure.suptitle(title, y=1.0 - 0.12 / height, va="top", wrap=True)
+    add_heading(figure, title)
     lines = fill(note, int(_LETTERS * figure.get_figwidth()))
     figure.supxlabel(lines, y=0.12 / height, va="bottom", fontsize="small", color="0.3")
 

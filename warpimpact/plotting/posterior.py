@@ -14,7 +14,7 @@ from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.reading import fit_from
 from warpimpact.identification.text import unit_of
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,8 +81,8 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
 
 
 def _worth(tree: xarray.DataTree) -> str:
-    ended = "" if tree.attrs[files.CONVERGED] else ", NOT CONVERGED"
-    return f"effective sample size {tree.attrs[files.EFFECTIVE]:.0f}{ended}"
+    ended = "" if tree.attrs[posterior_file.CONVERGED] else ", NOT CONVERGED"
+    return f"effective sample size {tree.attrs[posterior_file.EFFECTIVE]:.0f}{ended}"
 
 
 def _limits(prior: Array, posterior: Array) -> tuple[float, float]:
@@ -99,7 +99,8 @@ def _density(axes: Axes, prior: Array, posterior: Array) -> None:
 def measured_figure(tree: xarray.DataTree) -> Figure:
     """Every measured number with its uncertainty beside what is computed for it: 50 and 90 % intervals."""
     observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
-    units = [str(one) for one in observed[files.UNITS_OF].values] if files.UNITS_OF in observed else []
+    stored = observed[posterior_file.UNITS_OF].values if posterior_file.UNITS_OF in observed else ()
+    units = [str(one) for one in stored]
     kinds = list(dict.fromkeys(units)) or ["1"]
     counts = [max(1, units.count(kind)) for kind in kinds]
     figure = Figure(figsize=(10.0, 2.6 + 0.55 * sum(counts)), layout="constrained")
@@ -109,14 +110,14 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
         rows = [place for place, unit in enumerate(units) if unit == kind]
         labels = [str(observed["observation"].values[place]) for place in rows]
         for line, place in enumerate(rows):
-            for offset, name, colour in ((-0.16, files.MEASURED, _GREY), (0.16, files.FITTED, _BLUE)):
+            for offset, name, colour in ((-0.16, posterior_file.MEASURED, _GREY), (0.16, posterior_file.FITTED, _BLUE)):
                 values = computed[name].values[..., place].ravel()
                 values = values[np.isfinite(values)]
                 if len(values):
                     low, quarter, three, high = np.quantile(values, [0.05, 0.25, 0.75, 0.95])
                     axes.plot([low, high], [line + offset] * 2, color=colour, lw=1.5)
                     axes.plot([quarter, three], [line + offset] * 2, color=colour, lw=5, solid_capstyle="butt")
-            value, std = (float(observed[name][place]) for name in (files.MEASURED, files.STD))
+            value, std = (float(observed[name][place]) for name in (posterior_file.MEASURED, posterior_file.STD))
             axes.errorbar(value, line, xerr=std, fmt="o", color=_VERMILION, capsize=3, ms=5, zorder=4)
         axes.set_yticks(range(len(rows)), labels)
         axes.set_ylim(len(rows) - 0.5, -0.5)
@@ -140,7 +141,7 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
 
     The plate is drawn at the posterior's medians; where the spacing of its holes is unknown, so are their places.
     """
-    fit = fit_from(str(tree.attrs[files.FIT]), "the fit of this posterior", Path())
+    fit = fit_from(str(tree.attrs[posterior_file.FIT]), "the fit of this posterior", Path())
     posterior, best = tree["posterior"].to_dataset(), tree["best"].to_dataset()
     medians = {one.path: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.unit != "rad"}
     across = min(3, len(fit.shots))
@@ -151,7 +152,7 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
     for place, shot in enumerate(fit.shots):
         axes = panels[place]
         scene = fit.scene_of(shot, medians)
-        y, z = (_MM * posterior[name].values[..., place].ravel() for name in files.HITS)
+        y, z = (_MM * posterior[name].values[..., place].ravel() for name in posterior_file.HITS)
         cell = [side * _MM for side in scene.target.layers[0].sampled_cell]
         far = [float(np.abs(at).max()) * 1.05 for at in (y, z)]
         half = [min(max(0.55 * side, most), _CELLS * side) for side, most in zip(cell, far, strict=True)]
@@ -160,7 +161,7 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
         for outline in scene.target.layers[0].pattern.outlines(*ranges):
             axes.fill(*(_MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
         axes.scatter(y, z, s=5, color=_BLUE, alpha=0.35, lw=0, label="posterior")
-        at = (_MM * float(best[name][place]) for name in files.HITS)
+        at = (_MM * float(best[name][place]) for name in posterior_file.HITS)
         axes.plot(*at, "X", color=_VERMILION, ms=8, mec="white", label="smallest misfit")
         axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
         axes.set_title(str(posterior["shot"].values[place]))

@@ -55,7 +55,7 @@ class Row(NamedTuple):
     interval: str
 
 
-def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
+def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
     promise = promise_text(dataset)
@@ -66,6 +66,7 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "hits": dataset.sizes["hit"],
         "passed": sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])),
         "asked": _asked(dataset),
+        "evidence": attributes.get(attr.EVIDENCE, "").splitlines(),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise,
         "numerics": numerics,

@@ -25,8 +25,7 @@ from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, part_of, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
-from warpimpact.scene import Numerics, Scene, Shots, Target
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -75,8 +74,8 @@ class LimitMap:
             CampaignError: the campaign has no limits, or this search cannot find them.
         """
         try:
-            given = {asked.STOP: campaign.stop is not None, asked.BURST: campaign.burst is not None}
-            asked.check_together({asked.LIMIT: True} | given)
+            given = {exclusions.STOP: campaign.stop is not None, exclusions.BURST: campaign.burst is not None}
+            exclusions.check_together({exclusions.LIMIT: True} | given)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None

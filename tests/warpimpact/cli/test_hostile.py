@@ -262,7 +262,7 @@ def test_a_result_shows_no_control_characters(
 @pytest.mark.usefixtures("unrendered")
 def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> None:
     path = tmp_path / "a.nc"
-    files.write(make_result(100).assign_attrs(title=r"costs 5 $ or $\notacommand{"), path)
+    files.write(make_result(100).assign_attrs(title=r"costs 5 $ or \frac{1}{ $"), path)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 0
 
 
