@@ -42,6 +42,7 @@ def described(
     """
     told = _campaign(campaign)
     told |= _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
+    told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
     return to_table(
         campaign.scene,
         shots,
@@ -116,7 +117,6 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     told |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
     told |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
     told |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
-    told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
     return told | ({} if campaign.burst is None else _burst(campaign.burst))
 
 
