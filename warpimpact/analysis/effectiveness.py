@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray
@@ -27,7 +27,7 @@ from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.scene.units import Radians
 from warpimpact.statistics.comparisons import Ratio, ratio_numbers
-from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
 from warpimpact.statistics.of_groups import of_worst_tenth
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
 
@@ -148,7 +148,7 @@ def gather(
 ) -> Iterator[Evidence]:
     """The measures of `effectiveness` one after the other, each with the numbers that it is made of; of some effects
     `only`, by their names."""
-    dealt = dealing(dataset) | {"confidence": confidence}
+    dealt: Estimating = {**dealing(dataset), "confidence": confidence}
     reference = solid_limits(dataset) if attr.LIMIT in dataset.attrs else solid_reference(dataset)
     for effect in effects(dataset, angle=angle, standoff=standoff):
         if only is not None and effect.name not in only:
@@ -167,7 +167,7 @@ def _averaged(
     statistic: _Statistic,
     values: Array,
     solid: Array | None,
-    dealt: dict[str, Any],
+    dealt: Estimating,
     dataset: xarray.Dataset,
 ) -> Evidence:
     """The measure that is a mean of what the shots say, or of numbers made of that."""

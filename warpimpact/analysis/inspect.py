@@ -62,6 +62,7 @@ def _origin(dataset: xarray.Dataset) -> Iterator[str]:
         numbers = plate_numbers(told[attr.OPEN_AREA], told.get(attr.LIGAMENT, math.inf), told[attr.AREAL_DENSITY])
         whole = " of the whole target" if v.LAYER_STATUS in dataset else ""
         yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}{whole}"
+    yield from told.get(attr.EVIDENCE, "").splitlines()
     if (promise := promise_text(dataset)) is not None:
         yield f"{'accuracy':<12}{promise}"
     for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY):

@@ -42,6 +42,7 @@ from ..scene.shots import FARTHEST
 from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
+from .catalogued import catalogue_of, with_materials, with_threat
 from .plausible import warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
@@ -87,6 +88,7 @@ class Campaign(Model):
         burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
         posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
+        catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
         published: published limits, which `warpimpact limit` puts beside its own: a table `[[published]]` each.
@@ -103,6 +105,7 @@ class Campaign(Model):
     output: Output = Output()
     scatter: Scatter = Scatter()
     posterior: InputFile | None = None
+    catalogue: InputFile | None = None
     stop: Stop | None = None
     burst: Burst | None = None
     published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
@@ -154,7 +157,9 @@ class Campaign(Model):
             )
         if count is not None:
             _override_count(data, count)
-        data = with_scatter_apart(data, name)
+        catalogue = catalogue_of(data, name, folder)
+        data = with_scatter_apart(with_threat(data, catalogue, name), name)
+        data = with_materials(data, catalogue, name)
         try:
             campaign = cls.model_validate(data, context={"folder": folder})
         except ValidationError as error:

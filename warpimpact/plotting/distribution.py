@@ -25,6 +25,7 @@ from warpimpact.plotting.cell import (
     struck,
     tree_of,
 )
+from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
@@ -55,7 +56,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     column = shown(dataset, variable, standoff)
     size = _map_size(dataset)
     figure = Figure(figsize=(size[0] + 4.6, size[1] + 2.9), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{column.title}")
+    figure.suptitle(f"{heading(dataset)}\n{column.title}")
     centre = figure.subplots()
     artist = draw_values(centre, dataset, column.values, scale_of([column.values], signed=column.signed))
     exists = np.isfinite(column.values)
@@ -83,7 +84,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
     figure = Figure(figsize=(7.5, 6.5), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\ncores that passed the {struck(dataset)}")
+    figure.suptitle(f"{heading(dataset)}\ncores that passed the {struck(dataset)}")
     grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
     (above, corner), (centre, beside) = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     corner.remove()
@@ -225,7 +226,7 @@ def _local_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], t
     a probability is that of all of them."""
     width, height = _map_size(dataset)
     figure = Figure(figsize=(len(images) * (width + 2.0) + (len(images) < 2), height + 1.9), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{title}")
+    figure.suptitle(f"{heading(dataset)}\n{title}")
     panels = figure.subplots(1, len(images), sharex=True, sharey=True, squeeze=False)[0]
     for axes, image, label in zip(panels, images, labels, strict=True):
         scale = scale_of([np.array([0.0, 1.0])] if label.startswith("P(") else [image.ravel()])

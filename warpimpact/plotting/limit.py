@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
+from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
@@ -58,7 +59,7 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
 
 def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
     note = fill(f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", 110)
-    figure.suptitle(f"{dataset.attrs[attr.TITLE]}\n{note}", fontsize=10)
+    figure.suptitle(f"{heading(dataset)}\n{note}", fontsize=10)
     if sources := dict.fromkeys(row.published.source for row in published_beside(dataset)):
         figure.supxlabel(fill("published: " + "; ".join(sources), 110), fontsize=8)
 

@@ -8,6 +8,7 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.studies.accuracy import QUOTED
@@ -34,7 +35,7 @@ def study_figure(dataset: xarray.Dataset) -> Figure:
         _draw(axes, quoted, quantity)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle(
-        f"{dataset.attrs[attr.TITLE]}\n{dataset.sizes['hit']} hits, tilt at {quoted[v.STANDOFF].item() * 1e3:g} mm; "
+        f"{heading(dataset)}\n{dataset.sizes['hit']} hits, tilt at {quoted[v.STANDOFF].item() * 1e3:g} mm; "
         f"{dataset.attrs[attr.DEVICE]}, {dataset.attrs[attr.HISTORY][:10]}"
     )
     return figure

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from warpimpact.analysis.summary import estimated
 from warpimpact.plotting.cell import words
+from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
@@ -65,7 +66,7 @@ def sweep_figure(sweep: xarray.Dataset) -> Figure:
     left_out = _product(sweep.sizes[name] for name in others) - len(lines)
     note = f"; {left_out} more combinations are not shown" if left_out > 0 else ""
     hits = f"{sweep.sizes['hit']} hits at every point, 95 % intervals"
-    figure.suptitle(f"{sweep.attrs[attr.TITLE]}\n{hits}{counted}{note}")
+    figure.suptitle(f"{heading(sweep)}\n{hits}{counted}{note}")
     return figure
 
 

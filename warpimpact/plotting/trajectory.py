@@ -20,6 +20,7 @@ from matplotlib.patheffects import Normal, Stroke
 from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.analysis.surface import pressed
 from warpimpact.plotting.cell import struck, words
+from warpimpact.plotting.heading import heading
 from warpimpact.plotting.layers import layers
 from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
 from warpimpact.plotting.pressure import pressure
@@ -204,7 +205,7 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
 
 
 def _title(dataset: xarray.Dataset, what: str) -> str:
-    return f"{dataset.attrs[attr.TITLE]}\nhit {dataset.attrs[attr.HIT]}: {what}"
+    return f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: {what}"
 
 
 def two_views(

@@ -66,6 +66,7 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "hits": dataset.sizes["hit"],
         "passed": sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])),
         "asked": _asked(dataset),
+        "evidence": attributes.get(attr.EVIDENCE, "").splitlines(),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise,
         "numerics": numerics,

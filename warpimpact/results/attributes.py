@@ -89,6 +89,11 @@ CORE = _declared("core", "table", _SI)
 PLATE = _declared("plate", "table", _SI)
 IMPACT = _declared("impact", "table", _SI)
 MATERIAL = _declared("material", "table", _SI)
+EVIDENCE = _declared("evidence")
+"""Names of threat and materials with the state of their evidence, and what is beyond it: a line each; not there where
+nothing is to be said."""
+NOT_TESTED = "not tested: "
+"""Begins a line of the evidence that is a doubt."""
 DISCREPANCY = _declared("discrepancy", "table")
 """JSON of the standard deviation that a posterior's model misses by, by units of the Dataset."""
 DISCREPANCY_COUNTS = _declared("discrepancy_counts", "number")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.evidence import evidence_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -116,6 +117,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     told |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
     told |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
     told |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
+    told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
     return told | ({} if campaign.burst is None else _burst(campaign.burst))
 
 

@@ -28,6 +28,7 @@ from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
 from warpimpact.solver.pilot import Found
+from warpimpact.statistics.intervals import Dealing
 from warpimpact.statistics.stopping import looks
 
 if TYPE_CHECKING:
@@ -218,7 +219,7 @@ class _Watch:
         self._rule = campaign.stop
         tilts = [f"mean(tilt@{last * 1e3:.10g}mm)" for last in campaign.output.standoffs[-1:]]
         measures = measures or ("mean(residual_velocity)", *tilts)
-        dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
+        dealt: Dealing = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
         self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
         if self._rule is not None:
             rule = self._rule
