@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -291,7 +290,7 @@ class _Watch:
 def _attributes(table: Table, end: _End) -> dict[str, Any]:
     """Global attributes of a complete result over those of its first shard."""
     return {
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {table.attrs[attr.HISTORY].partition(' ')[2]}",
+        attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),
         attr.COMPUTE_TIME: end.compute_time,
         attr.HITS_PER_SECOND: end.hits / images(table) / end.compute_time,
         **_computed(table, end.hits),
