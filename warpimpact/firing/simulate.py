@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -50,7 +49,7 @@ def simulate_test(
     columns: dict[Variable, Any] = {}
     told: dict[str, Any] = {
         attr.TITLE: test.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact test",
+        attr.HISTORY: attr.history_line("test"),
         f.TEST: test.text,
         f.SETTINGS: test.model_dump_json(exclude_none=True),
         f.REQUIREMENT: requirement_line(test),

@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 
 from warpimpact.firing.text import verdict
 from warpimpact.plotting.heading import add_heading
+from warpimpact.plotting.style import BLUE, GREEN, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_BLUE, _VERMILION, _GREEN = "#0072B2", "#D55E00", "#009E73"  # colours of Okabe and Ito
 _MM = 1e3
 _Settings = Mapping[str, Any]
 
@@ -62,15 +62,15 @@ def _draw_response(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
     velocity = dataset[f.VELOCITY].values
     low, high = dataset[f.SHARE_LOW].values, dataset[f.SHARE_HIGH].values
     if np.isfinite(low).any():
-        axes.fill_between(velocity, low, high, color=_BLUE, alpha=0.2, linewidth=0, label="95 % interval")
-    axes.plot(velocity, dataset[f.SHARE].values, color=_BLUE, linewidth=1.5)
+        axes.fill_between(velocity, low, high, color=BLUE, alpha=0.2, linewidth=0, label="95 % interval")
+    axes.plot(velocity, dataset[f.SHARE].values, color=BLUE, linewidth=1.5)
     for row, share in enumerate(dataset[f.QUANTILE].values):
         value = float(dataset[f.QUANTILE_VELOCITY][row])
         if np.isfinite(value):
             ends = np.array([float(dataset[name][row]) for name in (f.QUANTILE_LOW, f.QUANTILE_HIGH)])
             if np.isfinite(ends).all():
-                axes.plot(ends, [share, share], color=_VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
-            axes.plot(value, share, "o", color=_VERMILION, markersize=5)
+                axes.plot(ends, [share, share], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
+            axes.plot(value, share, "o", color=VERMILION, markersize=5)
             name = f"V{100 * share:02.0f} = {value:.4g} m/s"
             axes.annotate(name, (value, share), xytext=(8, 6 - 11 * row), textcoords="offset points", fontsize="small")
     _furnish(
@@ -87,11 +87,11 @@ def _draw_map(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
     artist = axes.scatter(y, z, c=shown, s=size, cmap="viridis", plotnonfinite=True)
     axes.figure.colorbar(artist, ax=axes, label="limit velocity [m/s]")
     order = np.argsort(first)
-    for share, face in ((0.05, "none"), (0.01, _VERMILION)):
+    for share, face in ((0.05, "none"), (0.01, VERMILION)):
         weakest = order[: max(1, round(share * len(first)))]
         label = f"weakest {100 * share:g} % of the hits"
         axes.scatter(
-            y[weakest], z[weakest], s=2.2 * size, edgecolors=_VERMILION, linewidths=1.2, label=label, facecolors=face
+            y[weakest], z[weakest], s=2.2 * size, edgecolors=VERMILION, linewidths=1.2, label=label, facecolors=face
         )
     axes.plot(_MM * dataset[f.OUTLINE_Y].values, _MM * dataset[f.OUTLINE_Z].values, color="black", linewidth=1.0)
     half = 0.5 * _MM * np.asarray(dataset.attrs[f.CELL])
@@ -112,10 +112,10 @@ def _draw_reported(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
         axes.text(0.5, 0.5, "no test reports a V50", ha="center", transform=axes.transAxes)
         return
     ends = np.quantile(known, [0.005, 0.995])
-    axes.hist(np.clip(known, *ends), bins=40, color=_BLUE, alpha=0.55, label="reported V50")
+    axes.hist(np.clip(known, *ends), bins=40, color=BLUE, alpha=0.55, label="reported V50")
     axes.axvline(true, color="black", linewidth=1.5, label=f"true V50, {true:.4g} m/s")
     if required:
-        axes.axvline(required["v50"], color=_VERMILION, linestyle="--", linewidth=1.5, label="required V50")
+        axes.axvline(required["v50"], color=VERMILION, linestyle="--", linewidth=1.5, label="required V50")
     lines = [
         f"{found.bias:+.2g} m/s off, standard deviation {found.deviation:.3g} m/s",
         f"reported spread {found.spread:.3g} m/s (median), true {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s",
@@ -136,8 +136,8 @@ def _draw_reported(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
 def _draw_sizes(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
     precision, shots = settings["precision"], dataset[f.SIZE_SHOTS].values
     within, share = float(precision["within"]), float(precision["share"])
-    axes.plot(shots, dataset[f.SIZE_WITHIN].values, "o-", color=_BLUE, label=f"within ± {within:g} m/s")
-    axes.axhline(share, color=_VERMILION, linestyle="--", linewidth=1.2, label=f"asked: {100 * share:g} % of the tests")
+    axes.plot(shots, dataset[f.SIZE_WITHIN].values, "o-", color=BLUE, label=f"within ± {within:g} m/s")
+    axes.axhline(share, color=VERMILION, linestyle="--", linewidth=1.2, label=f"asked: {100 * share:g} % of the tests")
     labels = {"xlabel": "shots of a test", "ylabel": "share of the tests", "ylim": (0.0, 1.03)}
     _furnish(axes, title="how many shots a precision takes", **labels)
 
@@ -147,17 +147,17 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> Non
     axes.plot(
         velocity, 1.0 - dataset[f.PROOF_PERFORATION].values, color="0.6", linewidth=1.2, label="P(stop) of one shot"
     )
-    axes.plot(velocity, dataset[f.PASS].values, color=_BLUE, label="plan passes, shots anywhere")
+    axes.plot(velocity, dataset[f.PASS].values, color=BLUE, label="plan passes, shots anywhere")
     axes.plot(
         velocity,
         dataset[f.PASS_SAME_PLACE].values,
-        color=_GREEN,
+        color=GREEN,
         linestyle="-.",
         label="plan passes, all shots at one place",
     )
     axes.axvline(
         float(dataset.attrs[f.PROOF_VELOCITY]),
-        color=_VERMILION,
+        color=VERMILION,
         linestyle="--",
         linewidth=1.2,
         label="velocity of the proof",
