@@ -39,7 +39,7 @@ def add_test(commands: Commands) -> None:
 
 def _test(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.text import CampaignError
-    from warpimpact.firing.plan import read_test
+    from warpimpact.firing.reading import read_test
     from warpimpact.firing.simulate import simulate_test
     from warpimpact.firing.text import report_lines
     from warpimpact.plotting.firing import directions_figure, firing_figure

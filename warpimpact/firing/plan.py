@@ -1,18 +1,14 @@
-"""A firing test as a TOML file, validated; a mistake becomes one sentence."""
+"""A firing test: the models of its file."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
-from warpimpact.campaign.problems import sentence
-from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.firing.directions import Directions
 from warpimpact.firing.estimators import Estimator
 from warpimpact.firing.procedures import AnyProcedure
-from warpimpact.firing.requirements import with_requirement
 from warpimpact.firing.rules import FairHit, Gun
 from warpimpact.scene.files import InputFile
 from warpimpact.scene.model import Model
@@ -185,27 +181,3 @@ class FiringTest(Model):
         if self.proof is not None and self.proof.velocity is None and self.requirement is None:
             raise ValueError("proof.velocity: is missing, but must be given")
         return self
-
-
-def read_test(path: str | Path) -> FiringTest:
-    """Read a test file; file names in it count from its folder.
-
-    Raises:
-        CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
-    """
-    path = Path(path)
-    return firing_test(read_text(path), str(path), path.parent)
-
-
-def firing_test(text: str, name: str, folder: Path) -> FiringTest:
-    """Read a test from its text; `name` is what errors call it."""
-    data: dict[str, Any] = parsed(text, name)
-    try:
-        test = FiringTest.model_validate(data, context={"folder": folder})
-    except ValidationError as error:
-        raise CampaignError(f"{name}: {sentence(error, data)}") from None
-    test._source = text
-    try:
-        return with_requirement(test)
-    except CampaignError as error:
-        raise CampaignError(f"{name}: {error}") from None

@@ -9,17 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
 
+from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat, Velocity
 from warpimpact.firing.directions import Directions
+from warpimpact.firing.plan import FiringTest
 from warpimpact.scene.units import quoted
-
-if TYPE_CHECKING:
-    from warpimpact.campaign.campaign import Campaign
-    from warpimpact.firing.plan import FiringTest
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import pytest
 from warpimpact import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.directions import Directions, impact_azimuth, obliquity, protect, weighted_mean
-from warpimpact.firing.plan import firing_test
+from warpimpact.firing.reading import firing_test
 from warpimpact.firing.requirements import REQUIREMENTS, requirement_line, threat_of, with_threat
 from warpimpact.firing.simulate import simulate_test
 from warpimpact.firing.text import report_lines
