@@ -282,7 +282,9 @@ def _kind(way: str) -> str:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Draw the figure; with "all", measure first. Returns 1 if a benchmark failed."""
-    parser = argparse.ArgumentParser(description="draw the figure of the benchmark page from the results that are there")
+    parser = argparse.ArgumentParser(
+        description="draw the figure of the benchmark page from the results that are there"
+    )
     parser.add_argument("measure", nargs="?", choices=("all",), help="measure everything first")
     failed = []
     for name, (script, *arguments) in RUNS.items() if parser.parse_args(argv).measure else ():
