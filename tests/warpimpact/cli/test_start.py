@@ -14,7 +14,7 @@ from warpimpact import Campaign
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
 from warpimpact.cli.options import read_option
-from warpimpact.firing.plan import read_test
+from warpimpact.firing.reading import read_test
 from warpimpact.identification.reading import read_fit
 from warpimpact.identification.schema import fit_schema
 from warpimpact.scene.units import Angle
