@@ -11,7 +11,7 @@ from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
 from warpimpact.cli import main
-from warpimpact.firing.plan import read_test
+from warpimpact.firing.reading import read_test
 from warpimpact.identification.reading import read_fit
 from warpimpact.identification.schema import fit_schema
 
