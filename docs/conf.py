@@ -6,6 +6,8 @@ from importlib.metadata import version as version_of
 from importlib.util import find_spec
 from pathlib import Path
 
+from sphinx.application import Sphinx
+
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE / "_ext"))
 # Tutorials call the command of the environment that builds them, and say no progress.
@@ -64,3 +66,13 @@ html_theme_options = {
 }
 html_sourcelink_suffix = ""
 html_show_sourcelink = False
+
+
+def setup(app: Sphinx) -> None:
+    """Read pages in parallel: the extension that copies MathJax reads none, and does not say so."""
+    app.connect("config-inited", _let_pages_be_read_in_parallel)
+
+
+def _let_pages_be_read_in_parallel(app: Sphinx, _: object) -> None:
+    if "sphinx-mathjax-offline" in app.extensions:
+        app.extensions["sphinx-mathjax-offline"].parallel_read_safe = True

@@ -75,14 +75,15 @@ class CampaignReference(FromTheCode):
 
     def chosen(self, part: dict[str, Any]) -> list[dict[str, Any]]:
         """The models that a part of the schema may be."""
-        options = [part, *part.get("oneOf", []), *part.get("anyOf", [])]
+        options = [part, *([part["then"]] if "type" in part and "then" in part else [])]
+        options += [one["then"] for one in part.get("allOf", [])]
         options += [option["items"] for option in options if "items" in option]
         return [self.definition(option["$ref"]) for option in options if "$ref" in option]
 
     def of_table(self, name: str, part: dict[str, Any], depth: str = "##") -> Iterator[str]:
         """A table of the file, and those within it."""
-        models = [one for one in self.chosen(part) if "properties" in one]
-        if not models:
+        models = [one for one in self.chosen(part) if "properties" in one and "allOf" not in one]
+        if not models or name == "layer.pattern":  # which is that of the plate
             return
         yield from [f"{depth} `[{name}]`", "", part.get("description", "").capitalize(), ""]
         if len(models) > 1 and "shape" in models[0]["properties"]:
@@ -101,7 +102,11 @@ class CampaignReference(FromTheCode):
             yield from [model.get("description", ""), ""]
             yield from self.keys(model)
             for key, inner in model["properties"].items():
-                if not any("distribution" in one.get("properties", {}) or "oneOf" in one for one in self.chosen(inner)):
+                if not any(
+                    "distribution" in one.get("properties", {})
+                    or "enum" in one.get("properties", {}).get("distribution", {})
+                    for one in self.chosen(inner)
+                ):
                     yield from self.of_table(f"{name}.{key}", inner, depth)
 
     def shared(self, models: list[dict[str, Any]]) -> dict[str, Any]:
@@ -136,16 +141,16 @@ class CampaignReference(FromTheCode):
         if rows:
             yield from table(("key", "unit or type", "default", "allowed", "meaning"), rows)
 
-    def leaf(self, part: dict[str, Any]) -> dict[str, Any]:
-        """The value itself, where a distribution may take its place."""
-        return next((one for one in part.get("anyOf", []) if "type" in one), part)
+    def scatters(self, part: dict[str, Any]) -> bool:
+        """Whether a distribution may take the place of the value."""
+        return str(part.get("then", {}).get("$ref", "")).endswith("/Distribution")
 
     def kind(self, part: dict[str, Any]) -> str:
-        if "items" not in part and any("properties" in one for one in self.chosen(part)):
+        tables = "items" not in part or "object" in part["type"]
+        if tables and not self.scatters(part) and any("properties" in one for one in self.chosen(part)):
             return "table"
-        part = self.leaf(part)
         if "unit" in part:
-            return str(part["unit"])
+            return f"{part['unit']}, or a list of them" if "prefixItems" in part else str(part["unit"])
         if "enum" in part or "const" in part:
             return "word" if isinstance(part.get("const", part.get("enum", [""])[0]), str) else "integer"
         if part.get("type") == "array":
@@ -160,15 +165,14 @@ class CampaignReference(FromTheCode):
         default = part.get("default")
         if default is None or default == [] or isinstance(default, dict):
             return ""
-        unit = self.leaf(part).get("unit", "") or self.leaf(part).get("items", {}).get("unit", "")
+        unit = part.get("unit", "") or part.get("items", {}).get("unit", "")
         told = str(default).lower() if isinstance(default, bool) else f'"{default}"' if isinstance(default, str) else ""
         if not told and isinstance(default, list):
             told = ", ".join(f"{one:g}" for one in default)
         return code(f"{told or format(default, 'g')} {unit if default != 0 else ''}".strip())
 
     def bounds(self, part: dict[str, Any]) -> str:
-        part = self.leaf(part)
-        inner = (part.get("items") or part.get("prefixItems", [{}])[0]) if part.get("type") == "array" else part
+        inner = part.get("items") or part.get("prefixItems", [part])[0]
         words = [f'"{one}"' if isinstance(one, str) else str(one) for one in inner.get("enum", [])]
         told = [", ".join(map(code, words))] if words else []
         for name, sign in (("exclusiveMinimum", ">"), ("minimum", "≥"), ("exclusiveMaximum", "<"), ("maximum", "≤")):
@@ -184,8 +188,7 @@ class CampaignReference(FromTheCode):
 
     def meaning(self, part: dict[str, Any]) -> str:
         told = str(part.get("description", ""))
-        scatters = any(one.get("$ref", "").endswith("/Distribution") for one in part.get("anyOf", []))
-        return f"{told} May [scatter](#distributions)." if scatters else told
+        return f"{told} May [scatter](#distributions)." if self.scatters(part) else told
 
 
 def short(number: float) -> str:

@@ -58,7 +58,7 @@ SLOTTED = Plate(
 )
 ROUND = SLOTTED.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
 BY_PATH = SLOTTED.model_copy(update={"degradation_interval": None, "degradation_distance": 0.825e-3})
-SIMPLE, BLOCK = Numerics(), Numerics(layout="block")
+SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
 NORMAL, OBLIQUE = {}, {"obliquity": 0.35, "azimuth": 0.7, "yaw": 0.1, "pitch": 0.05}
 SCENES = {
     "slots": (CORE, SLOTTED, NORMAL, {}),

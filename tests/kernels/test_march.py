@@ -22,7 +22,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.solver import marching, prepare, replay, simulate
+from warpimpact.solver import marching, replay, resolution, simulate
 
 Array = NDArray[np.float64]
 
@@ -144,7 +144,7 @@ def test_status_tells_how_the_shot_ended(plate: Plate, shot: dict[str, float], s
 
 
 def test_shot_without_an_end_is_given_up(monkeypatch: pytest.MonkeyPatch, device: str) -> None:
-    monkeypatch.setattr(prepare, "STEP_ALLOWANCE", 0.1)
+    monkeypatch.setattr(resolution, "STEP_ALLOWANCE", 0.1)
     outcomes = simulate.simulate(at(SOLID), shots_of(), numerics=DRAFT, device=device)
     assert Status(outcomes.status[0]) is Status.UNFINISHED
     assert np.isnan(outcomes.residual_velocity[0])

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, NoPattern, Plate, Target
-from warpimpact.solver import prepare
+from warpimpact.solver import resolution
 
 from . import references
 from .scenes import PAPER_CORE, SLOTS, histories, paper_plate, scattered_hits, shots_at, simulate, solid_plate
@@ -272,7 +272,7 @@ def test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there(devi
 
 def test_a_core_that_slides_between_layers_stays_there(device: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Through a wide hole, off the base at a small angle, and along the rear face of the plate, beside any hole.
-    monkeypatch.setattr(prepare, "STEP_ALLOWANCE", 3)
+    monkeypatch.setattr(resolution, "STEP_ALLOWANCE", 3)
     hole = CirclePattern(diameter=0.3, spacing=(1.0, 1.0))
     front = paper_plate(thickness=10e-3, degradation=1.0, shear_coefficient=0.0, pattern=hole, degradation_length=5e-3)
     base = Layer(thickness=40e-3, resistance=2e9, gap=0.2)

@@ -25,7 +25,15 @@ import xarray
 
 from warpimpact.analysis.base import base_thickness, has_base, solid_note, solid_plate
 from warpimpact.analysis.comparison_text import Comparison, Contestant, Difference, Pair
-from warpimpact.analysis.effectiveness import ANGLE, EffectMeasure, Evidence, depth_note, effect_names, gather
+from warpimpact.analysis.effectiveness import (
+    ANGLE,
+    EffectMeasure,
+    Evidence,
+    depth_note,
+    effect_names,
+    gather,
+    ratio_of_draws,
+)
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.questions import check_same_question, other_shots
 from warpimpact.analysis.summary import breaks_promise, sampling_note
@@ -42,7 +50,7 @@ from warpimpact.statistics.comparisons import (
     difference_of_independent,
     ratio_numbers,
 )
-from warpimpact.statistics.intervals import Array, Estimate, estimate_of
+from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
@@ -88,12 +96,13 @@ def compare(
         if differ_in_weight and not any(math.isnan(evidence.measure.ratio) for evidence in evidences):
             by_ratio.add(name)
         for (i, j), pair in zip(pairs, used, strict=True):
-            dealt = [dealing(datasets[k]) | {"confidence": each} for k in (i, j)]
+            dealt: list[Estimating] = [{**dealing(datasets[k]), "confidence": each} for k in (i, j)]
             sides = [_side(evidences[k], of, by_ratio=name in by_ratio) for k, of in zip((i, j), dealt, strict=True)]
             interval = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
-            numbers = sides[0].numbers, sides[1].numbers
-            why = why_not_by_draws(name, numbers, independent=pair.independent, by_ratio=name in by_ratio)
-            survival = survival_of((datasets[i], datasets[j]), numbers, interval[0], reason=why, confidence=confidence)
+            drawn = sides[0].drawn, sides[1].drawn
+            why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=name in by_ratio)
+            both = datasets[i], datasets[j]
+            survival = survival_of(both, drawn, interval, reason=why, confidence=(confidence, each))
             differences.append(Difference(name, names[i], names[j], *interval, survival))
     plates = tuple(
         Contestant(
@@ -151,30 +160,33 @@ def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str
 
 class _Side(NamedTuple):
     """What of a plate is compared: whether it is a share or made of one, whether it is a ratio to the solid plate,
-    numbers whose mean it is, and its estimate."""
+    numbers whose mean it is, those whose mean over the shots of a draw is that of the draw, and its estimate."""
 
     is_share: bool
     by_ratio: bool
     numbers: Array
+    drawn: Array
     estimate: Estimate
 
 
-def _side(evidence: Evidence, dealt: dict[str, Any], *, by_ratio: bool) -> _Side:
+def _side(evidence: Evidence, dealt: Estimating, *, by_ratio: bool) -> _Side:
     assert evidence.numbers is not None
+    assert evidence.drawn is not None
     estimate = estimate_of(evidence.kind, evidence.numbers, **dealt)
     if math.isnan(evidence.measure.low):  # as of a worst tenth of few hits
         estimate = replace(estimate, low=math.nan, high=math.nan)
     if not by_ratio:
-        return _Side(evidence.kind == "share", False, evidence.numbers, estimate)
+        return _Side(evidence.kind == "share", False, evidence.numbers, evidence.drawn, estimate)
     assert evidence.solid is not None
+    assert evidence.solid_drawn is not None
     ratio = Ratio.of(estimate, evidence.numbers, evidence.solid, dealt)
     numbers = ratio_numbers(evidence.numbers, evidence.solid, ratio.value)
-    return _Side(
-        evidence.kind == "share", True, numbers, replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
-    )
+    drawn = ratio_of_draws(evidence.drawn, evidence.solid_drawn)
+    estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
+    return _Side(evidence.kind == "share", True, numbers, drawn, estimate)
 
 
-def _difference(one: _Side, other: _Side, dealt: dict[str, Any], *, paired: bool) -> tuple[float, float, float]:
+def _difference(one: _Side, other: _Side, dealt: Estimating, *, paired: bool) -> tuple[float, float, float]:
     """Difference of two plates and its interval; NaN where there is none."""
     a, b = one.estimate, other.estimate
     independent = a.value - b.value, *difference_of_independent(a, b)

@@ -10,7 +10,7 @@ from html import escape
 from typing import NamedTuple
 
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, EffectMeasure
-from warpimpact.analysis.numbers import interval_text, intervals_text, of_each
+from warpimpact.analysis.numbers import intervals_text, of_each
 from warpimpact.analysis.numbers import number_text as number
 from warpimpact.analysis.survival import Survival, survival_text
 
@@ -42,6 +42,11 @@ class Difference:
     low: float
     high: float
     survival: Survival | None = None
+
+    @property
+    def parameters(self) -> tuple[float, float] | None:
+        """Its interval by the parameters as of an `Estimate`."""
+        return None if self.survival is None else self.survival.interval
 
     @property
     def told_apart(self) -> bool:
@@ -87,7 +92,11 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        return f"<pre>{escape(comparison_text(self))}</pre>"
+        best = "".join(
+            f'<tr><th style="text-align: left">{escape(label)}</th><td style="text-align: left">{escape(who)}</td></tr>'
+            for label, who in best_rows(self)
+        )
+        return f"<table><tr><th>best at</th><th>plate</th></tr>{best}</table><pre>{escape(comparison_text(self))}</pre>"
 
     def ranks(self, measure: str) -> dict[str, int]:
         """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
@@ -236,10 +245,9 @@ def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
     rows: list[tuple[str, ...]] = []
     for plate in (plates[name] for name in ranks):
         told = plate.measures[place]
-        against = "" if math.isnan(told.ratio_low) else interval_text(told.ratio_low, told.ratio_high)
         value = (f"{plate.areal_density:.2f}", number(told.value), intervals_text(told.low, told.high, told.parameters))
         rank = str(ranks[plate.name]) if is_ranked(comparison, measure.name) else "-"
-        rows.append((rank, plate.name, *value, number(told.ratio), against))
+        rows.append((rank, plate.name, *value, number(told.ratio), told.ratio_text))
     what = " in the ratio to the solid plate" if by_ratio else ""
     return Ranking(
         f"{measure.label}{SHOWN_UNITS[measure.units]}; {better} is better{weighed(comparison, measure.name)}",
@@ -249,10 +257,10 @@ def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
 
 
 def _ranking_lines(ranking: Ranking) -> list[str]:
-    width = max(5, *(len(row[1]) for row in ranking.rows))
+    width, wide = (max(least, *(len(row[at]) for row in ranking.rows)) for at, least in ((1, 5), (4, 18)))
     lines = [ranking.title]
     for rank, plate, density, value, interval, ratio, against in (RANKING_HEAD, *ranking.rows):
-        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<20}{ratio}"
+        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<{wide}}  {ratio}"
         lines.append(f"{start}  {against}" if against else start)
     return lines + ranking.differences
 
@@ -272,9 +280,17 @@ def _in_words(pair: Difference, measure: EffectMeasure, what: str) -> str:
         told = f"difference{what} {number(pair.value)}"
         return f"{pair.one} and {pair.other}: {told}, of which these hits give no interval"
     if not pair.told_apart:
-        interval = f"({interval_text(pair.low, pair.high)})"
+        interval = f"({intervals_text(pair.low, pair.high, pair.parameters)})"
         return f"{pair.one} and {pair.other} cannot be told apart: difference{what} {number(pair.value)} {interval}"
     names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
-    low, high = sorted((abs(pair.low), abs(pair.high)))
-    verdict = f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval_text(low, high)})"
+    by_hits, by_parameters = (pair.low, pair.high), pair.parameters
+    if pair.value < 0.0:
+        by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
+    interval = intervals_text(*by_hits, by_parameters)
+    verdict = f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
+
+
+def _negative(interval: tuple[float, float]) -> tuple[float, float]:
+    """The interval of the negative number."""
+    return -interval[1], -interval[0]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray
@@ -18,16 +18,17 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.effects import Effect, effects
-from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
-from warpimpact.analysis.survival import over_draws
+from warpimpact.analysis.numbers import intervals_text, number_text
+from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import solid_reference
 from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.scene.units import Radians
-from warpimpact.statistics.comparisons import Ratio
-from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.comparisons import Ratio, ratio_numbers
+from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
+from warpimpact.statistics.of_groups import of_worst_tenth
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
 
 Array = NDArray[np.float64]
@@ -48,6 +49,7 @@ class EffectMeasure:
         ratio, ratio_low, ratio_high: the value as a multiple of that.
         hit: number of the hit that is the worst point; None of anything else.
         parameters: its interval by the parameters as of an `Estimate`.
+        ratio_parameters: that of the ratio.
     """
 
     name: str
@@ -65,6 +67,14 @@ class EffectMeasure:
     ratio_high: float
     hit: int | None = None
     parameters: tuple[float, float] | None = None
+    ratio_parameters: tuple[float, float] | None = None
+
+    @property
+    def ratio_text(self) -> str:
+        """The interval of the ratio, or both; empty where there is none."""
+        if math.isnan(self.ratio) or (self.ratio_parameters is None and math.isnan(self.ratio_low)):
+            return ""
+        return intervals_text(self.ratio_low, self.ratio_high, self.ratio_parameters)
 
 
 @dataclass(frozen=True)
@@ -75,12 +85,16 @@ class Evidence:
         kind: that of the numbers, "mean" or "share" as in `intervals.Dealt`.
         numbers: what each shot says, NaN where it does not count, shape [hits]; None of a worst point.
         solid: the same of the first shots at the solid plate; None where there is none.
+        drawn, solid_drawn: as `numbers` and `solid`, but their means over the shots of a draw are the numbers of the
+            draw.
     """
 
     measure: EffectMeasure
     kind: str
-    numbers: Array | None
-    solid: Array | None
+    numbers: Array | None = None
+    solid: Array | None = None
+    drawn: Array | None = None
+    solid_drawn: Array | None = None
 
 
 class _Statistic(NamedTuple):
@@ -134,7 +148,7 @@ def gather(
 ) -> Iterator[Evidence]:
     """The measures of `effectiveness` one after the other, each with the numbers that it is made of; of some effects
     `only`, by their names."""
-    dealt = dealing(dataset) | {"confidence": confidence}
+    dealt: Estimating = {**dealing(dataset), "confidence": confidence}
     reference = solid_limits(dataset) if attr.LIMIT in dataset.attrs else solid_reference(dataset)
     for effect in effects(dataset, angle=angle, standoff=standoff):
         if only is not None and effect.name not in only:
@@ -144,29 +158,45 @@ def gather(
             yield _averaged(effect, _SHARE, values, solid, dealt, dataset)
         else:
             yield _averaged(effect, _MEAN, values, solid, dealt, dataset)
-            sign = -1.0 if effect.higher_is_better else 1.0
-            worst = None if solid is None else sign * worst_tenth(sign * solid)
-            yield _averaged(effect, _WORST_TENTH, sign * worst_tenth(sign * values), worst, dealt, dataset)
+            yield _averaged(effect, _WORST_TENTH, values, solid, dealt, dataset)
             yield _worst_point(effect, values, solid, dataset)
 
 
 def _averaged(
     effect: Effect,
     statistic: _Statistic,
-    numbers: Array,
+    values: Array,
     solid: Array | None,
-    dealt: dict[str, Any],
+    dealt: Estimating,
     dataset: xarray.Dataset,
 ) -> Evidence:
-    """The measure that is the mean of some numbers."""
-    estimate = over_draws(dataset, estimate_of(effect.kind, numbers, **dealt), numbers)
-    estimate = estimate.within(0.0, 1.0 if effect.units == "1" else math.inf)
-    if statistic is _WORST_TENTH and estimate.parameters:  # that is of all draws together
-        estimate = replace(estimate, parameters=(math.nan, math.nan))
+    """The measure that is a mean of what the shots say, or of numbers made of that."""
+    numbers = drawn = values
+    of_solid = solid_drawn = solid
+    if statistic is _WORST_TENTH:
+        sign = -1.0 if effect.higher_is_better else 1.0
+        numbers, drawn = sign * worst_tenth(sign * values), sign * by_draws(dataset, sign * values, of_worst_tenth)
+        if solid is not None:
+            of_solid = sign * worst_tenth(sign * solid)
+            solid_drawn = of_solid if len(solid) == 1 else sign * by_draws(dataset, sign * solid, of_worst_tenth)
+    estimate = estimate_of(effect.kind, numbers, **dealt)
     if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
-        estimate = replace(_without_interval(estimate.value), parameters=estimate.parameters)
-    against = Ratio.of(estimate, numbers, solid, dealt)
-    return Evidence(_measure(effect, statistic, estimate, against), effect.kind, numbers, solid)
+        estimate = _without_interval(estimate.value)
+    estimate = over_draws(dataset, estimate, drawn).within(0.0, 1.0 if effect.units == "1" else math.inf)
+    against = Ratio.of(estimate, numbers, of_solid, dealt)
+    measure = _measure(effect, statistic, estimate, against)
+    if measure.parameters and solid_drawn is not None:
+        by_parameters = _without_interval(against.value)
+        if np.isfinite(solid_drawn).any() and np.nanmean(solid_drawn) > 0.0:
+            ends = replace(by_parameters, low=against.low, high=against.high)
+            by_parameters = over_draws(dataset, ends, ratio_of_draws(drawn, solid_drawn)).within(0.0)
+        measure = replace(measure, ratio_parameters=by_parameters.parameters or (math.nan, math.nan))
+    return Evidence(measure, effect.kind, numbers, of_solid, drawn, solid_drawn)
+
+
+def ratio_of_draws(drawn: Array, solid: Array) -> Array:
+    """Numbers whose means over the shots of a draw are the ratios of two means, to first order."""
+    return ratio_numbers(drawn, solid, float(np.nanmean(drawn) / np.nanmean(solid)))
 
 
 def _worst_point(effect: Effect, values: Array, solid: Array | None, dataset: xarray.Dataset) -> Evidence:
@@ -178,7 +208,7 @@ def _worst_point(effect: Effect, values: Array, solid: Array | None, dataset: xa
     hit = None if place is None else int(dataset[v.HIT][place])
     worst = None if solid is None else np.atleast_1d(sign * np.fmax.reduce(sign * solid))
     against = Ratio.of(estimate, values, worst, {})
-    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind, None, None)
+    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind)
 
 
 def _without_interval(value: float) -> Estimate:
@@ -217,13 +247,13 @@ def effectiveness_text(
     """The measures of `effectiveness` as a table, beside those of the solid plate of equal areal density."""
     measures = effectiveness(dataset, angle=angle, standoff=standoff)
     labels = [measure.label + SHOWN_UNITS[measure.units] for measure in measures]
-    width = max(map(len, labels))
+    width, wide = max(map(len, labels)), max(18, *(len(_second(measure)) for measure in measures))
     title = f"effectiveness{plate_text(dataset)}"
-    head = f"{title:<{width}}{'':>10}   {'95 % interval':<18}"
+    head = f"{title:<{width}}{'':>10}   {'95 % interval':<{wide}}"
     with_solid = any(not math.isnan(measure.solid) for measure in measures)
     rows = [head + f"{'solid plate':>12}   ratio to it" if with_solid else head.rstrip()]
     for label, measure in zip(labels, measures, strict=True):
-        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
+        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<{wide}}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
     if note := depth_note(measures):
         rows.append(note)
@@ -266,5 +296,4 @@ def _second(measure: EffectMeasure) -> str:
 
 
 def _against_text(measure: EffectMeasure) -> str:
-    interval = "" if math.isnan(measure.ratio_low) else f"  {interval_text(measure.ratio_low, measure.ratio_high)}"
-    return f"{number_text(measure.solid):>12}   {number_text(measure.ratio)}{interval}"
+    return f"{number_text(measure.solid):>12}   {number_text(measure.ratio)}  {measure.ratio_text}".rstrip()

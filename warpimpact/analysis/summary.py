@@ -12,14 +12,15 @@ import numpy as np
 
 from warpimpact.analysis import base
 from warpimpact.analysis.numbers import interval_text, intervals_text
-from warpimpact.analysis.survival import draws_note, over_draws
+from warpimpact.analysis.survival import by_draws, draws_note, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
-from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
+from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing
 from warpimpact.scene.display import STORED
 from warpimpact.solver.pilot import accuracy_text, errors_text, hits_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.of_groups import of_quantile
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -143,11 +144,21 @@ def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 
     if v.POSTERIOR_DRAW not in dataset:
         return found
     return {
-        one: replace(estimate, parameters=(math.nan, math.nan))  # a quantile does not move as the mean does
-        if one.kind == "quantile"
-        else over_draws(dataset, estimate, np.concatenate(values), units=one.units).within(one.least)
+        one: over_draws(dataset, estimate, _drawn(dataset, one, values), units=one.units).within(one.least)
         for (one, estimate), values in zip(found.items(), drawn, strict=True)
     }
+
+
+def status_shares(dataset: Result) -> dict[str, Estimate]:
+    """Shares of the shots by how they ended, of the statuses that occur."""
+    shares = estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES])
+    return {measure.variable: estimate for measure, estimate in shares.items() if estimate.value > 0.0}
+
+
+def _drawn(dataset: Result, measure: Measure, values: Sequence[Any]) -> Any:
+    """Numbers of the hits whose mean over those of a draw is the measure of the draw."""
+    numbers = np.concatenate(values)
+    return by_draws(dataset, numbers, of_quantile(measure.share)) if measure.kind == "quantile" else numbers
 
 
 def slices(dataset: Result) -> Iterator[Any]:

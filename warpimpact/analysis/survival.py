@@ -18,6 +18,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Array, dealing
 from warpimpact.statistics.intervals import Estimate
+from warpimpact.statistics.of_groups import Weights, pseudo_values
 from warpimpact.statistics.random_effects import FEWEST, interval_of_means, positive_share
 
 if TYPE_CHECKING:
@@ -35,12 +36,14 @@ class Survival:
         at_least: lower end of the one-sided interval of that, as the hits leave it.
         needed: probability from which a verdict survives, and confidence of `at_least`.
         reason: why it is not known; empty where it is.
+        interval: of the difference for the true parameters.
     """
 
     probability: float
     at_least: float
     needed: float
     reason: str = ""
+    interval: tuple[float, float] = (math.nan, math.nan)
 
     @property
     def survives(self) -> bool | None:
@@ -50,13 +53,25 @@ class Survival:
         return self.at_least >= self.needed
 
 
-def over_draws(dataset: Result, estimate: Estimate, numbers: Array, *, units: str = "", kind: str = "mean") -> Estimate:
+def by_draws(dataset: Result, values: Array, weights: Weights) -> Array:
+    """Numbers of shots whose mean over those of a draw is the worst tenth or the quantile of that draw.
+
+    Args:
+        values: of the first shots, shape [shots].
+        weights: as in `of_groups.pseudo_values`.
+    """
+    if v.POSTERIOR_DRAW not in dataset:
+        return values
+    draws = np.asarray(dataset[v.POSTERIOR_DRAW].values)[: len(values)]
+    return pseudo_values(values, draws, weights, images=dealing(dataset)["images"])
+
+
+def over_draws(dataset: Result, estimate: Estimate, numbers: Array, *, units: str = "") -> Estimate:
     """An estimate with its interval by the parameters, where shots draw these from a posterior.
 
     Args:
-        numbers: of all shots, whose mean moves with the draw as the estimate does, shape [hits].
+        numbers: of all shots; their mean over the shots of a draw is the estimated number of that draw, shape [hits].
         units: of the numbers; with units of a discrepancy that the result asks to count, this adds to every draw.
-        kind: of the estimate; a "quantile" moves as the mean of the numbers.
     """
     if v.POSTERIOR_DRAW not in dataset:
         return estimate
@@ -65,10 +80,14 @@ def over_draws(dataset: Result, estimate: Estimate, numbers: Array, *, units: st
     finite = np.where(np.isinf(numbers), np.nan, numbers)
     draws = np.asarray(dataset[v.POSTERIOR_DRAW].values)
     low, high = interval_of_means(finite, draws, images=dealing(dataset)["images"], beside=float(beside))
-    shift = estimate.value - float(np.nanmean(finite)) if kind == "quantile" and np.isfinite(finite).any() else 0.0
-    if not math.isnan(estimate.low + estimate.high):  # the hits leave the number of one draw no more certain than that
-        low, high = min(low, estimate.low - shift), max(high, estimate.high - shift)
-    return replace(estimate, parameters=(low + shift, high + shift))
+    return replace(estimate, parameters=_no_less((low, high), (estimate.low, estimate.high)))
+
+
+def _no_less(found: tuple[float, float], by_hits: tuple[float, float]) -> tuple[float, float]:
+    """An interval by the parameters: the hits leave the number of one draw no more certain than that of all."""
+    if math.isnan(sum(by_hits)):
+        return found
+    return min(found[0], by_hits[0]), max(found[1], by_hits[1])
 
 
 def draws_note(dataset: Result) -> str:
@@ -90,17 +109,18 @@ def draws_note(dataset: Result) -> str:
 def survival_of(
     datasets: tuple[xarray.Dataset, xarray.Dataset],
     numbers: tuple[Array, Array],
-    value: float,
+    by_hits: tuple[float, float, float],
     *,
     reason: str,
-    confidence: float,
+    confidence: tuple[float, float],
 ) -> Survival | None:
     """Whether the sign of a difference survives; None where no result draws its parameters from a posterior.
 
     Args:
-        numbers: of the shots of both plates, whose means are compared, shape [hits] each.
-        value: the difference of the means.
+        numbers: of the shots of both plates, whose means over those of a draw are compared, shape [hits] each.
+        by_hits: the difference of the means over all shots, with its interval by the hits.
         reason: why the numbers are not compared by draws, if so.
+        confidence: of the sign, and of the interval of the difference.
     """
     drawn = [dataset[v.POSTERIOR_DRAW].values for dataset in datasets if v.POSTERIOR_DRAW in dataset]
     if not drawn:
@@ -110,30 +130,27 @@ def survival_of(
         reason = "only one of the plates draws its parameters from a posterior"
     elif not reason and not np.array_equal(drawn[0][:common], drawn[1][:common]):
         reason = "their shots have different draws"
-    if not reason:
-        apart = math.copysign(1.0, value) * (numbers[0][:common] - numbers[1][:common])
-        images = dealing(datasets[0])["images"]
-        found = positive_share(apart, drawn[0][:common], images=images, confidence=confidence)
-        if found is not None:
-            return Survival(found.share, found.at_least, confidence)
-        reason = f"fewer than {FEWEST} draws have two shots that count"
-    return Survival(math.nan, math.nan, confidence, reason)
+    if reason:
+        return Survival(math.nan, math.nan, confidence[0], reason)
+    apart = numbers[0][:common] - numbers[1][:common]
+    images, draws = dealing(datasets[0])["images"], drawn[0][:common]
+    found = positive_share(math.copysign(1.0, by_hits[0]) * apart, draws, images=images, confidence=confidence[0])
+    if found is None:
+        return Survival(math.nan, math.nan, confidence[0], f"fewer than {FEWEST} draws have the shots that it takes")
+    interval = interval_of_means(apart, draws, images=images, confidence=confidence[1])
+    return Survival(found.share, found.at_least, confidence[0], interval=_no_less(interval, by_hits[1:]))
 
 
-def why_not_by_draws(measure: str, numbers: tuple[Array, Array], *, independent: str, by_ratio: bool) -> str:
+def why_not_by_draws(numbers: tuple[Array, Array], *, independent: str, by_ratio: bool) -> str:
     """Why the numbers of two plates do not tell the difference for each draw; empty where they do.
 
     Args:
         independent: why the plates are compared as independent, if so.
         by_ratio: the numbers are those of ratios to the solid plate.
     """
-    if independent:
-        return independent
-    if measure.endswith("_worst_tenth"):
-        return "the worst tenth is that of all draws together"
-    if by_ratio and len(numbers[0]) != len(numbers[1]):
+    if not independent and by_ratio and len(numbers[0]) != len(numbers[1]):
         return "a ratio to the solid plate needs as many hits of both plates"
-    return ""
+    return independent
 
 
 def survival_text(survival: Survival | None) -> str:

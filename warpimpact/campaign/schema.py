@@ -7,11 +7,12 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 
 from ..scene.distributions import PURE_NUMBERS, Distribution
 from ..scene.model import Model
 from ..scene.quantities import SCATTERED
+from ..scene.units import PositiveArealDensity
 from .campaign import Campaign
 
 Schema = dict[str, Any]
@@ -26,12 +27,9 @@ def campaign_schema() -> Schema:
     Every key has its description, its default and its bounds. A quantity is a number or a string with a unit; the
     keyword ``unit`` is that of a number. A schema cannot tell that keys exclude each other: warpimpact does.
     """
-    schema: Schema = _tidied(Campaign.model_json_schema(mode="validation"))
+    schema = _described(Campaign)
     definitions = schema["$defs"]
-    for model in _models():
-        if model.__name__ in definitions:
-            _complete(definitions[model.__name__], model)
-    _complete(schema, Campaign)
+    _take_weights(definitions)
     _take_distributions(schema)
     _take_plates(schema)
     schema["properties"]["sweep"] = {
@@ -42,10 +40,25 @@ def campaign_schema() -> Schema:
     definitions["Stop"]["properties"]["half_width"]["type"] = ["number", "string"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **schema,
+        **_named(_decided(schema, definitions)),
         "title": "warpimpact campaign",
         "description": "A campaign of warpimpact: what is shot at what, where, how finely it is computed.",
     }
+
+
+def completed_schema(model: type[BaseModel]) -> Schema:
+    """The JSON schema of another file, whose tables are those of a model: with descriptions, defaults and bounds."""
+    schema = _described(model)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_decided(schema, schema["$defs"])}
+
+
+def _described(model: type[BaseModel]) -> Schema:
+    schema: Schema = _tidied(model.model_json_schema(mode="validation"))
+    for one in _models():
+        if one.__name__ in schema["$defs"]:
+            _complete(schema["$defs"][one.__name__], one)
+    _complete(schema, model)
+    return schema
 
 
 def _models(base: type[BaseModel] = Model) -> Iterator[type[BaseModel]]:
@@ -84,16 +97,17 @@ def _complete(definition: Schema, model: type[BaseModel]) -> None:
             properties[name]["description"] = _in_a_file(text)
     if issubclass(model, Model):
         for name in [key for key in model._keys() if key not in properties]:  # read into other keys, as a file is
-            properties[name] = {"description": meanings.get(name, "")}
-            definition.pop("required", None)
-    chosen = [name for name in ("shape", "distribution") if "const" in properties.get(name, {})]
+            properties[name] = {"description": _in_a_file(meanings.get(name, ""))}
+            if name == "file":
+                definition.pop("required", None)
+    chosen = [name for name in ("shape", "distribution", "name") if "const" in properties.get(name, {})]
     if chosen:
         definition["required"] = [*chosen, *definition.get("required", [])]
 
 
 def _in_a_file(text: str) -> str:
     """What a docstring says of a field, as it holds for the key of a file: its unit is told apart."""
-    return re.sub(r"\bNone\b", "not given", re.sub(r"(?:^| )\[[^]]*\]", "", text)).strip(" .") + "."
+    return re.sub(r"\bNone\b", "not given", re.sub(r"(?:^|\s)\[[^]]*\]", "", text)).strip(" .") + "."
 
 
 def read_docstring(model: type) -> tuple[str, dict[str, str]]:
@@ -117,6 +131,40 @@ def _entries(text: str) -> dict[str, str]:
         elif line.strip():
             entries |= {name: f"{entries[name]} {line.strip()}" for name in names}
     return entries
+
+
+def _take_weights(definitions: Schema) -> None:
+    """A plate has a thickness or an areal density."""
+    density = _tidied(TypeAdapter(PositiveArealDensity).json_schema())
+    for one in (definitions["Plate"], definitions["Layer"]):
+        one["properties"]["areal_density"] |= density
+        one["required"].remove("thickness")
+        one |= {"if": {"required": ["areal_density"]}, "then": {"properties": {"thickness": {"not": {}}}}}
+        one["else"] = {"required": ["thickness"]}
+
+
+def _named(schema: Schema) -> Schema:
+    """A schema in which a threat stands for the keys of a core and for the velocity, a material for a resistance."""
+    definitions = schema["$defs"]
+    cores = [one["then"]["$ref"].rpartition("/")[2] for one in schema["properties"]["core"]["allOf"]]
+    for name in cores:
+        required = definitions[name]["required"]
+        definitions[name] |= {"required": ["shape"], "allOf": [_unless("threat", {"required": required})]}
+    for name in ("Plate", "Layer", "NamedPlate"):
+        definitions[name]["required"] = [key for key in definitions[name]["required"] if key != "resistance"]
+        definitions[name]["allOf"] = [_unless("material", {"required": ["resistance"]})]
+    core = schema["properties"]["core"]
+    core["allOf"].append(_unless("threat", {"required": core.pop("required")}))
+    del definitions["Impact"]["required"]
+    without = {"required": ["impact"], "properties": {"impact": {"required": ["velocity"]}}}
+    named = {"properties": {"core": {"required": ["threat"]}}}
+    required = [key for key in schema["required"] if key != "impact"]
+    return schema | {"required": required, "if": named, "else": without}
+
+
+def _unless(key: str, rest: Schema) -> Schema:
+    """What holds of a table without a key."""
+    return {"if": {"required": [key]}, "else": rest}
 
 
 def _take_distributions(schema: Schema) -> None:
@@ -171,9 +219,50 @@ def _take_plates(schema: Schema) -> None:
     }
     several = {"type": "array", "items": {"$ref": "#/$defs/NamedPlate"}, "minItems": 2}
     plate = schema["properties"]["plate"]
-    schema["properties"]["plate"] = {
-        "description": plate.pop("description"),
-        "if": {"type": "array"},  # not anyOf: a slip in one of many keys would make an editor mark the whole table
-        "then": several,
-        "else": plate,
+    description = plate.pop("description")
+    schema["properties"]["plate"] = {"description": description, "anyOf": [several, plate]}
+
+
+def _decided(part: Any, definitions: Schema) -> Any:
+    """The same with choices that a kind of value or a key decides, in the place of anyOf and oneOf. An editor then
+    marks the key that is wrong; of several choices none of which fits, it would mark the whole table."""
+    if isinstance(part, list):
+        return [_decided(one, definitions) for one in part]
+    if not isinstance(part, dict):
+        return part
+    rest = {name: _decided(one, definitions) for name, one in part.items() if name not in ("anyOf", "oneOf")}
+    rest.pop("discriminator", None)
+    if "oneOf" in part:
+        return rest | _by_key([one["$ref"] for one in part["oneOf"]], definitions)
+    if "anyOf" in part:
+        return rest | _by_kind(_decided(part["anyOf"], definitions))
+    return rest
+
+
+def _by_kind(choices: list[Schema]) -> Schema:
+    """A choice that the kind of the value decides: keywords of a number, a string or a list say nothing of others."""
+    merged: Schema = {"type": []}
+    for one in choices:
+        table = "$ref" in one or one["type"] == "object"
+        kinds = ["object"] if table else one["type"] if isinstance(one["type"], list) else [one["type"]]
+        merged["type"] += kinds
+        merged |= {"if": {"type": "object"}, "then": one} if table else {k: v for k, v in one.items() if k != "type"}
+    return merged
+
+
+def _by_key(references: list[str], definitions: Schema) -> Schema:
+    """A choice between tables that one of their keys decides. Their keys stand here, too, for completion."""
+    tables = [definitions[reference.rpartition("/")[2]] for reference in references]
+    key = next(name for name, one in tables[0]["properties"].items() if "const" in one)
+    names = [one["properties"][key]["const"] for one in tables]
+    meant = {name: one.get("description", "") for table in tables for name, one in table["properties"].items()}
+    return {
+        "type": "object",
+        "required": [key],
+        "properties": {name: {"description": text} for name, text in meant.items()}
+        | {key: {"enum": names, "description": f"One of {', '.join(names)}."}},
+        "allOf": [
+            {"if": {"required": [key], "properties": {key: {"const": name}}}, "then": {"$ref": reference}}
+            for name, reference in zip(names, references, strict=True)
+        ],
     }

@@ -137,8 +137,10 @@ class _Log:
 
     def _line(self, step: Step, elapsed: float) -> str:
         line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - step.resumed
-        if fresh <= 0 or elapsed <= 0.0:
+        if fresh <= 0:
             return line
+        if elapsed <= 0.0:
+            return f"{line}; {step.text}".removesuffix("; ")
         left = (step.total - step.done) * elapsed / fresh
         return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s, {left:.0f} s left; {step.text}".removesuffix("; ")
 

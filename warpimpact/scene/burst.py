@@ -27,7 +27,7 @@ _NonNegativeLength = Annotated[Length, Field(ge=0)]
 
 def _or_one_length(schema: dict[str, Any]) -> None:
     """A file may give one length, too."""
-    schema["anyOf"].append({"type": ["number", "string"]})
+    schema["anyOf"].append({"type": ["number", "string"], "unit": "m"})
 
 
 class Burst(Scattering):

@@ -37,6 +37,7 @@ UNITS = {
     "J": Unit("J", "J"),
     "kg m^2": Unit("kg m2", "kg m²"),
     "kg/m^3": Unit("kg m-3", "kg/m³"),
+    "kg/m^2": Unit("kg m-2", "kg/m²"),
     "m/s": Unit("m s-1", "m/s"),
     "rad": Unit("degree", "°"),
     "rad/s": Unit("rad s-1", "rad/s"),

@@ -23,6 +23,7 @@ LAYER_STANDOFFS = "output.layer_standoffs"
 STOP_BENDING, STOP_BROKEN = "stop.quantity of a bending moment or stress", "stop.quantity of broken cores"
 WHOLE_PLATE, SIZE, MARGIN = 'hits.area = "plate"', "size of the plate", "margin"
 BY_TIME, MASK, STAGGERED, HOLES = "plate.degradation_interval", 'shape = "mask"', "staggered", "holes"
+THICKNESS, AREAL_DENSITY = "thickness", "areal_density"
 SPACING, OFFSETS, HIT_SCATTER = "burst.spacing", "burst.offsets", "burst.scatter"
 LIMIT = "warpimpact limit"
 
@@ -45,6 +46,7 @@ EXCLUDED = (
     Rule(LIMIT, STOP, "limits are searched for every hit; leave out the table [stop]"),
     Rule(LIMIT, BURST, "limits are searched for every hit alone; leave out the table [burst]"),
     Rule(BY_TIME, BY_PATH, "exposure counts either time or path"),
+    Rule(THICKNESS, AREAL_DENSITY, "with the holes each gives the other"),
     Rule(STAGGERED, HOLES, "it stands for two holes; list all holes of the cell"),
     Rule(MARGIN, MASK, "a mask has no single holes to leave out; draw it as large as the plate"),
     Rule(LAYERS, NODAL, "the nodal scheme knows one plate and no layers behind it"),

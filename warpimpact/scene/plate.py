@@ -3,22 +3,28 @@
 from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator, model_validator
+from pydantic import BaseModel, Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
 
-from .exclusions import BY_PATH, BY_TIME, MARGIN, SIZE, check_together
+from .exclusions import AREAL_DENSITY, BY_PATH, BY_TIME, MARGIN, SIZE, THICKNESS, check_together
 from .model import Array, Model
 from .patterns import AnyPattern, BoolArray, NoPattern, Pattern
 from .units import (
     NonNegativeNumber,
     NonNegativeStress,
     Number,
+    PositiveArealDensity,
     PositiveDensity,
     PositiveLength,
     PositiveTime,
+    Title,
 )
 
 INTERVAL = 1.0e-6
 """Δt_β where neither it nor Δs_β is given [s]: that of the paper's rows (docs/model.md §4)."""
+
+
+class _Weight(BaseModel):
+    areal_density: PositiveArealDensity
 
 
 class Plate(Model):
@@ -26,6 +32,7 @@ class Plate(Model):
 
     Attributes:
         thickness: that of the plate, h [m].
+        areal_density: mass per area of the plate with its holes [kg/m²], in place of the thickness, which follows.
         resistance: Y, the stress of the material against the core [Pa].
         shear_coefficient: η, friction per normal stress.
         degradation: β, the share of Y that is left after contact for `degradation_interval` or over
@@ -37,6 +44,8 @@ class Plate(Model):
         degradation_depth: d, how far from a contact it weakens along the thickness [m]. A plate no thicker than that
             weakens as a whole, as in the paper; every depth of a thicker one loses the same share of its resistance.
         density: of the material [kg/m³].
+        material: its name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law
+            of [interaction]; a key beside it overrides what it gives.
         size: extent along y and z of a finite plate centred on the origin [m]; a plate without it is unbounded.
         margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out.
             Without a margin the rim cuts holes.
@@ -52,9 +61,26 @@ class Plate(Model):
     degradation_length: PositiveLength = 0.5e-3
     degradation_depth: PositiveLength = 4.0e-3
     density: PositiveDensity = 7850.0
+    material: Title | None = None
     size: tuple[PositiveLength, PositiveLength] | None = None
     margin: PositiveLength | None = None
     pattern: AnyPattern = NoPattern()
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _has_its_weight(cls, values: Any, read: ModelWrapValidatorHandler[Self]) -> Self:
+        if not isinstance(values, dict) or values.get("areal_density") is None:
+            return read(values)
+        check_together({THICKNESS: "thickness" in values, AREAL_DENSITY: True})
+        rest = {name: value for name, value in values.items() if name != "areal_density"}
+        weight = _Weight(areal_density=values["areal_density"]).areal_density
+        plate = read(rest | {"thickness": 1.0})
+        object.__setattr__(plate, "thickness", weight / plate.areal_density)  # which was that of 1 m
+        return plate
+
+    @classmethod
+    def _keys(cls) -> list[str]:
+        return [*super()._keys(), "areal_density"]
 
     @field_validator("pattern")
     @classmethod

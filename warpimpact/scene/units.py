@@ -17,7 +17,7 @@ from .display import UNITS, Unit
 
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
-_LARGEST = 1e30
+LARGEST = 1e30
 """Of a quantity in SI: what is computed of it, such as a volume, stays finite."""
 _RIGHT_ANGLE = math.pi / 2
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
@@ -103,8 +103,8 @@ class _Quantity:
             raise self._error(value, f"which is not {self.name}")
         if not math.isfinite(number):
             raise self._error(value, "which is not finite")
-        if abs(number) > _LARGEST:
-            raise self._error(value, f"which is more than {_LARGEST:g}")
+        if abs(number) > LARGEST:
+            raise self._error(value, f"which is more than {LARGEST:g}")
         return self.as_read(number)
 
     def as_read(self, number: float) -> float:
@@ -174,6 +174,7 @@ COMMON = {
     ("MPa", "Pa"): 1e6,
     ("GPa", "Pa"): 1e9,
     ("kg/m^3", "kg/m^3"): 1.0,
+    ("kg/m^2", "kg/m^2"): 1.0,
     ("m/s", "m/s"): 1.0,
     ("rad", "rad"): 1.0,
     ("deg", "rad"): math.pi / 180.0,
@@ -287,6 +288,7 @@ Time = Annotated[Read, _quantity("a time", "s", "1 us")]
 Stress = Annotated[Read, _quantity("a stress", "Pa", "2600 MPa")]
 Moment = Annotated[Read, _quantity("a moment", "N m", "50 N m")]
 Density = Annotated[Read, _quantity("a density", "kg/m^3", "7850 kg/m^3")]
+ArealDensity = Annotated[Read, _quantity("an areal density", "kg/m^2", "31.4 kg/m^2")]
 Speed = Annotated[Read, _quantity("a speed", "m/s", "825 m/s")]
 Angle = Annotated[
     Read,
@@ -324,6 +326,7 @@ NonNegativeLength = Annotated[Length, Field(ge=0)]
 PositiveMass = Annotated[Mass, Field(gt=0)]
 PositiveTime = Annotated[Time, Field(gt=0)]
 PositiveDensity = Annotated[Density, Field(gt=0)]
+PositiveArealDensity = Annotated[ArealDensity, Field(gt=0)]
 PositiveAngle = Annotated[Angle, Field(gt=0)]
 PositiveSpeed = Annotated[Speed, Field(gt=0)]
 PositiveInertia = Annotated[Inertia, Field(gt=0)]

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.kernels import free_flight, march
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.device import find_device, load
+from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import HitErrors, pilot_hits, pilot_size
@@ -61,7 +60,11 @@ def simulate(
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
     """Compute what was prepared; see `simulate`."""
-    memory = Memory(prepared, find_device(worker.device))
+    return marched(Memory(prepared, find_device(worker.device)), worker, progress)
+
+
+def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
+    """Compute what is in the memory of a device; see `simulate`."""
     march = March(memory, worker.threads)
     contact = march.march(progress, worker.cancel)
     return outcomes_of(march.memory, contact)
@@ -90,12 +93,6 @@ def spread(shots: Shots, most: int) -> Shots:
     plates = len(shots) // together
     places = np.linspace(0, plates, min(plates, -(-most // together)), endpoint=False).astype(int)
     return shots[(places[:, None] * together + np.arange(together)).reshape(-1)]
-
-
-def build(prepared: Prepared, device: str = "auto") -> None:
-    """Compile the kernels that `computed` needs, once per version and machine."""
-    for stage in (march, free_flight):
-        load(stage.build(prepared.variant).kernel, find_device(device))
 
 
 def outcomes_of(memory: Memory, contact: Any) -> Outcomes:

@@ -12,22 +12,19 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
-from warpimpact.analysis.survival import over_draws
+from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.posterior import Posterior
+from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.campaign.text import CampaignError
-from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.limits import with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, pilot_shots
+from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, part_of, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
-from warpimpact.scene import Numerics, Scene, Shots, Target
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -42,11 +39,12 @@ from warpimpact.solver.limit import (
     with_thickness,
     with_velocity,
 )
+from warpimpact.solver.limit_near import joined_limits, velocities_from_neighbours
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import LimitErrors, limits_pilot_size
-from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.of_groups import of_quantile
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -56,11 +54,19 @@ QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
 
 
+Array = NDArray[np.float64]
+
+
 @dataclass(frozen=True)
 class LimitMap:
-    """The limit of every hit, as a `runs.task.Computation`: what `warpimpact limit` computes."""
+    """The limit of every hit, as a `runs.task.Computation`: what `warpimpact limit` computes.
+
+    Attributes:
+        near: whether searches of a velocity begin at limits of neighbours, with fewer runs.
+    """
 
     sought: Sought
+    near: bool = False
     most_solid: ClassVar[int] = 256
 
     @classmethod
@@ -73,8 +79,8 @@ class LimitMap:
             CampaignError: the campaign has no limits, or this search cannot find them.
         """
         try:
-            given = {asked.STOP: campaign.stop is not None, asked.BURST: campaign.burst is not None}
-            asked.check_together({asked.LIMIT: True} | given)
+            given = {exclusions.STOP: campaign.stop is not None, exclusions.BURST: campaign.burst is not None}
+            exclusions.check_together({exclusions.LIMIT: True} | given)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None
@@ -90,7 +96,8 @@ class LimitMap:
         """What decides the bits beside the campaign."""
         sought = self.sought
         of_layer = f" of layer {sought.layer}" if sought.layer else ""
-        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}"}
+        begun = ", begun at neighbours" if self.near else ""
+        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}{begun}"}
 
     @property
     def measures(self) -> tuple[str, ...]:
@@ -103,47 +110,46 @@ class LimitMap:
         Args:
             progress: as in `simulate`.
         """
-        scene, sought, images, found = campaign.scene, self.sought, len(campaign.symmetries), task.found
-        numerics = numerics_of(campaign, found)
+        sought, images, found = self.sought, len(campaign.symmetries), task.found
+        numerics, drawn = numerics_of(campaign, found), campaign.drawn
+        progress, shots = of_images(progress, images), task.shots[::images]
         begin = time.perf_counter()
-        searched = _searched(
-            campaign.drawn, scene, task.shots[::images], sought, numerics, worker, of_images(progress, images)
-        )
+        searched = _searched(drawn, campaign.scene, shots, sought, numerics, worker, progress, near=self.near)
         elapsed = time.perf_counter() - begin
         attributes = {
-            **computed_by(campaign, worker.device, len(task.shots) // images, elapsed),
+            **computed_by(campaign, worker.device, len(shots), elapsed),
             **found_attributes(campaign, found),
             **({attr.LIMIT_ERROR: found.error} if isinstance(found, LimitErrors) else {}),
+            attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
             attr.LIMIT: sought.quantity,
             attr.LIMIT_LAYER: sought.layer,
             **self.weights(campaign.target),
             attr.LIMIT_TOLERANCE: sought.tolerance,
             attr.LIMIT_HIGHEST: sought.highest,
         }
+        solid: dict[str, Array] = {}
+        if task.solid is not None:
+            solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
+            attributes |= of_solid
         put = self._put(campaign, task.shots, searched, images)
-        resolution = prepare(scene, put[:1], short_steps(numerics)).resolution
         found_limits = {name: getattr(searched, name.field) for name in v.LIMITS[sought.quantity]}
-        table = described(campaign, put, searched.outcomes.assign(**found_limits), resolution, attributes)
-        begun, *_ = table.attrs[attr.HISTORY].split()
-        table.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {sought.quantity}"
-        return table if task.solid is None else self._beside_solid(campaign, table, task.solid, numerics, worker)
+        outcomes = searched.outcomes.assign(**found_limits)
+        return described(campaign, put, outcomes, short_steps(numerics), attributes, solid)
 
-    def _beside_solid(
-        self, campaign: Campaign, table: Table, solid: Shots, numerics: Numerics, worker: Worker
-    ) -> Table:
-        """The columns with the limits of some shots at the solid plate that is as heavy as the whole target."""
-        plate, sought = campaign.target.solid, replace(self.sought, layer=0)
-        scene = campaign.scene.model_copy(update={"target": plate})
+    def _at_solid(
+        self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker
+    ) -> tuple[dict[str, Array], dict[str, float]]:
+        """Column and attributes of the limits of some shots at the solid plate that is as heavy as the whole target."""
+        (scene, shots), sought = at_solid(campaign, shots), replace(self.sought, layer=0)
         if sought.quantity == "thickness":
             sought = replace(sought, highest=thickest(scene, 0))
         begin = time.perf_counter()
-        searched = _searched(campaign.drawn, scene, at_solid(campaign, solid), sought, numerics, worker)
-        attributes = {
+        searched = _searched(campaign.drawn, scene, shots, sought, numerics, worker)
+        return {v.SOLID_LIMITS[sought.quantity]: searched.value}, {
             attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
-            attr.SOLID_LIMIT_DENSITY: plate.density,
+            attr.SOLID_LIMIT_DENSITY: scene.target.layers[0].density,
             attr.SOLID_LIMIT_HIGHEST: sought.highest,
         }
-        return with_solid_limits(table, sought.quantity, searched).assign_attrs(attr.with_units(attributes))
 
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
@@ -186,23 +192,17 @@ def _searched(
     numerics: Numerics,
     worker: Worker,
     progress: Progress | None = None,
+    near: bool = False,
 ) -> Limits:
     """Limits of shots. Draws of a posterior may need scenes of their own."""
-    if drawn is None or not drawn.of_scene:
-        return limits(scene, shots, sought, numerics, worker, progress)
-    places, parts = list[NDArray[np.int64]](), list[Limits]()
-    for which, own in drawn.scenes(scene, shots):
-        parts.append(limits(own, shots[which], sought, numerics, worker))
+    search = velocities_from_neighbours if near else limits
+    places, parts, done = list[NDArray[np.int64]](), list[Limits](), 0
+    for which, own in scenes_of(drawn, scene, shots):
+        parts.append(search(own, shots[which], sought, numerics, worker, part_of(progress, done, len(shots))))
         places.append(which)
-        if progress is not None:
-            progress(sum(map(len, places)), len(shots))
+        done += len(which)
     order = np.argsort(np.concatenate(places), kind="stable")
-    numbers = ("value", "lower", "upper", "runs", "converged")
-    return Limits(
-        **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
-        shots=Shots.joined([part.shots for part in parts])[order],
-        outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
-    )
+    return joined_limits(parts, order)
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:
@@ -225,7 +225,8 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     for name, share in QUANTILES.items():
         estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
         ends = (estimate.value, estimate.low, estimate.high)
-        estimate = over_draws(dataset, estimate, counted, units=_UNITS_OF[quantity], kind="quantile")
+        drawn = by_draws(dataset, counted, of_quantile(share))
+        estimate = over_draws(dataset, estimate, drawn, units=_UNITS_OF[quantity])
         value_, low, high = (math.inf if end >= highest else end for end in ends)
         found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
     return found

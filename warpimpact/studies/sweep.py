@@ -9,13 +9,11 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import xarray
-from pydantic.fields import FieldInfo
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError, parsed, read_text
@@ -24,7 +22,7 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Impact, Interaction, Plate
-from warpimpact.scene.units import quoted, reader_in, typed
+from warpimpact.scene.units import PositiveArealDensity, quoted, reader_in, typed
 
 _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
 """Tables whose keys need no table in front of them, as there is no other key of that name."""
@@ -152,9 +150,9 @@ def _resolved(key: str, path: str) -> str:
     if "." in key or key in _WHOLE:
         return key
     for table, model in _TABLES.items():
-        if key in model.model_fields:
+        if key in model._keys():
             return f"{table}.{key}"
-    known = ", ".join(name for model in _TABLES.values() for name in model.model_fields)
+    known = ", ".join(name for model in _TABLES.values() for name in model._keys())
     raise CampaignError(
         f"{path}: sweep: got the unknown input {quoted(key)}; give one of {', '.join(_WHOLE)}, {known}, or a dotted "
         'place such as "core.mass"'
@@ -278,20 +276,24 @@ def _equal(one: xarray.Variable, other: xarray.Variable) -> bool:
 
 def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
     """Values of an input: a number with its unit where it is a quantity, else its label."""
-    found = _field(one.key, next(iter(sweep.campaigns.values())))
+    kind = _type(one.key, next(iter(sweep.campaigns.values())))
     stride = math.prod(sweep.shape[sweep.inputs.index(one) + 1 :])
     campaigns = list(sweep.campaigns.values())[:: max(1, stride)][: len(one.values)]
     numbers = [_value(one.key, campaign) for campaign in campaigns]
-    if found is None or not all(isinstance(number, int | float) for number in numbers):
+    if kind is None or not all(isinstance(number, int | float) for number in numbers):
         return one.name, np.array(one.labels), {"long_name": one.key}
-    reader, values = reader_in(typed(found)), np.array(numbers, dtype=float)
+    reader, values = reader_in(kind), np.array(numbers, dtype=float)
     units = reader.display.stored if reader else "1"
     return one.name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": one.key}
 
 
-def _field(key: str, campaign: Campaign) -> FieldInfo | None:
+def _type(key: str, campaign: Campaign) -> Any:
+    """The type of an input, with its marks; None where it is in no model."""
     table, _, last = key.rpartition(".")
-    return getattr(type(_value(table, campaign)), "model_fields", {}).get(last)
+    if last == "areal_density":  # which a plate reads and has, but not as a field
+        return PositiveArealDensity
+    found = getattr(type(_value(table, campaign)), "model_fields", {}).get(last)
+    return None if found is None else typed(found)
 
 
 def _value(key: str, campaign: Campaign) -> Any:
@@ -311,7 +313,7 @@ def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any
     }
     return shared | {
         attr.TITLE: sweep.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact sweep",
+        attr.HISTORY: attr.history_line("sweep"),
         attr.CAMPAIGN: sweep.text,
         attr.SWEEP: json.dumps({one.name: list(one.labels) for one in sweep.inputs}),
     }

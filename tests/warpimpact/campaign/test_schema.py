@@ -6,10 +6,15 @@ from typing import Any
 
 import pytest
 from jsonschema import Draft202012Validator
+from jsonschema.exceptions import best_match
 
 from warpimpact.campaign.schema import campaign_schema
+from warpimpact.firing.schema import firing_schema
+from warpimpact.identification.schema import fit_schema
 
 CAMPAIGNS = sorted((Path(__file__).parents[3] / "campaigns").glob("*.toml"))
+FIRING = [CAMPAIGNS[0].parent / "firing" / "v50_test.toml"]
+FITS = sorted((CAMPAIGNS[0].parent / "fits").glob("*.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -102,3 +107,46 @@ def test_nothing_is_told_that_toml_lacks(schema: dict[str, Any]) -> None:
 def test_a_profile_comes_from_a_file_or_from_numbers(schema: dict[str, Any], campaign: dict[str, Any]) -> None:
     for core in ({"file": "core.csv"}, {"s": [0, "1 mm"], "r": [0, "1 mm"]}):
         assert complaints(schema, campaign | {"core": {"shape": "profile", "mass": "4 g", **core}}) == []
+
+
+@pytest.mark.parametrize(
+    ("table", "change", "place", "named"),
+    [
+        ("core", {"lenght": "27 mm"}, "$.core", "lenght"),
+        ("core", {"shape": "ogiv"}, "$.core.shape", "ogiv"),
+        ("core", {"mass": "4"}, "$.core.mass", "4"),
+        ("plate", {"patern": {}}, "$.plate", "patern"),
+        ("plate", {"resistance": -1}, "$.plate.resistance", "-1"),
+        ("plate", {"areal_density": 30}, "$.plate.thickness", "4 mm"),
+        ("plate", {"pattern": {"shape": "circle", "diametre": 1, "spacing": 2}}, "$.plate.pattern", "diamet"),
+        (
+            "plate",
+            {"pattern": {"shape": "circle", "diameter": 1, "spacing": [2, 0]}},
+            "$.plate.pattern.spacing[1]",
+            "0",
+        ),
+        ("impact", {"velocity": {"distribution": "normal", "mean": "8 m/s", "sdt": 1}}, "$.impact.velocity", "sdt"),
+        ("impact", {"velocity": {"distribution": "norml"}}, "$.impact.velocity.distribution", "norml"),
+    ],
+)
+def test_a_slip_is_marked_where_it_is(
+    schema: dict[str, Any], campaign: dict[str, Any], table: str, change: dict[str, Any], place: str, named: str
+) -> None:
+    found = best_match(Draft202012Validator(schema).iter_errors(campaign | {table: campaign[table] | change}))
+    assert (found.json_path, named in found.message) == (place, True), found.message
+
+
+@pytest.mark.parametrize("path", FIRING, ids=lambda path: path.stem)
+def test_firing_tests_have_a_schema(path: Path) -> None:
+    test = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert complaints(firing_schema(), test) == []
+    assert complaints(firing_schema(), test | {"tests": 0, "gum": {}}) == ["$", "$.tests"]
+    assert complaints(firing_schema(), test | {"procedure": {"name": "langlie", "lowest": 1}}) == ["$.procedure"]
+
+
+@pytest.mark.parametrize("path", FITS, ids=lambda path: path.stem)
+def test_fits_have_a_schema(path: Path) -> None:
+    fit = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert complaints(fit_schema(), fit) == []
+    fit["shot"][0]["core"] = {"shape": "cone", "lenght": 1}
+    assert complaints(fit_schema(), fit | {"samplin": {}}) == ["$.shot[0].core", "$"]

@@ -6,13 +6,18 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
+from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
+from warpimpact.cli.options import read_option
+from warpimpact.firing.reading import read_test
 from warpimpact.identification.reading import read_fit
 from warpimpact.identification.schema import fit_schema
+from warpimpact.scene.units import Angle
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
@@ -23,7 +28,7 @@ pytestmark = pytest.mark.usefixtures("in_tmp_path")
 def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["examples"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    paths = [*CAMPAIGNS.glob("*.toml"), *CAMPAIGNS.glob("fits/*.toml")]
+    paths = [*CAMPAIGNS.glob("*.toml"), *CAMPAIGNS.glob("fits/*.toml"), *CAMPAIGNS.glob("firing/*.toml")]
     assert [line.split()[0] for line in lines] == sorted(path.stem for path in paths)
     assert all("?" in line for line in lines)
 
@@ -47,6 +52,12 @@ def test_a_new_fit_can_be_read() -> None:
     assert main(["new", "paper_fit"]) == 0
     assert read_fit("paper_fit.toml").observed == 10
     assert [path.name for path in Path().glob("*.json")] == ["warpimpact.fit.schema.json"]
+
+
+def test_a_new_firing_test_can_be_read_with_its_target() -> None:
+    assert main(["new", "v50_test"]) == 0
+    assert read_test("v50_test.toml").target.campaign == Path("plate_and_base.toml").absolute()
+    assert [path.name for path in Path().glob("*.json")] == ["warpimpact.test.schema.json"]
 
 
 def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,7 +121,6 @@ def test_bash_completes_commands_and_options(capsys: pytest.CaptureFixture[str])
         ([], "64 of 64 hits", "warpimpact.solver"),
         (["-q"], "", "of 64 hits"),
         (["-v"], "warpimpact.solver.pilot: pilot at level", "warpimpact.solver.device"),
-        (["-vv"], "warpimpact.solver.device: march on cpu: loaded in", "nothing of the kind"),
     ],
 )
 def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -118,6 +128,13 @@ def test_more_or_less_is_told(option: list[str], told: str, untold: str, capsys:
     shown = capsys.readouterr().err
     assert told in shown
     assert untold not in shown
+
+
+def test_what_is_loaded_is_told_at_the_highest_verbosity() -> None:
+    command = [sys.executable, "-c", "from warpimpact.cli import command; command()"]
+    arguments = ["run", str(CAMPAIGNS / "slotted_plate.toml"), "--count", "4", "--device", "cpu", "-vv"]
+    done = subprocess.run(command + arguments, capture_output=True, text=True, check=True)
+    assert "warpimpact.solver.device: march on cpu: loaded in" in done.stderr
 
 
 INTERRUPTED = """
@@ -144,3 +161,10 @@ def test_a_signal_while_the_command_is_loaded_ends_it_in_a_sentence(name: str) -
 def test_the_command_listens_before_it_loads() -> None:
     project = tomllib.loads((CAMPAIGNS.parent / "pyproject.toml").read_text(encoding="utf-8"))
     assert project["project"]["scripts"]["warpimpact"] == "warpimpact.__main__:command"
+
+
+@pytest.mark.parametrize(("text", "shown"), [("30 deg", "30"), ("0.7853981633974483 rad", "45")])
+def test_an_angle_of_an_option_is_that_angle(text: str, shown: str, make_plate_result) -> None:
+    angle = read_option("--angle", Angle, text, ValueError)
+    labels = [one.label for one in effectiveness(make_plate_result(np.full(64, 700.0)), angle=angle)]
+    assert f"P(inclined > {shown}° at 130 mm, either end first, or stopped)" in labels

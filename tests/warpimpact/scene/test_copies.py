@@ -100,7 +100,7 @@ def thinner(campaign: Campaign) -> Campaign:
         (CORE, {"density": 7850.0}, "got both of mass and density"),
         (ROUND, {"diameter": 9e-3}, "overlap or touch"),
         (Impact(velocity=825.0), {"velocity": "825 m"}, "not a speed"),
-        (Hits(count=4), {"sampling": "list"}, 'got sampling = "list" without file'),
+        (Hits(count=4), {"sampling": "list"}, 'sampling = "list" needs file'),
     ],
 )
 def test_a_copy_that_cannot_be_is_refused(value: Model, update: dict[str, Any], complaint: str) -> None:

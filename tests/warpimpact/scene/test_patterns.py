@@ -43,6 +43,17 @@ LATTICES = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.parametrize(("staggered", "neighbours"), [(False, 4), (True, 6)])
+def test_a_pitch_is_the_distance_of_the_nearest_neighbours(staggered: bool, neighbours: int) -> None:
+    pattern = CirclePattern(diameter="6 mm", spacing="9 mm", staggered=staggered)
+    assert pattern.ligament() == pytest.approx(3 * MM, rel=1e-12)
+    around = 9 * MM * np.exp(1j * np.radians(np.arange(30 if staggered else 0, 360, 360 / neighbours)))
+    assert pattern.is_hole(around.real, around.imag).all()
+    np.testing.assert_allclose(pattern.open_area, math.pi * 9 / (81 * (math.sqrt(0.75) if staggered else 1.0)))
+    with pytest.raises(ValidationError, match="which is not a length"):
+        CirclePattern(diameter="6 mm", spacing="9 kg")
+
+
 def test_slots_are_stadiums_on_a_staggered_lattice() -> None:
     points = {
         (0, 0): True,

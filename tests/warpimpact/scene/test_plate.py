@@ -25,6 +25,18 @@ def test_holes_take_their_share_of_the_weight() -> None:
     assert plate.areal_density == pytest.approx(31.4 * (1 - math.pi / 16), rel=1e-14)
 
 
+@pytest.mark.parametrize("margin", [{}, {"size": ["80 mm", "90 mm"], "margin": "3 mm"}])
+def test_a_plate_may_be_given_by_its_weight(margin: dict) -> None:
+    holes = CirclePattern(diameter="5 mm", spacing="10 mm")
+    plate = Plate(areal_density="25 kg/m^2", resistance=1e9, pattern=holes, **margin)
+    assert plate.areal_density == pytest.approx(25.0, rel=1e-14)
+    assert plate == Plate(thickness=plate.thickness, resistance=1e9, pattern=holes, **margin)
+    assert Plate.model_validate_json(plate.model_dump_json()) == plate
+    for given, complaint in (({"areal_density": 0}, "greater than 0"), (STEEL, "thickness cannot be combined with")):
+        with pytest.raises(ValidationError, match=complaint):
+            Plate(**{"areal_density": 25, "resistance": 1e9, **given})
+
+
 def test_a_scene_is_immutable() -> None:
     with pytest.raises(ValidationError, match="frozen"):
         Plate(**STEEL).thickness = 1.0

@@ -1,5 +1,6 @@
 """Limits of a campaign: the command, its file, its figure, resuming it, and what it refuses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
+from warpimpact.runs.task import Task
 from warpimpact.runs.team import local_team
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap, quantiles, warning_of
 from warpimpact.studies.limit_text import limits_text
 
@@ -223,3 +226,45 @@ def test_bad_tolerances(
     out = ["-o", str(tmp_path / "limit.nc"), *arguments]
     assert main(["limit", str(CAMPAIGNS / "limit_velocity.toml"), *out]) == 2
     assert sentence in capsys.readouterr().err
+
+
+PUBLISHED = """[[published]]
+velocity = "{} m/s"
+standard_deviation = "9 m/s"
+obliquity = "{} deg"
+label = "shots"
+source = "somebody 2020"
+"""
+
+
+def test_published_limits_stand_beside_the_computed_ones(result: xarray.Dataset) -> None:
+    told = result.assign_attrs(campaign=TEXT + PUBLISHED.format(300, 0) + PUBLISHED.format(700, 45))
+    median = quantiles(result)["V50"].value
+    lines = limits_text(told).splitlines()
+    at = next(place for place, line in enumerate(lines) if line.split()[:1] == ["published"])
+    assert lines[at + 1].split() == ["300", "m/s", "0°", f"{median:.4g}", f"{100 * (median / 300 - 1):+.1f}", "%", *OF]
+    assert lines[at + 2].split() == ["700", "m/s", "45°", "-", "-", *OF]
+    assert lines[at + 3] == "[1] somebody 2020"
+    assert "published" not in limits_text(result)
+    labels = limit_figure(told).axes[1].get_legend_handles_labels()[1]
+    assert "published: shots" in labels
+    places = result.assign(hit_y=0 * result["hit_y"], hit_z=0 * result["hit_z"], obliquity=0 * result["obliquity"])
+    places["obliquity"][-1] = 30.0
+    oblique = limit_figure(places.assign_attrs(told.attrs)).axes[0]
+    assert "published: shots" in oblique.get_legend_handles_labels()[1]
+    with pytest.raises(CampaignError, match=r"published\[0\].source: is missing"):
+        campaign(TEXT + '[[published]]\nvelocity = "300 m/s"\n')
+    assert campaign(TEXT + PUBLISHED.format(300, 20)).published[0].obliquity == pytest.approx(np.radians(20))
+
+
+OF = ["shots", "[1]"]
+
+
+def test_searches_that_begin_at_neighbours_take_fewer_runs(result: xarray.Dataset) -> None:
+    of = campaign()
+    near = replace(LimitMap.of(of), near=True)
+    task = Task(of.sampler().shots(0, 64), None, near.found_in(result))
+    table = near.compute(of, task, Worker("cpu"))
+    assert table["limit_runs"].values.mean() < 0.9 * float(result["limit_runs"].mean())
+    assert np.abs(table["limit_velocity"].values - result["limit_velocity"].values).max() <= 1.0
+    assert near.content != LimitMap.of(of).content

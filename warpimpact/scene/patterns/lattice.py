@@ -4,21 +4,24 @@ import math
 from abc import abstractmethod
 from copy import copy
 from functools import cached_property
+from numbers import Real
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array
-from ..units import Angle, Length, PositiveLength
+from ..units import Angle, Length, PositiveLength, quantity
 from .pattern import BoolArray, Pattern, Range, half_sides
 from .roundings import area, distance, geometries, neighbours, outline, placed
 
 _MOST_HOLES = 20_000
 _SAME = 1e-9
 """Two lengths are equal if they differ by less than this share of the period."""
+
+_PAIR = tuple[PositiveLength, PositiveLength]
 
 
 class Place(NamedTuple):
@@ -37,19 +40,28 @@ class LatticePattern(Pattern):
     the radius of the corners.
 
     Attributes:
-        spacing: extent (a, b) of the cell along y and z [m].
         staggered: shifts every odd row of cells along y by b/2 along z.
+        spacing: extent (a, b) of the cell along y and z, or one length, the pitch, which is the distance of a hole from
+            its nearest neighbours [m]. The lattice of a pitch is square; staggered it is hexagonal, with rows along z.
         holes: places of the holes in a cell, each with an optional rotation in addition to `rotation`; by default one
             hole on the origin.
         rotation: rotation of every hole from +y towards +z, given in degrees or with its unit [rad].
     """
 
-    spacing: tuple[PositiveLength, PositiveLength]
     staggered: Annotated[bool, Field(strict=True)] = False
+    spacing: _PAIR
     holes: Annotated[tuple[Place, ...], Field(fail_fast=True, min_length=1, max_length=_MOST_HOLES)] | None = None
     rotation: Angle = 0.0
     _plate: tuple[tuple[float, float], float] | None = PrivateAttr(None)
     """Size and margin of the plate that bounds the pattern; None if it is unbounded."""
+
+    @field_validator("spacing", mode="before", json_schema_input_type=_PAIR | PositiveLength)
+    @classmethod
+    def _of_a_pitch(cls, value: Any, info: ValidationInfo) -> Any:
+        if not isinstance(value, str | Real) or isinstance(value, bool):
+            return value
+        pitch = quantity(PositiveLength)(value)
+        return (pitch * math.sqrt(0.75) if info.data.get("staggered") else pitch, pitch)
 
     @property
     @abstractmethod
