@@ -71,16 +71,17 @@ def made(rows: Rows, scales: dict[str, float], law: Law, seed: int) -> tuple[Row
 def test_known_sizes_are_recovered_and_intervals_hold(rows: Rows) -> None:
     law = Law("known friction", free=(), exponent=True)
     scales = {"material": 0.1, "source": 0.06, "thickness": 0.05, "test": 0.04}
-    drawn, truth = made(rows[::3], scales, law, seed=1)
-    own = fit(drawn, law)
-    assert own.scales["test"] == pytest.approx(0.04, rel=0.5)
-    assert own.scales["material"] == pytest.approx(0.1, rel=0.6)
-    inside = []
-    for split in left_out(drawn):
-        table = predictions(drawn, split, Fit(law, truth, 0.0))
-        table = table[table["method"] == law.name]
-        inside.append(table["published"].between(table["low"], table["high"]).mean())
-    assert np.mean(inside) == pytest.approx(0.92, abs=0.05)  # tails of Student's t widen what is normal here
+    inside = list[float]()
+    for seed in (1, 2, 3):
+        drawn, truth = made(rows[::3], scales, law, seed)
+        own = fit(drawn, law)
+        assert own.scales["test"] == pytest.approx(0.04, rel=0.4)
+        assert own.scales["material"] == pytest.approx(0.1, rel=0.4)
+        for split in left_out(drawn):
+            table = predictions(drawn, split, Fit(law, truth, 0.0))
+            table = table[table["method"] == law.name]
+            inside.append(table["published"].between(table["low"], table["high"]).mean())
+    assert np.mean(inside) == pytest.approx(0.94, abs=0.04)  # tails of Student's t widen what is normal here
 
 
 def test_rows_left_out_together_are_predicted_as_from_a_fit_without_them(rows: Rows, found: Fit) -> None:

@@ -133,8 +133,7 @@ def label_of(measure: Measure) -> str:
     """A measure for people, with its unit."""
     if measure.is_binary:
         return str(measure.text)
-    at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-    return f"{measure.variable.replace('_', ' ')}{at} [{measure.display.shown}]"
+    return f"{measure.variable.replace('_', ' ')}{measure.place} [{measure.display.shown}]"
 
 
 PASSED_ALONE = "velocity and tilt are those of the cores that passed"

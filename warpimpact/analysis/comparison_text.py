@@ -92,7 +92,11 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        return f"<pre>{escape(comparison_text(self))}</pre>"
+        best = "".join(
+            f'<tr><th style="text-align: left">{escape(label)}</th><td style="text-align: left">{escape(who)}</td></tr>'
+            for label, who in best_rows(self)
+        )
+        return f"<table><tr><th>best at</th><th>plate</th></tr>{best}</table><pre>{escape(comparison_text(self))}</pre>"
 
     def ranks(self, measure: str) -> dict[str, int]:
         """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;

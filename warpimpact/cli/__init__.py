@@ -18,6 +18,7 @@ from .accuracy import add_study, add_validate
 from .catalogue import add_catalogue
 from .compare import add_compare
 from .export import add_export, add_report
+from .firing import add_test
 from .identify import add_identify
 from .limit import add_limit
 from .mistakes import bug_report, implausible_told, message_of
@@ -46,6 +47,7 @@ _COMMANDS = (
     add_study,
     add_validate,
     add_identify,
+    add_test,
     add_schema,
     add_completion,
 )

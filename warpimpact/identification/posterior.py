@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -202,7 +201,7 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
     }
     return {
         attr.TITLE: fit.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact identify",
+        attr.HISTORY: attr.history_line("identify"),
         posterior_file.FIT: fit.text,
         posterior_file.MATERIAL: _material(fit, sampled),
         **made,

@@ -9,6 +9,7 @@ import matplotlib as mpl
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
+from warpimpact.plotting.limit import limit_figure
 from warpimpact.plotting.maps import (
     layers_figure,
     overview,
@@ -34,6 +35,7 @@ __all__ = [
     "flight",
     "largest_load",
     "layers_figure",
+    "limit_figure",
     "marginals",
     "overview",
     "passage",

@@ -90,8 +90,7 @@ def _measures(sweep: xarray.Dataset) -> list[Measure]:
 def _label(measure: Measure) -> str:
     if measure.kind == "share":
         return f"share {words(measure.variable)}"
-    at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-    return f"mean {words(measure.variable)}{at} [{measure.display.shown}]\nof the cores that passed"
+    return f"mean {words(measure.variable)}{measure.place} [{measure.display.shown}]\nof the cores that passed"
 
 
 def _axis_label(values: xarray.DataArray) -> str:

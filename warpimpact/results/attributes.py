@@ -3,6 +3,7 @@
 import platform
 import subprocess
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -152,6 +153,11 @@ def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
         if name in ATTRIBUTES and (units := ATTRIBUTES[name].units):
             described[f"{name}_units"] = units
     return described
+
+
+def history_line(command: str) -> str:
+    """A line of the history: the time, and the command that has made a result."""
+    return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact {command}"
 
 
 def versions() -> dict[str, str]:

@@ -108,6 +108,11 @@ class Measure:
         return cls(text, kind, name, standoff)
 
     @property
+    def place(self) -> str:
+        """Where it is measured, such as " at 130 mm"; empty where it has no stand-off."""
+        return f" at {self.standoff * 1e3:g} mm" if self.standoff else ""
+
+    @property
     def least(self) -> float:
         """What no value is below."""
         return -math.inf if self.variable in _SIGNED else 0.0

@@ -169,7 +169,8 @@ def _outcomes(
     places, parts, building, done = list[NDArray[np.int64]](), list[Outcomes](), 0.0, 0
     begin = time.perf_counter()
     for which, own in scenes_of(drawn, scene, shots):
-        memory = Memory(prepare(own, shots[which], numerics), find_device(worker.device))
+        prepared = prepare(own, shots[which], numerics)
+        memory = Memory(prepared, find_device(worker.device))
         building += memory.build()
         parts.append(marched(memory, worker, part_of(progress, done, len(shots))))
         places.append(which)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +42,7 @@ def described(
     """
     told = _campaign(campaign)
     told |= _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
+    told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
     return to_table(
         campaign.scene,
         shots,
@@ -99,7 +99,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     ligament = campaign.plate.ligament
     told = {
         attr.TITLE: campaign.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        attr.HISTORY: attr.history_line("run"),
         attr.CAMPAIGN: campaign.text,
         attr.SAMPLING: campaign.hits.sampling,
         attr.SEED: campaign.hits.seed,
@@ -117,7 +117,6 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     told |= {attr.LAYERS: _layers(campaign)} if campaign.layer else {}
     told |= {attr.LIGAMENT: ligament} if math.isfinite(ligament) else {}
     told |= {} if campaign.drawn is None else {attr.DISCREPANCY: json.dumps(campaign.drawn.discrepancy)}
-    told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
     return told | ({} if campaign.burst is None else _burst(campaign.burst))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +80,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
             f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
         )
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
-        attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
+        attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{attr.history_line('replay')}",
         attr.HIT: hit,
         attr.AGREEMENT: _agreement(end, stored),
         **attr.versions(),

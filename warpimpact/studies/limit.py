@@ -114,6 +114,7 @@ class LimitMap:
             **computed_by(campaign, worker.device, len(shots), elapsed),
             **found_attributes(campaign, found),
             **({attr.LIMIT_ERROR: found.error} if isinstance(found, LimitErrors) else {}),
+            attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
             attr.LIMIT: sought.quantity,
             attr.LIMIT_LAYER: sought.layer,
             **self.weights(campaign.target),
@@ -127,10 +128,7 @@ class LimitMap:
         put = self._put(campaign, task.shots, searched, images)
         found_limits = {name: getattr(searched, name.field) for name in v.LIMITS[sought.quantity]}
         outcomes = searched.outcomes.assign(**found_limits)
-        table = described(campaign, put, outcomes, short_steps(numerics), attributes, solid)
-        begun, *_ = table.attrs[attr.HISTORY].split()
-        table.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {sought.quantity}"
-        return table
+        return described(campaign, put, outcomes, short_steps(numerics), attributes, solid)
 
     def _at_solid(
         self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker

@@ -1,6 +1,7 @@
 """Hostile input: one sentence and exit code 2, whatever is in a file; no traceback, no hang, nothing unbounded."""
 
 import io
+import math
 import os
 import random
 import re
@@ -278,6 +279,13 @@ def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) ->
     [
         lambda d: d.assign_attrs(core="[1"),
         lambda d: d.assign_attrs(plate_period="wide"),
+        lambda d: d.assign_attrs(plate_period=[1.0, math.nan]),
+        lambda d: d.assign_attrs(core='{"a": 1}'),
+        lambda d: d.assign_attrs(sweep="{"),
+        lambda d: d.assign_attrs(limit="{"),
+        lambda d: d.assign_attrs(accuracy="{}"),
+        lambda d: d.assign_attrs(resolution='{"fidelity": "draft"}'),
+        lambda d: d.assign_attrs(material='{"density": 1.0}'),
         lambda d: d.assign_attrs(seed="x"),
         lambda d: d.assign_attrs(sampling="sobol"),
         lambda d: d.assign_attrs(title=7),

@@ -97,6 +97,7 @@ def test_a_resumed_fit_equals_an_undisturbed_one(
 
 def test_a_batch_with_a_flipped_bit_is_whole_or_none(tmp_path: Path) -> None:
     store, arrays = Store(tmp_path / "a.nc", {"fit": "a"}), {"points": np.arange(3.0), "misfit_0": np.ones(2)}
+    store.folder.mkdir()
     store.save(0, arrays)
     path = store.folder / "batch_000000.npz"
     whole = path.read_bytes()

@@ -272,8 +272,10 @@ def test_uniform_results_draw_without_complaint(make_result, status):
     dataset["tilt"][:] = np.nan
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        picture = Picture(overview(dataset))
-    assert np.allclose(picture.colour(5.0, 3.0), GREY, atol=0.01) == (status != Status.PERFORATED)
+        figure = overview(dataset)
+        figure.savefig("/dev/null", format="png")
+    shown = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
+    assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["status"])
 
 
 def test_no_colour_bar_without_values(make_result):
@@ -314,6 +316,19 @@ def test_save_maps_writes_one_png_per_map(covered, tmp_path):
         with Image.open(path) as image:
             assert image.format == "PNG"
             assert np.asarray(image.convert("L")).std() > 10.0
+
+
+def test_maps_without_values_are_left_out(make_result, tmp_path):
+    paths = save_maps(make_result([Status.ARRESTED] * 100), tmp_path, "plate")
+    assert [path.name for path in paths] == ["plate_overview.png", "plate_status.png"]
+
+
+def test_a_long_note_keeps_to_the_figure(perforated):
+    figure = variable_map(perforated.assign_attrs(promise_kept=0), "deflection")
+    figure.canvas.draw()
+    box = figure._supxlabel.get_window_extent()
+    assert (box.x0 > 0.0, box.x1 < figure.bbox.width) == (True, True)
+    assert "\n" in figure.get_supxlabel()
 
 
 def test_maps_beside_each_other_have_one_scale_of_colour_and_of_length(make_result, tmp_path):
