@@ -84,7 +84,7 @@ def add_computing(parser: argparse.ArgumentParser) -> None:
 
 
 def read_option(option: str, kind: Any, text: str, mistake: type[ValueError]) -> float:
-    """The number, in SI, of an option with a unit, whose type is one of scene/units.py.
+    """The number, in SI or `Radians`, of an option with a unit, whose type is one of scene/units.py.
 
     Raises:
         mistake: names the option and what is allowed.
@@ -92,7 +92,7 @@ def read_option(option: str, kind: Any, text: str, mistake: type[ValueError]) ->
     from warpimpact.scene.units import quantity
 
     try:
-        return float(quantity(kind)(text))
+        return quantity(kind)(text)
     except ValueError as error:
         raise mistake(f"{option}: {error}") from None
 

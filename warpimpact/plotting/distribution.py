@@ -9,6 +9,8 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.effectiveness import ANGLE
+from warpimpact.analysis.effects import effects
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
@@ -26,6 +28,7 @@ from warpimpact.plotting.cell import (
     tree_of,
 )
 from warpimpact.plotting.heading import heading
+from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
@@ -40,7 +43,6 @@ if TYPE_CHECKING:
 
 _MM = 1e3
 _LONGER_SIDE = 4.2  # of a map on paper [inch]
-_BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
 _PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
 _FINE = 100  # pixels along the longer side of a smoothed map
@@ -72,7 +74,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
         above.set_ylabel(column.label)
         beside.set_xlabel(column.label)
         figure.colorbar(artist, cax=bar).set_ticks([])
-        histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=_BLUE, alpha=0.5)
+        histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=BLUE, alpha=0.5)
         histogram.axhline(np.median(values), color="black", lw=1.2)
         histogram.set(ylim=artist.get_clim() if np.ptp(values) else None, xlabel="hits", ylabel=column.label)
         histogram.yaxis.tick_right()
@@ -91,7 +93,7 @@ def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure
     tilt, velocity = draw_dispersion(centre, dataset, standoff)
     for axes, values, orientation in ((above, tilt, "vertical"), (beside, velocity, "horizontal")):
         if len(values):
-            axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
+            axes.hist(values, bins=40, orientation=orientation, color=BLUE, alpha=0.5)
         else:
             axes.set(xticks=[], yticks=[])
         axes.label_outer()
@@ -110,10 +112,10 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
         density = axes.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
         axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per hexagon", format="{x:g}")
     else:
-        axes.scatter(x, y, s=7, color=_BLUE, alpha=0.4, linewidths=0)
+        axes.scatter(x, y, s=7, color=BLUE, alpha=0.4, linewidths=0)
     if len(x):
-        axes.axvline(np.median(x), color=_VERMILION, lw=1.0, ls="--", label="medians")
-        axes.axhline(np.median(y), color=_VERMILION, lw=1.0, ls="--")
+        axes.axvline(np.median(x), color=VERMILION, lw=1.0, ls="--", label="medians")
+        axes.axhline(np.median(y), color=VERMILION, lw=1.0, ls="--")
         axes.legend(frameon=False, loc="best")
     else:
         axes.text(0.5, 0.5, "no core behind the " + struck(dataset), transform=axes.transAxes, ha="center", va="center")
@@ -194,23 +196,32 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
 
     Args:
         dataset: a result whose hits cover the cell.
-        quantity: such as ``P(bending_stress > 1.5 GPa)`` or ``P(perforated)``, as in a campaign's ``stop.quantity``.
+        quantity: such as ``P(bending_stress > 1.5 GPa)`` or ``P(perforated)``, as in a campaign's ``stop.quantity``; or
+            a share among the measures of protection, such as ``P(base perforated)``.
 
     Raises:
         ValueError: the quantity is no probability, the result does not have it, or the hits do not cover the cell.
     """
+    values, nearest = _of_every_hit(dataset, quantity), _covered(dataset)
+    if not shots_scatter(dataset):
+        note = "each hit has one outcome, 1 or 0; nearest hit"
+        return _local_maps(dataset, values[nearest][None], [quantity], quantity, note)
+    images = _local(dataset, values, nearest, lambda near: share_of(near[1]))
+    labels = quantity, "half width of its 95 % interval"
+    return _local_maps(dataset, images, labels, quantity, "share of the {} nearest hits, Wilson's interval")
+
+
+def _of_every_hit(dataset: xarray.Dataset, quantity: str) -> Array:
+    """1 or 0 of every hit, shape [hits]; NaN where it does not count."""
+    shares = {one.label: one for one in effects(dataset, angle=ANGLE, standoff=None) if one.kind == "share"}
+    if quantity in shares:
+        return shares[quantity].over(dataset)
     measure = Measure.parse(quantity)
     if not measure.is_binary:
         raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
     if measure.kind == "probability" and measure.variable not in dataset:
         raise ValueError(f'got "{quantity}", but the result has no {measure.variable}')
-    values, nearest = measure.values(dataset), _covered(dataset)
-    if not shots_scatter(dataset):
-        note = "each hit has one outcome, 1 or 0; nearest hit"
-        return _local_maps(dataset, values[nearest][None], [measure.text], measure.text, note)
-    images = _local(dataset, values, nearest, lambda near: share_of(near[1]))
-    labels = f"{measure.text}", "half width of its 95 % interval"
-    return _local_maps(dataset, images, labels, measure.text, "share of the {} nearest hits, Wilson's interval")
+    return measure.values(dataset)
 
 
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:
@@ -279,7 +290,7 @@ def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> 
 
     fill = axes.fill_betweenx if upright else axes.fill_between
     for label, (low, high, alpha) in _BANDS.items():
-        fill(middles, quantiles(low), quantiles(high), color=_BLUE, alpha=alpha, lw=0, label=label)
+        fill(middles, quantiles(low), quantiles(high), color=BLUE, alpha=alpha, lw=0, label=label)
     median = (quantiles(0.5), middles) if upright else (middles, quantiles(0.5))
     axes.plot(*median, color="black", lw=1.2, label="median")
     axes.tick_params(labelleft=not upright, labelbottom=upright)

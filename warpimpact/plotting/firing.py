@@ -12,13 +12,13 @@ from matplotlib.figure import Figure
 
 from warpimpact.firing.text import verdict
 from warpimpact.plotting.heading import add_heading
+from warpimpact.plotting.style import BLUE, GREEN, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_BLUE, _VERMILION, _GREEN = "#0072B2", "#D55E00", "#009E73"  # colours of Okabe and Ito
 _MM = 1e3
 _Settings = Mapping[str, Any]
 
@@ -62,15 +62,15 @@ def _draw_response(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
     velocity = dataset[f.VELOCITY].values
     low, high = dataset[f.SHARE_LOW].values, dataset[f.SHARE_HIGH].values
     if np.isfinite(low).any():
-        axes.fill_between(velocity, low, high, color=_BLUE, alpha=0.2, linewidth=0, label="95 % interval")
-    axes.plot(velocity, dataset[f.SHARE].values, color=_BLUE, linewidth=1.5)
+        axes.fill_between(velocity, low, high, color=BLUE, alpha=0.2, linewidth=0, label="95 % interval")
+    axes.plot(velocity, dataset[f.SHARE].values, color=BLUE, linewidth=1.5)
     for row, share in enumerate(dataset[f.QUANTILE].values):
         value = float(dataset[f.QUANTILE_VELOCITY][row])
         if np.isfinite(value):
             ends = np.array([float(dataset[name][row]) for name in (f.QUANTILE_LOW, f.QUANTILE_HIGH)])
             if np.isfinite(ends).all():
-                axes.plot(ends, [share, share], color=_VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
-            axes.plot(value, share, "o", color=_VERMILION, markersize=5)
+                axes.plot(ends, [share, share], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
+            axes.plot(value, share, "o", color=VERMILION, markersize=5)
             name = f"V{100 * share:02.0f} = {value:.4g} m/s"
             axes.annotate(name, (value, share), xytext=(8, 6 - 11 * row), textcoords="offset points", fontsize="small")
     _furnish(
@@ -87,11 +87,11 @@ def _draw_map(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
     artist = axes.scatter(y, z, c=shown, s=size, cmap="viridis", plotnonfinite=True)
     axes.figure.colorbar(artist, ax=axes, label="limit velocity [m/s]")
     order = np.argsort(first)
-    for share, face in ((0.05, "none"), (0.01, _VERMILION)):
+    for share, face in ((0.05, "none"), (0.01, VERMILION)):
         weakest = order[: max(1, round(share * len(first)))]
         label = f"weakest {100 * share:g} % of the hits"
         axes.scatter(
-            y[weakest], z[weakest], s=2.2 * size, edgecolors=_VERMILION, linewidths=1.2, label=label, facecolors=face
+            y[weakest], z[weakest], s=2.2 * size, edgecolors=VERMILION, linewidths=1.2, label=label, facecolors=face
         )
     axes.plot(_MM * dataset[f.OUTLINE_Y].values, _MM * dataset[f.OUTLINE_Z].values, color="black", linewidth=1.0)
     half = 0.5 * _MM * np.asarray(dataset.attrs[f.CELL])
@@ -112,10 +112,10 @@ def _draw_reported(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
         axes.text(0.5, 0.5, "no test reports a V50", ha="center", transform=axes.transAxes)
         return
     ends = np.quantile(known, [0.005, 0.995])
-    axes.hist(np.clip(known, *ends), bins=40, color=_BLUE, alpha=0.55, label="reported V50")
+    axes.hist(np.clip(known, *ends), bins=40, color=BLUE, alpha=0.55, label="reported V50")
     axes.axvline(true, color="black", linewidth=1.5, label=f"true V50, {true:.4g} m/s")
     if required:
-        axes.axvline(required["v50"], color=_VERMILION, linestyle="--", linewidth=1.5, label="required V50")
+        axes.axvline(required["v50"], color=VERMILION, linestyle="--", linewidth=1.5, label="required V50")
     lines = [
         f"{found.bias:+.2g} m/s off, standard deviation {found.deviation:.3g} m/s",
         f"reported spread {found.spread:.3g} m/s (median), true {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s",
@@ -136,8 +136,8 @@ def _draw_reported(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
 def _draw_sizes(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> None:
     precision, shots = settings["precision"], dataset[f.SIZE_SHOTS].values
     within, share = float(precision["within"]), float(precision["share"])
-    axes.plot(shots, dataset[f.SIZE_WITHIN].values, "o-", color=_BLUE, label=f"within ± {within:g} m/s")
-    axes.axhline(share, color=_VERMILION, linestyle="--", linewidth=1.2, label=f"asked: {100 * share:g} % of the tests")
+    axes.plot(shots, dataset[f.SIZE_WITHIN].values, "o-", color=BLUE, label=f"within ± {within:g} m/s")
+    axes.axhline(share, color=VERMILION, linestyle="--", linewidth=1.2, label=f"asked: {100 * share:g} % of the tests")
     labels = {"xlabel": "shots of a test", "ylabel": "share of the tests", "ylim": (0.0, 1.03)}
     _furnish(axes, title="how many shots a precision takes", **labels)
 
@@ -147,20 +147,59 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> Non
     axes.plot(
         velocity, 1.0 - dataset[f.PROOF_PERFORATION].values, color="0.6", linewidth=1.2, label="P(stop) of one shot"
     )
-    axes.plot(velocity, dataset[f.PASS].values, color=_BLUE, label="plan passes, shots anywhere")
+    axes.plot(velocity, dataset[f.PASS].values, color=BLUE, label="plan passes, shots anywhere")
     axes.plot(
         velocity,
         dataset[f.PASS_SAME_PLACE].values,
-        color=_GREEN,
+        color=GREEN,
         linestyle="-.",
         label="plan passes, all shots at one place",
     )
     axes.axvline(
         float(dataset.attrs[f.PROOF_VELOCITY]),
-        color=_VERMILION,
+        color=VERMILION,
         linestyle="--",
         linewidth=1.2,
         label="velocity of the proof",
     )
     title = f"proof: {shots} shots, at most {int(dataset.attrs[f.PROOF_ALLOWED])} perforate"
     _furnish(axes, title=title, xlabel="impact velocity [m/s]", ylabel="probability", ylim=(-0.03, 1.03))
+
+
+def directions_figure(dataset: xarray.Dataset) -> Figure:
+    """P(perforation) over the directions of fire, as a polar map: the angle from the normal of the plate outwards, and
+    the direction to the side and upwards about it.
+
+    Args:
+        dataset: the result of `warpimpact test` with directions.
+    """
+    figure = Figure(figsize=(8.2, 7.6), layout="constrained")
+    axes: Any = figure.add_subplot(projection="polar")
+    azimuth, elevation = np.meshgrid(
+        np.radians(dataset[f.AZIMUTH].values), np.radians(dataset[f.ELEVATION].values), indexing="ij"
+    )
+    around = np.arctan2(np.sin(elevation), np.cos(elevation) * np.sin(azimuth))
+    outward = dataset[f.DIRECTION_OBLIQUITY].values
+    share, hits = dataset[f.DIRECTION_SHARE].values, dataset[f.DIRECTION_HITS].values
+    sizes = 90.0 + 160.0 * (np.log2(hits) - np.log2(hits.min())) / max(1.0, float(np.log2(hits.max() / hits.min())))
+    artist = axes.scatter(around, outward, c=share, s=sizes, cmap="RdYlBu_r", vmin=0.0, vmax=1.0, edgecolors="black")
+    for angle, radius, value in zip(around.ravel(), outward.ravel(), share.ravel(), strict=True):
+        axes.annotate(
+            f"{value:.2f}",
+            (angle, radius),
+            xytext=(0, -15),
+            textcoords="offset points",
+            ha="center",
+            fontsize="x-small",
+        )
+    axes.set_rlim(0.0, 1.12 * float(outward.max()) if outward.max() > 0.0 else 1.0)
+    axes.set_rlabel_position(-67.5)
+    axes.yaxis.set_major_formatter("{x:g}°")
+    axes.set_xticks(np.radians([0, 90, 180, 270]), ["right", "from above", "left", "from below"])
+    figure.colorbar(artist, ax=axes, label="probability of perforation", shrink=0.8, pad=0.1)
+    low, high = dataset.attrs[f.MEAN_INTERVAL]
+    weight = json.loads(dataset.attrs[f.SETTINGS])["directions"]["weight"].replace("_", " ")
+    mean = f"mean by {weight}: {float(dataset.attrs[f.MEAN]):.3g} ({low:.3g} to {high:.3g}); larger dots: more hits"
+    add_heading(figure, f"{dataset.attrs[attr.TITLE]}\n{mean}")
+    figure.supxlabel(dataset.attrs[f.DISCLAIMER], fontsize="medium")
+    return figure

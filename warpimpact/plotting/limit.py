@@ -15,6 +15,7 @@ from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
 from warpimpact.plotting.heading import heading
+from warpimpact.plotting.style import BLUE, GREY, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
@@ -25,7 +26,6 @@ from warpimpact.studies.published import published_beside
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
 _OTHERS = ("#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
@@ -73,7 +73,7 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
     value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
     yawed = np.ptp(obliquity) == 0.0
     along = np.degrees(inclination(dataset)) if yawed else obliquity
-    axes.plot(along, factor * value, "o", color=_BLUE, label=f"limit {quantity}")
+    axes.plot(along, factor * value, "o", color=BLUE, label=f"limit {quantity}")
     first = int(np.argmin(obliquity))
     if np.ptp(obliquity) > 0.0 and np.isfinite(value[first]):
         angles = np.linspace(obliquity.min(), obliquity.max())
@@ -87,7 +87,7 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
     reference = solid_limits(dataset)
     if reference is not None:
         solid = np.broadcast_to(reference[v.LIMITS[quantity].value].values, value.shape)
-        axes.plot(along, factor * solid, "D", color="0.55", fillstyle="none", label=_solid_label(dataset, quantity))
+        axes.plot(along, factor * solid, "D", color=GREY, fillstyle="none", label=_solid_label(dataset, quantity))
     axes.set(xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
     axes.grid(color="0.9")
     axes.set_axisbelow(True)
@@ -148,21 +148,21 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
         margin = 0.05 * max(np.ptp(found[finite]), 0.02 * found[finite].max())
         ends = found[finite][0] - margin, found[finite][-1] + margin
         steps = [ends[0], *found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
-        axes.step(factor * np.array(steps[0]), steps[1], where="post", color=_BLUE, linewidth=1.5)
+        axes.step(factor * np.array(steps[0]), steps[1], where="post", color=BLUE, linewidth=1.5)
         axes.set_xlim(*(factor * np.array(ends)))
     for name, estimate in quantiles(dataset).items():
         level = QUANTILES[f"V{name[1:]}"]
         if np.isfinite(estimate.value):
             low, high = factor * np.array([estimate.low, estimate.high])
-            axes.plot([low, high], [level, level], color=_VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
-            axes.plot(factor * estimate.value, level, "o", color=_VERMILION, markersize=5)
+            axes.plot([low, high], [level, level], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
+            axes.plot(factor * estimate.value, level, "o", color=VERMILION, markersize=5)
             text = f" {name} = {factor * estimate.value:.4g} {unit}"
             axes.annotate(text, (factor * estimate.value, level), xytext=(8, -12), textcoords="offset points")
     reference = solid_limits(dataset)
     if reference is not None:
         mean = factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
-            axes.axvline(mean, color="0.55", linewidth=1.2, linestyle="--", label=_solid_label(dataset, quantity))
+            axes.axvline(mean, color=GREY, linewidth=1.2, linestyle="--", label=_solid_label(dataset, quantity))
             low, high = axes.get_xlim()
             margin = 0.03 * (high - low)
             axes.set_xlim(min(low, mean - margin), max(high, mean + margin))

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.reading import fit_from
 from warpimpact.identification.text import unit_of
+from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
 
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.6"
+_GREY = "0.6"
 _MM = 1e3
 _POINTS = 600
 _CELLS = 5.0
@@ -69,7 +70,7 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
             else:
                 some = slice(None, None, max(1, len(x) // _POINTS))
                 axes.scatter(prior[some], _values(tree, "prior", below)[0][some], s=2, color=_GREY, alpha=0.25, lw=0)
-                axes.scatter(x[some], y[some], s=4, color=_BLUE, alpha=0.45, lw=0)
+                axes.scatter(x[some], y[some], s=4, color=BLUE, alpha=0.45, lw=0)
                 axes.set_ylim(_limits(_values(tree, "prior", below)[0], y))
             axes.set_xlim(_limits(prior, x))
             axes.tick_params(labelsize="x-small", labelbottom=row == len(names) - 1, labelleft=column == 0 and row > 0)
@@ -93,7 +94,7 @@ def _limits(prior: Array, posterior: Array) -> tuple[float, float]:
 def _density(axes: Axes, prior: Array, posterior: Array) -> None:
     edges = np.linspace(*_limits(prior, posterior), 31).tolist()
     axes.hist(prior, bins=edges, density=True, color=_GREY, alpha=0.5)
-    axes.hist(posterior, bins=edges, density=True, color=_BLUE, alpha=0.6)
+    axes.hist(posterior, bins=edges, density=True, color=BLUE, alpha=0.6)
 
 
 def measured_figure(tree: xarray.DataTree) -> Figure:
@@ -110,7 +111,7 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
         rows = [place for place, unit in enumerate(units) if unit == kind]
         labels = [str(observed["observation"].values[place]) for place in rows]
         for line, place in enumerate(rows):
-            for offset, name, colour in ((-0.16, posterior_file.MEASURED, _GREY), (0.16, posterior_file.FITTED, _BLUE)):
+            for offset, name, colour in ((-0.16, posterior_file.MEASURED, _GREY), (0.16, posterior_file.FITTED, BLUE)):
                 values = computed[name].values[..., place].ravel()
                 values = values[np.isfinite(values)]
                 if len(values):
@@ -118,13 +119,13 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
                     axes.plot([low, high], [line + offset] * 2, color=colour, lw=1.5)
                     axes.plot([quarter, three], [line + offset] * 2, color=colour, lw=5, solid_capstyle="butt")
             value, std = (float(observed[name][place]) for name in (posterior_file.MEASURED, posterior_file.STD))
-            axes.errorbar(value, line, xerr=std, fmt="o", color=_VERMILION, capsize=3, ms=5, zorder=4)
+            axes.errorbar(value, line, xerr=std, fmt="o", color=VERMILION, capsize=3, ms=5, zorder=4)
         axes.set_yticks(range(len(rows)), labels)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlabel({"m s-1": "m/s", "degree": "degrees"}.get(kind, kind))
         axes.grid(axis="x", color="0.9")
         axes.set_axisbelow(True)
-    handles = [_line(_VERMILION, "measured, ±1 standard uncertainty", "o"), _line(_BLUE, "computed at its hit")]
+    handles = [_line(VERMILION, "measured, ±1 standard uncertainty", "o"), _line(BLUE, "computed at its hit")]
     handles.append(_line(_GREY, "another such shot, measured"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -160,9 +161,9 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
         axes.set_facecolor("0.85")
         for outline in scene.target.layers[0].pattern.outlines(*ranges):
             axes.fill(*(_MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
-        axes.scatter(y, z, s=5, color=_BLUE, alpha=0.35, lw=0, label="posterior")
+        axes.scatter(y, z, s=5, color=BLUE, alpha=0.35, lw=0, label="posterior")
         at = (_MM * float(best[name][place]) for name in posterior_file.HITS)
-        axes.plot(*at, "X", color=_VERMILION, ms=8, mec="white", label="smallest misfit")
+        axes.plot(*at, "X", color=VERMILION, ms=8, mec="white", label="smallest misfit")
         axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
         axes.set_title(str(posterior["shot"].values[place]))
     for axes in panels[len(fit.shots) :]:
