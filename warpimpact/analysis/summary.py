@@ -76,9 +76,10 @@ def promise_text(dataset: Result) -> str | None:
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
     asked = json.loads(told[attr.ACCURACY])
-    stated = accuracy_text(asked.get("residual_velocity", math.inf), asked.get("tilt", math.inf), asked["share"])
+    stated = accuracy_text(asked, layered=attr.STATUS_ERROR in told)
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
-    found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR, math.nan))}"
+    depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
+    found = f"estimated errors: {errors_text(velocity, tilt, depth, status)}"
     name = "the campaign" if given.get("accuracy") else given["fidelity"]
     if told[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {found}"
