@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from warpimpact import Campaign, replay, run
-from warpimpact.plotting import bursts_figure, dispersion, hit_maps, marginals, overview, trajectory, uncertainty
+from warpimpact.plotting import bursts_figure, dispersion, marginals, overview, trajectory, uncertainty, variable_maps
 from warpimpact.plotting.pressure import pressure
 
 HERE = Path(__file__).parent
@@ -26,7 +26,7 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
     results = {name: run(Campaign.from_toml(HERE / f"{file}.toml")) for name, file in names.items()}
     slotted = results["slotted plate"]
     yield "slotted_plate.png", overview(slotted), 1000
-    yield "gallery/tilt_of_three.png", hit_maps(results, "tilt"), 1400
+    yield "gallery/tilt_of_three.png", variable_maps(results, "tilt"), 1400
     yield "gallery/marginals.png", marginals(slotted, "residual_velocity"), 900
     yield "gallery/dispersion.png", dispersion(results["oblique, yawed shot"]), 700
     oblique = Campaign.from_toml(HERE / "oblique_shot.toml")

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .analysis.comparison import compare
     from .analysis.comparison_text import Comparison
     from .analysis.hit_map import hit_map
+    from .analysis.inspection import Inspection, inspect
     from .campaign.campaign import Campaign, Output
     from .campaign.plates import read_plates
     from .campaign.stop import Stop
@@ -71,6 +72,7 @@ __all__ = [
     "HexagonPattern",
     "Hits",
     "Impact",
+    "Inspection",
     "Interaction",
     "Layer",
     "MaskPattern",
@@ -98,6 +100,7 @@ __all__ = [
     "cluster_team",
     "compare",
     "hit_map",
+    "inspect",
     "limit_thickness",
     "limit_velocity",
     "make_shots",
@@ -129,6 +132,8 @@ _HOMES = {
     "read_plates": ".campaign.plates",
     "replay": ".runs.replay",
     "hit_map": ".analysis.hit_map",
+    "Inspection": ".analysis.inspection",
+    "inspect": ".analysis.inspection",
     "run": ".runs.run",
     "run_to_file": ".runs.run",
     "simulate": ".solver.simulate",

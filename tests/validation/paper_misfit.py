@@ -16,7 +16,7 @@ from scipy.special import ndtri
 from warpimpact.identification.evaluate import evaluate
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.reading import fit_from
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.scene.distributions import Continuous
 
 ROUNDS, SETS, HITS, KEPT = 10, 24, 2048, 6
@@ -54,8 +54,8 @@ def refined(fit: Fit, points: np.ndarray, misfit: np.ndarray, seed: int = 0) -> 
 
 
 def main() -> None:
-    tree = files.read(Path(sys.argv[1]))
-    fit = fit_from(str(tree.attrs[files.FIT]), sys.argv[1], Path("campaigns"))
+    tree = posterior_file.read(Path(sys.argv[1]))
+    fit = fit_from(str(tree.attrs[posterior_file.FIT]), sys.argv[1], Path("campaigns"))
     sets = tree["sets"].to_dataset()
     shares = []
     for one in fit.parameters:

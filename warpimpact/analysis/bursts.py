@@ -19,7 +19,7 @@ from warpimpact.results.dataset import shots_at_a_plate
 from warpimpact.results.measures import Array, Measure, dealing
 from warpimpact.statistics.clusters import cluster_estimate, cluster_numbers
 from warpimpact.statistics.comparisons import confidence_of_each
-from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -93,7 +93,7 @@ def bursts(dataset: Result) -> Bursts:
         ends = (distances.min(), distances.mean(), distances.max()) if len(distances) else (math.nan,) * 3
         chosen = {one: np.where(which, column, np.nan) for one, column in values.items()}
         alone = {one: np.where(order == 0, column, np.nan) for one, column in values.items()}
-        together = {"replicates": replicates, "confidence": confidence_of_each(0.95, len(later))}
+        together: Estimating = {"replicates": replicates, "confidence": confidence_of_each(0.95, len(later))}
         return Group(
             name,
             (float(ends[0]), float(ends[1]), float(ends[2])),
@@ -133,8 +133,7 @@ def label_of(measure: Measure) -> str:
     """A measure for people, with its unit."""
     if measure.is_binary:
         return str(measure.text)
-    at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-    return f"{measure.variable.replace('_', ' ')}{at} [{measure.display.shown}]"
+    return f"{measure.variable.replace('_', ' ')}{measure.place} [{measure.display.shown}]"
 
 
 PASSED_ALONE = "velocity and tilt are those of the cores that passed"

@@ -50,7 +50,7 @@ from warpimpact.statistics.comparisons import (
     difference_of_independent,
     ratio_numbers,
 )
-from warpimpact.statistics.intervals import Array, Estimate, estimate_of
+from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 
 _SAME_WEIGHT = 1.01
 """Plates whose areal densities differ by less than this factor weigh the same."""
@@ -96,7 +96,7 @@ def compare(
         if differ_in_weight and not any(math.isnan(evidence.measure.ratio) for evidence in evidences):
             by_ratio.add(name)
         for (i, j), pair in zip(pairs, used, strict=True):
-            dealt = [dealing(datasets[k]) | {"confidence": each} for k in (i, j)]
+            dealt: list[Estimating] = [{**dealing(datasets[k]), "confidence": each} for k in (i, j)]
             sides = [_side(evidences[k], of, by_ratio=name in by_ratio) for k, of in zip((i, j), dealt, strict=True)]
             interval = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
             drawn = sides[0].drawn, sides[1].drawn
@@ -169,7 +169,7 @@ class _Side(NamedTuple):
     estimate: Estimate
 
 
-def _side(evidence: Evidence, dealt: dict[str, Any], *, by_ratio: bool) -> _Side:
+def _side(evidence: Evidence, dealt: Estimating, *, by_ratio: bool) -> _Side:
     assert evidence.numbers is not None
     assert evidence.drawn is not None
     estimate = estimate_of(evidence.kind, evidence.numbers, **dealt)
@@ -186,7 +186,7 @@ def _side(evidence: Evidence, dealt: dict[str, Any], *, by_ratio: bool) -> _Side
     return _Side(evidence.kind == "share", True, numbers, drawn, estimate)
 
 
-def _difference(one: _Side, other: _Side, dealt: dict[str, Any], *, paired: bool) -> tuple[float, float, float]:
+def _difference(one: _Side, other: _Side, dealt: Estimating, *, paired: bool) -> tuple[float, float, float]:
     """Difference of two plates and its interval; NaN where there is none."""
     a, b = one.estimate, other.estimate
     independent = a.value - b.value, *difference_of_independent(a, b)

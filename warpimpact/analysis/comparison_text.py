@@ -92,7 +92,11 @@ class Comparison:
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        return f"<pre>{escape(comparison_text(self))}</pre>"
+        best = "".join(
+            f'<tr><th style="text-align: left">{escape(label)}</th><td style="text-align: left">{escape(who)}</td></tr>'
+            for label, who in best_rows(self)
+        )
+        return f"<table><tr><th>best at</th><th>plate</th></tr>{best}</table><pre>{escape(comparison_text(self))}</pre>"
 
     def ranks(self, measure: str) -> dict[str, int]:
         """Name of each plate → its rank, by value. Plates that share a rank are a group in which no two are told apart;
@@ -253,10 +257,10 @@ def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
 
 
 def _ranking_lines(ranking: Ranking) -> list[str]:
-    width = max(5, *(len(row[1]) for row in ranking.rows))
+    width, wide = (max(least, *(len(row[at]) for row in ranking.rows)) for at, least in ((1, 5), (4, 18)))
     lines = [ranking.title]
     for rank, plate, density, value, interval, ratio, against in (RANKING_HEAD, *ranking.rows):
-        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<20}{ratio}"
+        start = f"{rank:>4}  {plate:<{width}}{density:>8}{value:>10}   {interval:<{wide}}  {ratio}"
         lines.append(f"{start}  {against}" if against else start)
     return lines + ranking.differences
 

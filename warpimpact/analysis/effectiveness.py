@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray
@@ -27,7 +27,7 @@ from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.scene.units import Radians
 from warpimpact.statistics.comparisons import Ratio, ratio_numbers
-from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
 from warpimpact.statistics.of_groups import of_worst_tenth
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
 
@@ -72,7 +72,7 @@ class EffectMeasure:
     @property
     def ratio_text(self) -> str:
         """The interval of the ratio, or both; empty where there is none."""
-        if self.ratio_parameters is None and math.isnan(self.ratio_low):
+        if math.isnan(self.ratio) or (self.ratio_parameters is None and math.isnan(self.ratio_low)):
             return ""
         return intervals_text(self.ratio_low, self.ratio_high, self.ratio_parameters)
 
@@ -148,7 +148,7 @@ def gather(
 ) -> Iterator[Evidence]:
     """The measures of `effectiveness` one after the other, each with the numbers that it is made of; of some effects
     `only`, by their names."""
-    dealt = dealing(dataset) | {"confidence": confidence}
+    dealt: Estimating = {**dealing(dataset), "confidence": confidence}
     reference = solid_limits(dataset) if attr.LIMIT in dataset.attrs else solid_reference(dataset)
     for effect in effects(dataset, angle=angle, standoff=standoff):
         if only is not None and effect.name not in only:
@@ -167,7 +167,7 @@ def _averaged(
     statistic: _Statistic,
     values: Array,
     solid: Array | None,
-    dealt: dict[str, Any],
+    dealt: Estimating,
     dataset: xarray.Dataset,
 ) -> Evidence:
     """The measure that is a mean of what the shots say, or of numbers made of that."""
@@ -247,13 +247,13 @@ def effectiveness_text(
     """The measures of `effectiveness` as a table, beside those of the solid plate of equal areal density."""
     measures = effectiveness(dataset, angle=angle, standoff=standoff)
     labels = [measure.label + SHOWN_UNITS[measure.units] for measure in measures]
-    width = max(map(len, labels))
+    width, wide = max(map(len, labels)), max(18, *(len(_second(measure)) for measure in measures))
     title = f"effectiveness{plate_text(dataset)}"
-    head = f"{title:<{width}}{'':>10}   {'95 % interval':<18}"
+    head = f"{title:<{width}}{'':>10}   {'95 % interval':<{wide}}"
     with_solid = any(not math.isnan(measure.solid) for measure in measures)
     rows = [head + f"{'solid plate':>12}   ratio to it" if with_solid else head.rstrip()]
     for label, measure in zip(labels, measures, strict=True):
-        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<18}"
+        row = f"{label:<{width}}{number_text(measure.value):>10}   {_second(measure):<{wide}}"
         rows.append((row + _against_text(measure) if with_solid else row).rstrip())
     if note := depth_note(measures):
         rows.append(note)

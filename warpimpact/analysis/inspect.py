@@ -20,6 +20,7 @@ from warpimpact.analysis.summary import (
     promise_text,
     sampling_note,
     slices,
+    status_shares,
     stop_lines,
     symmetry_text,
 )
@@ -28,7 +29,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, hit_numbers, passed
-from warpimpact.results.measures import STATUSES, Measure
+from warpimpact.results.measures import Measure
 from warpimpact.statistics.intervals import Estimate
 
 _QUANTILES = (0.05, 0.5, 0.95)
@@ -62,6 +63,7 @@ def _origin(dataset: xarray.Dataset) -> Iterator[str]:
         numbers = plate_numbers(told[attr.OPEN_AREA], told.get(attr.LIGAMENT, math.inf), told[attr.AREAL_DENSITY])
         whole = " of the whole target" if v.LAYER_STATUS in dataset else ""
         yield f"{'plate':<12}{', '.join(f'{label} {number}' for label, number in numbers.items())}{whole}"
+    yield from told.get(attr.EVIDENCE, "").splitlines()
     if (promise := promise_text(dataset)) is not None:
         yield f"{'accuracy':<12}{promise}"
     for name in (attr.NUMERICS, attr.DEVICE, attr.HISTORY):
@@ -77,10 +79,8 @@ def _origin(dataset: xarray.Dataset) -> Iterator[str]:
 def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
     """Shares of the shots that ended, with intervals."""
     yield f"{'status':<22}{'share':>10}   95 % interval"
-    for measure, estimate in estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES]).items():
-        if estimate.value > 0.0:
-            interval = intervals_text(*ends_of(estimate), "{:.2%}".format)
-            yield f"{measure.variable:<22}{estimate.value:>10.2%}   {interval}"
+    for status, share in status_shares(dataset).items():
+        yield f"{status:<22}{share.value:>10.2%}   {intervals_text(*ends_of(share), '{:.2%}'.format)}"
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
@@ -109,8 +109,7 @@ def _row(measure: Measure, estimate: Estimate) -> str:
     name, what = "", f"{measure.share * 100.0:g} % quantile"
     unit, factor = measure.display.shown, measure.display.factor
     if measure.kind == "mean":
-        at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-        name, what = f"{measure.variable.replace('_', ' ')}{at}, {unit}", "mean"
+        name, what = f"{measure.variable.replace('_', ' ')}{measure.place}, {unit}", "mean"
     interval = intervals_text(*ends_of(estimate), lambda end: f"{factor * end:.2f}")
     row = f"{name:<29}{what:<14}{factor * estimate.value:>10.2f}   {interval}"
     return f"{row:<78} spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row

@@ -16,7 +16,7 @@ from warpimpact.analysis.survival import by_draws, draws_note, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
-from warpimpact.results.measures import MEASURED, Measure, Tally, dealing
+from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing
 from warpimpact.scene.display import STORED
 from warpimpact.solver.pilot import accuracy_text, errors_text, hits_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -148,6 +148,12 @@ def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 
         one: over_draws(dataset, estimate, _drawn(dataset, one, values), units=one.units).within(one.least)
         for (one, estimate), values in zip(found.items(), drawn, strict=True)
     }
+
+
+def status_shares(dataset: Result) -> dict[str, Estimate]:
+    """Shares of the shots by how they ended, of the statuses that occur."""
+    shares = estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES])
+    return {measure.variable: estimate for measure, estimate in shares.items() if estimate.value > 0.0}
 
 
 def _drawn(dataset: Result, measure: Measure, values: Sequence[Any]) -> Any:

@@ -29,27 +29,28 @@ from ..scene import (
     Scene,
     Symmetry,
     Target,
+    exclusions,
     symmetries_used,
 )
-from ..scene import exclusions as asked
 from ..scene.distributions import EDGE
 from ..scene.exclusions import check_together
 from ..scene.files import InputFile
 from ..scene.model import Model
 from ..scene.quantities import SCATTERED
 from ..scene.scatter import check_range
+from ..scene.shots import FARTHEST
 from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
+from .catalogued import catalogue_of, with_materials, with_threat
 from .plausible import warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
+from .published import Published
 from .scatter_tables import with_scatter_apart
 from .stop import Stop
 from .text import CampaignError, parsed, read_text
 
-_FARTHEST = 100.0
-"""Of hits from the origin [m]."""
 _MOST_LENGTHS = 1000
 """Degradation lengths in the radius of a core: its surface has patches of about that length."""
 _MOST_DEPTHS = 100
@@ -87,8 +88,10 @@ class Campaign(Model):
         burst: several shots at one plate, one after another; hits are then their aims.
         scatter: distributions of values that scatter. A file has them in the places of the values.
         posterior: file of `warpimpact identify`; every shot draws the parameters of the material from it, jointly.
+        catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
+        published: published limits, which `warpimpact limit` puts beside its own: a table `[[published]]` each.
     """
 
     title: Title
@@ -102,8 +105,10 @@ class Campaign(Model):
     output: Output = Output()
     scatter: Scatter = Scatter()
     posterior: InputFile | None = None
+    catalogue: InputFile | None = None
     stop: Stop | None = None
     burst: Burst | None = None
+    published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
     _source: str = PrivateAttr("")
 
     @property
@@ -152,7 +157,9 @@ class Campaign(Model):
             )
         if count is not None:
             _override_count(data, count)
-        data = with_scatter_apart(data, name)
+        catalogue = catalogue_of(data, name, folder)
+        data = with_scatter_apart(with_threat(data, catalogue, name), name)
+        data = with_materials(data, catalogue, name)
         try:
             campaign = cls.model_validate(data, context={"folder": folder})
         except ValidationError as error:
@@ -217,7 +224,7 @@ class Campaign(Model):
         scattered = [name for name, layer in self.scatter.given if not layer]
         given = [name for name in scattered if ("plate", name) in drawn.values or name == "degradation"]
         found = bool(given) and f"a distribution of plate.{given[0]}"
-        check_together({asked.POSTERIOR: True, asked.SCATTER_OF_MATERIAL: found})
+        check_together({exclusions.POSTERIOR: True, exclusions.SCATTER_OF_MATERIAL: found})
         return self
 
     @model_validator(mode="before")
@@ -248,22 +255,22 @@ class Campaign(Model):
         check_together(
             unsymmetric(self.scatter, self.layer)
             | {
-                asked.STOP: stop is not None,
-                asked.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
-                asked.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
-                asked.STOP_BENDING: variable in BENDING_VARIABLES and told,
-                asked.STOP_BROKEN: variable in BROKEN_VARIABLES and told,
-                asked.IMAGES: hits.irreducible,
-                asked.LISTED_STRENGTH: "strength" in (hits.listed or {}),
-                asked.BURST: self.burst is not None,
-                asked.POSTERIOR: self.posterior is not None,
-                asked.LAYERS: bool(self.layer),
-                asked.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
-                asked.BENDING: self.output.bending,
-                asked.STRENGTH: self.core.strength is not None or "strength" in (hits.listed or {}),
-                asked.NODAL: numerics.scheme == "nodal",
-                asked.BLOCK: numerics.layout == "block",
-                asked.DOUBLE: numerics.precision == "double",
+                exclusions.STOP: stop is not None,
+                exclusions.UNEVEN: hits.sampling in ("grid", "list") and f'hits.sampling = "{hits.sampling}"',
+                exclusions.ONE_SCRAMBLING: hits.sampling == "sobol" and self.replicates == 1,
+                exclusions.STOP_BENDING: variable in BENDING_VARIABLES and told,
+                exclusions.STOP_BROKEN: variable in BROKEN_VARIABLES and told,
+                exclusions.IMAGES: hits.irreducible,
+                exclusions.LISTED_STRENGTH: "strength" in (hits.listed or {}),
+                exclusions.BURST: self.burst is not None,
+                exclusions.POSTERIOR: self.posterior is not None,
+                exclusions.LAYERS: bool(self.layer),
+                exclusions.LAYER_STANDOFFS: bool(self.output.layer_standoffs),
+                exclusions.BENDING: self.output.bending,
+                exclusions.STRENGTH: self.core.strength is not None or "strength" in (hits.listed or {}),
+                exclusions.NODAL: numerics.scheme == "nodal",
+                exclusions.BLOCK: numerics.layout == "block",
+                exclusions.DOUBLE: numerics.precision == "double",
             }
         )
         return self
@@ -293,7 +300,7 @@ class Campaign(Model):
         farthest += 0.0 if self.burst is None else self.burst.reach
         # Cells of the plate have 32-bit numbers, counted from the origin.
         cell = min(self.plate.degradation_length / 25.0, (self.numerics.grid_spacing or math.inf) / 5.0)
-        allowed = min(_FARTHEST, 2**30 * cell)
+        allowed = min(FARTHEST, 2**30 * cell)
         if farthest > allowed:
             raise ValueError(
                 f"got hits up to {farthest:.6g} m from the origin, but they are exact up to {allowed:.4g} m; a pattern "

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.scene import Interaction, Plate, Sampler, Scene, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
@@ -95,16 +95,8 @@ class Posterior:
         chosen: NDArray[np.int64] = used[places[first - blocks.start * self.draws :][:count]]
         return chosen
 
-    def scenes(self, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:
-        """Places of the shots that share a scene, and that scene."""
-        draw = shots.posterior_draw
-        if draw is None or not self.of_scene:
-            yield np.arange(len(shots)), scene
-            return
-        for one in np.unique(draw):
-            yield np.flatnonzero(draw == one), self._scene(scene, int(one))
-
-    def _scene(self, scene: Scene, draw: int) -> Scene:
+    def scene(self, scene: Scene, draw: int) -> Scene:
+        """A scene with those parameters of a draw that need a scene of their own."""
         own: dict[str, dict[str, float]] = {"plate": {}, "interaction": {}}
         for table, key in self.of_scene:
             own[str(table)][str(key)] = float(self.values[table, key][draw])
@@ -113,6 +105,16 @@ class Posterior:
         return scene.model_copy(
             update={"target": target, "interaction": scene.interaction.model_copy(update=own["interaction"])}
         )
+
+
+def scenes_of(drawn: Posterior | None, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:
+    """Places of the shots that share a scene, and that scene: one for all, but where draws need scenes of their own."""
+    draw = shots.posterior_draw
+    if drawn is None or draw is None or not drawn.of_scene:
+        yield np.arange(len(shots)), scene
+        return
+    for one in np.unique(draw):
+        yield np.flatnonzero(draw == one), drawn.scene(scene, int(one))
 
 
 class DrawnSampler(Sampler):
@@ -143,11 +145,11 @@ def read_posterior(path: FilePath) -> Posterior:
 
 @lru_cache(maxsize=4)
 def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
-    tree = files.read(path, draws_alone=True)
+    tree = posterior_file.read(path, draws_alone=True)
     draws = tree["posterior"].to_dataset()
     values: dict[Path, Array] = {}
     for array in draws.data_vars.values():
-        at = tuple(json.loads(str(array.attrs.get(files.PATH, "[]"))))
+        at = tuple(json.loads(str(array.attrs.get(posterior_file.PATH, "[]"))))
         if at in OF_THE_MATERIAL:
             values[at] = array.values.ravel().astype(np.float64)
     if not values:
@@ -156,7 +158,7 @@ def _read(path: FilePath, _changed: tuple[int, int] | None) -> Posterior:
     for (table, key), column in values.items():
         for value in (column.min(), column.max()) if np.isfinite(column).all() else (math.nan,):
             _check_value(str(table), str(key), float(value), path.name)
-    return Posterior(values, json.loads(str(tree.attrs[files.MATERIAL])))
+    return Posterior(values, json.loads(str(tree.attrs[posterior_file.MATERIAL])))
 
 
 def _check_value(table: str, key: str, value: float, name: str) -> None:

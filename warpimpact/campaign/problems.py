@@ -7,6 +7,7 @@ from pydantic_core import ErrorDetails
 
 from ..scene.units import brief, quoted
 
+_CHOICES = ("shape", "distribution", "name")
 _MOST = 8
 """Problems of one file that a sentence names."""
 
@@ -26,10 +27,10 @@ def _described(problem: ErrorDetails, data: dict[str, Any]) -> str:
 
 
 def _place(problem: ErrorDetails, data: Any) -> str:
-    """Dotted TOML key of a problem, without the chosen `shape` or `distribution`, which pydantic counts as a key."""
+    """Dotted TOML key of a problem, without what a key of _CHOICES chooses, which pydantic counts as a key."""
     place = ""
     for part in problem["loc"]:
-        if isinstance(data, dict) and part not in data and part in (data.get("shape"), data.get("distribution")):
+        if isinstance(data, dict) and part not in data and part in map(data.get, _CHOICES):
             continue
         place += f"[{part}]" if isinstance(part, int) else f".{part}"
         inner = isinstance(data, list) and isinstance(part, int) and part < len(data)

@@ -27,12 +27,8 @@ def campaign_schema() -> Schema:
     Every key has its description, its default and its bounds. A quantity is a number or a string with a unit; the
     keyword ``unit`` is that of a number. A schema cannot tell that keys exclude each other: warpimpact does.
     """
-    schema: Schema = _tidied(Campaign.model_json_schema(mode="validation"))
+    schema = _described(Campaign)
     definitions = schema["$defs"]
-    for model in _models():
-        if model.__name__ in definitions:
-            _complete(definitions[model.__name__], model)
-    _complete(schema, Campaign)
     _take_weights(definitions)
     _take_distributions(schema)
     _take_plates(schema)
@@ -44,10 +40,25 @@ def campaign_schema() -> Schema:
     definitions["Stop"]["properties"]["half_width"]["type"] = ["number", "string"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        **_decided(schema, definitions),
+        **_named(_decided(schema, definitions)),
         "title": "warpimpact campaign",
         "description": "A campaign of warpimpact: what is shot at what, where, how finely it is computed.",
     }
+
+
+def completed_schema(model: type[BaseModel]) -> Schema:
+    """The JSON schema of another file, whose tables are those of a model: with descriptions, defaults and bounds."""
+    schema = _described(model)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_decided(schema, schema["$defs"])}
+
+
+def _described(model: type[BaseModel]) -> Schema:
+    schema: Schema = _tidied(model.model_json_schema(mode="validation"))
+    for one in _models():
+        if one.__name__ in schema["$defs"]:
+            _complete(schema["$defs"][one.__name__], one)
+    _complete(schema, model)
+    return schema
 
 
 def _models(base: type[BaseModel] = Model) -> Iterator[type[BaseModel]]:
@@ -89,7 +100,7 @@ def _complete(definition: Schema, model: type[BaseModel]) -> None:
             properties[name] = {"description": _in_a_file(meanings.get(name, ""))}
             if name == "file":
                 definition.pop("required", None)
-    chosen = [name for name in ("shape", "distribution") if "const" in properties.get(name, {})]
+    chosen = [name for name in ("shape", "distribution", "name") if "const" in properties.get(name, {})]
     if chosen:
         definition["required"] = [*chosen, *definition.get("required", [])]
 
@@ -130,6 +141,30 @@ def _take_weights(definitions: Schema) -> None:
         one["required"].remove("thickness")
         one |= {"if": {"required": ["areal_density"]}, "then": {"properties": {"thickness": {"not": {}}}}}
         one["else"] = {"required": ["thickness"]}
+
+
+def _named(schema: Schema) -> Schema:
+    """A schema in which a threat stands for the keys of a core and for the velocity, a material for a resistance."""
+    definitions = schema["$defs"]
+    cores = [one["then"]["$ref"].rpartition("/")[2] for one in schema["properties"]["core"]["allOf"]]
+    for name in cores:
+        required = definitions[name]["required"]
+        definitions[name] |= {"required": ["shape"], "allOf": [_unless("threat", {"required": required})]}
+    for name in ("Plate", "Layer", "NamedPlate"):
+        definitions[name]["required"] = [key for key in definitions[name]["required"] if key != "resistance"]
+        definitions[name]["allOf"] = [_unless("material", {"required": ["resistance"]})]
+    core = schema["properties"]["core"]
+    core["allOf"].append(_unless("threat", {"required": core.pop("required")}))
+    del definitions["Impact"]["required"]
+    without = {"required": ["impact"], "properties": {"impact": {"required": ["velocity"]}}}
+    named = {"properties": {"core": {"required": ["threat"]}}}
+    required = [key for key in schema["required"] if key != "impact"]
+    return schema | {"required": required, "if": named, "else": without}
+
+
+def _unless(key: str, rest: Schema) -> Schema:
+    """What holds of a table without a key."""
+    return {"if": {"required": [key]}, "else": rest}
 
 
 def _take_distributions(schema: Schema) -> None:

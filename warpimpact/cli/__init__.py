@@ -15,11 +15,13 @@ from warpimpact import __version__
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .accuracy import add_study, add_validate
+from .catalogue import add_catalogue
 from .compare import add_compare
 from .export import add_export, add_report
+from .firing import add_test
 from .identify import add_identify
 from .limit import add_limit
-from .mistakes import bug_report, implausible_told, told
+from .mistakes import bug_report, implausible_told, message_of
 from .plain import Plain, say
 from .progress import verbosity
 from .replay import add_replay
@@ -31,6 +33,7 @@ from .sweep import add_sweep
 _COMMANDS = (
     add_examples,
     add_new,
+    add_catalogue,
     add_run,
     add_limit,
     add_sweep,
@@ -44,6 +47,7 @@ _COMMANDS = (
     add_study,
     add_validate,
     add_identify,
+    add_test,
     add_schema,
     add_completion,
 )
@@ -88,7 +92,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return 141
     except Exception as error:
-        if sentence := told(error):
+        if sentence := message_of(error):
             say(f"error: {sentence}")
             return 2
         say(f"error: this is a bug, please report it: {bug_report(error)}")

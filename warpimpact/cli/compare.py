@@ -5,10 +5,9 @@ import math
 import sys
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite
+from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite, read_option
 from .paths import check_picture, named
 from .progress import show_run, warn
 from .run import failure_code
@@ -91,16 +90,11 @@ def _compare(arguments: argparse.Namespace) -> int:
 def _quantities(arguments: argparse.Namespace) -> tuple[float, float | None]:
     """The angle [rad] and the stand-off [m] of the command line."""
     from warpimpact.results.files import ResultError
-    from warpimpact.scene.units import Angle, Length, quantity
+    from warpimpact.scene.units import Angle, Length
 
-    def read(option: str, kind: Any, text: str) -> float:
-        try:
-            return quantity(kind)(text)
-        except ValueError as error:
-            raise ResultError(f"{option}: {error}") from None
-
-    angle = read("--angle", Angle, arguments.angle)
-    standoff = None if arguments.standoff is None else read("--standoff", Length, arguments.standoff)
+    angle = read_option("--angle", Angle, arguments.angle, ResultError)
+    given = arguments.standoff
+    standoff = None if given is None else read_option("--standoff", Length, given, ResultError)
     if not 0.0 <= angle < math.pi / 2:
         raise ResultError(f'--angle: got "{arguments.angle}", but it must be at least 0 and less than 90 deg')
     return angle, standoff

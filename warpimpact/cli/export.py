@@ -86,7 +86,7 @@ def add_report(commands: Commands) -> None:
 def _report(arguments: argparse.Namespace) -> None:
     from warpimpact.report.report import write_report
     from warpimpact.results import files
-    from warpimpact.results.posterior import is_posterior
+    from warpimpact.results.posterior_file import is_posterior
 
     paths = arguments.results
     output = arguments.output or paths[0].with_suffix(".html")
@@ -114,11 +114,11 @@ def _report(arguments: argparse.Namespace) -> None:
 
 def _report_posterior(paths: list[Path], output: Path) -> None:
     from warpimpact.report.posterior import write_posterior_report
-    from warpimpact.results import files, posterior
+    from warpimpact.results import files, posterior_file
 
     if len(paths) > 1:
         raise files.ResultError(
             f"got {len(paths)} files, one of which is a posterior, but a posterior is reported alone"
         )
-    write_posterior_report(posterior.read(paths[0]), output)
+    write_posterior_report(posterior_file.read(paths[0]), output)
     print(output)

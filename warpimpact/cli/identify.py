@@ -44,7 +44,7 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.reading import read_fit
     from warpimpact.identification.text import posterior_text
     from warpimpact.plotting.posterior import save_posterior
-    from warpimpact.results import posterior as files
+    from warpimpact.results import posterior_file
 
     fit = read_fit(arguments.fit)
     output = arguments.output or Path(arguments.fit.stem + ".nc")
@@ -60,7 +60,7 @@ def _identify(arguments: argparse.Namespace) -> int:
             overwrite=arguments.overwrite,
             progress=lambda now: show(Step(now.done, now.total, now.resumed, _running(now))),
         )
-    tree = files.read(output)
+    tree = posterior_file.read(output)
     print(posterior_text(tree))
     print(f"written to {output}")
     for picture in save_posterior(tree, output.parent, output.stem):

@@ -4,21 +4,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .mistakes import memory_told
-from .options import (
-    Commands,
-    add_campaign,
-    add_command,
-    add_computing,
-    add_count,
-    add_output,
-    add_overwrite,
-    add_posterior,
-    at_least,
-)
+from .options import Commands, add_campaign, add_command, add_output, at_least, read_option
 from .paths import check_picture, check_place
-from .progress import show_run, warn
-from .run import failure_code
+from .progress import warn
+from .run import add_run_options, failure_code, run_shown
 
 
 def add_limit(commands: Commands) -> None:
@@ -53,22 +42,13 @@ def add_limit(commands: Commands) -> None:
         metavar="TOLERANCE",
         help='how far the two ends of a limit may lie apart, such as "0.5 m/s" or "0.02 mm" (default: 1 m/s, 0.01 mm)',
     )
-    add_computing(parser)
-    add_count(parser)
-    add_posterior(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help="continue an interrupted search; start a new one if there is none"
-    )
-    add_overwrite(parser, "an existing result or an interrupted search")
+    add_run_options(parser, "search")
 
 
 def _limit(arguments: argparse.Namespace) -> int:
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.plotting.limit import limit_figure
     from warpimpact.results import files
-    from warpimpact.runs.cluster import cluster_team
-    from warpimpact.runs.run import run_to_file
-    from warpimpact.runs.team import local_team
     from warpimpact.studies.limit import LimitMap, warning_of
     from warpimpact.studies.limit_text import limits_text
 
@@ -80,26 +60,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     computation = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
     if sentence := warning_of(campaign, arguments.quantity):
         warn(sentence)
-    if arguments.scheduler or arguments.workers:
-        team = cluster_team(
-            campaign,
-            address=arguments.scheduler,
-            workers=arguments.workers,
-            device=arguments.device,
-            computation=computation,
-        )
-    else:
-        team = local_team(campaign, arguments.device, computation)
-    with memory_told(arguments.campaign), show_run() as progress:
-        run_to_file(
-            campaign,
-            output,
-            team=team,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-            progress=progress,
-            tell=warn,
-        )
+    run_shown(campaign, output, arguments, computation)
     dataset = files.read(output)
     print(limits_text(dataset))
     limit_figure(dataset).savefig(picture, dpi=150)
@@ -110,15 +71,12 @@ def _limit(arguments: argparse.Namespace) -> int:
 def _tolerance(arguments: argparse.Namespace) -> float | None:
     """The tolerance in SI; None where none is given."""
     from warpimpact.campaign.text import CampaignError
-    from warpimpact.scene.units import PositiveLength, PositiveSpeed, quantity
+    from warpimpact.scene.units import PositiveLength, PositiveSpeed
 
     if arguments.tolerance is None:
         return None
     kind: Any = PositiveSpeed if arguments.quantity == "velocity" else PositiveLength
-    try:
-        tolerance = float(quantity(kind)(arguments.tolerance))
-    except ValueError as error:
-        raise CampaignError(f"--tolerance: {error}") from None
+    tolerance = read_option("--tolerance", kind, arguments.tolerance, CampaignError)
     if not tolerance > 0.0:
         raise CampaignError(f'--tolerance: got "{arguments.tolerance}", but it must be greater than 0')
     return tolerance

@@ -13,8 +13,8 @@ from typing import Any
 from .plain import say
 
 
-def told(error: Exception) -> str | None:
-    """What a person is told of an error that they can put right; None of a bug."""
+def message_of(error: Exception) -> str | None:
+    """The message for an error that the user can correct; None of a bug."""
     if isinstance(error, mistakes()):
         return str(error)
     if isinstance(error, UnicodeEncodeError) and error.reason == "surrogates not allowed":

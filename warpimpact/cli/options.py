@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 Commands: TypeAlias = "argparse._SubParsersAction[argparse.ArgumentParser]"
 Command: TypeAlias = Callable[[argparse.Namespace], int | None]
@@ -81,6 +81,20 @@ def add_computing(parser: argparse.ArgumentParser) -> None:
     cluster = parser.add_mutually_exclusive_group()
     cluster.add_argument("--scheduler", metavar="ADDRESS", help="compute on the workers of this Dask scheduler")
     cluster.add_argument("--workers", type=at_least(1), metavar="N", help="compute in N processes on this machine")
+
+
+def read_option(option: str, kind: Any, text: str, mistake: type[ValueError]) -> float:
+    """The number, in SI or `Radians`, of an option with a unit, whose type is one of scene/units.py.
+
+    Raises:
+        mistake: names the option and what is allowed.
+    """
+    from warpimpact.scene.units import quantity
+
+    try:
+        return quantity(kind)(text)
+    except ValueError as error:
+        raise mistake(f"{option}: {error}") from None
 
 
 def at_least(least: int) -> Callable[[str], int]:

@@ -22,7 +22,9 @@ from .plain import say
 from .progress import show_run, warn
 
 if TYPE_CHECKING:
+    from warpimpact.campaign.campaign import Campaign
     from warpimpact.results.table import Result
+    from warpimpact.runs.task import Computation
 
 
 def add_run(commands: Commands) -> None:
@@ -36,13 +38,7 @@ def add_run(commands: Commands) -> None:
     )
     add_campaign(parser)
     add_output(parser, "RESULT.nc", "result file (default: the campaign's name, in this folder)")
-    add_computing(parser)
-    add_count(parser)
-    add_posterior(parser)
-    parser.add_argument(
-        "--resume", action="store_true", help="continue an interrupted run; start a new one if there is none"
-    )
-    add_overwrite(parser, "an existing result or an interrupted run")
+    add_run_options(parser, "run")
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -50,27 +46,12 @@ def _run(arguments: argparse.Namespace) -> int:
     from warpimpact.analysis.summary import promise_text, summary_text, symmetry_text
     from warpimpact.campaign.campaign import Campaign
     from warpimpact.results.netcdf import open_table
-    from warpimpact.runs.cluster import cluster_team
-    from warpimpact.runs.run import run_to_file
 
     campaign = Campaign.from_toml(arguments.campaign, count=arguments.count, posterior=arguments.posterior)
     output = arguments.output or Path(arguments.campaign.stem + ".nc")
     check_place(output)
     check_suffix(output, "a result", ".nc")
-    team = None
-    if arguments.scheduler or arguments.workers:
-        team = cluster_team(campaign, address=arguments.scheduler, workers=arguments.workers, device=arguments.device)
-    with memory_told(arguments.campaign), show_run() as progress:
-        run_to_file(
-            campaign,
-            output,
-            device=arguments.device,
-            team=team,
-            resume=arguments.resume,
-            overwrite=arguments.overwrite,
-            progress=progress,
-            tell=warn,
-        )
+    run_shown(campaign, output, arguments)
     with open_table(output) as dataset:
         print(summary_text(dataset))
         if attr.BURST in dataset.attrs:
@@ -79,9 +60,47 @@ def _run(arguments: argparse.Namespace) -> int:
             print(symmetry_text(dataset))
         if (promise := promise_text(dataset)) is not None:
             print(promise)
+        if attr.EVIDENCE in dataset.attrs:
+            print(dataset.attrs[attr.EVIDENCE])
         print(f"{dataset.attrs[attr.HITS_PER_SECOND]:.4g} hits per second on {dataset.attrs[attr.DEVICE]}")
         print(f"written to {output}")
         return failure_code(dataset, output)
+
+
+def add_run_options(parser: argparse.ArgumentParser, what: str) -> None:
+    """Options of a command that computes every hit: where, how many, by which posterior, and what becomes of an earlier
+    computation, which `what` names."""
+    add_computing(parser)
+    add_count(parser)
+    add_posterior(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help=f"continue an interrupted {what}; start a new one if there is none"
+    )
+    add_overwrite(parser, f"an existing result or an interrupted {what}")
+
+
+def run_shown(
+    campaign: "Campaign", output: Path, arguments: argparse.Namespace, computation: "Computation | None" = None
+) -> None:
+    """Compute every hit of a campaign into a file as the options say, and show the progress.
+
+    Args:
+        arguments: with those of `add_run_options`.
+        computation: of every hit; a hit map if None.
+    """
+    from warpimpact.runs.cluster import cluster_team
+    from warpimpact.runs.run import run_to_file
+    from warpimpact.runs.team import HIT_MAP, local_team
+
+    device, computation = arguments.device, computation or HIT_MAP
+    if arguments.scheduler or arguments.workers:
+        address, workers = arguments.scheduler, arguments.workers
+        team = cluster_team(campaign, address=address, workers=workers, device=device, computation=computation)
+    else:
+        team = local_team(campaign, device, computation)
+    resume, overwrite = arguments.resume, arguments.overwrite
+    with memory_told(arguments.campaign), show_run() as progress:
+        run_to_file(campaign, output, team=team, resume=resume, overwrite=overwrite, progress=progress, tell=warn)
 
 
 def failure_code(dataset: "Result", path: Path) -> int:

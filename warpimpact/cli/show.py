@@ -69,7 +69,7 @@ def add_plot(commands: Commands) -> None:
 
 
 def _plot(arguments: argparse.Namespace) -> None:
-    from warpimpact.plotting import hit_map, probability_map, save_beside, save_maps
+    from warpimpact.plotting import probability_map, save_beside, save_maps, variable_map
     from warpimpact.results import files
 
     datasets = {name: files.read(path) for name, path in named(arguments.results).items()}
@@ -79,7 +79,7 @@ def _plot(arguments: argparse.Namespace) -> None:
     dataset, *others = datasets.values()
     asked: dict[str, tuple[str | None, Callable[..., Figure]]] = {
         "--probability": (arguments.probability, probability_map),
-        "--variable": (arguments.variable, hit_map),
+        "--variable": (arguments.variable, variable_map),
     }
     for option, (quantity, draw) in asked.items():
         if quantity is None:

@@ -12,8 +12,9 @@ from .paths import check_output
 
 _SCHEMA = "warpimpact.schema.json"
 _FIT_SCHEMA = "warpimpact.fit.schema.json"
-_FITS = "fits"
-"""Folder of the examples that warpimpact identify takes."""
+_TEST_SCHEMA = "warpimpact.test.schema.json"
+_FITS, _FIRING = "fits", "firing"
+"""Folders of the examples that warpimpact identify and warpimpact test take."""
 
 
 def add_examples(commands: Commands) -> None:
@@ -21,9 +22,9 @@ def add_examples(commands: Commands) -> None:
         commands,
         "examples",
         _examples,
-        summary="list the campaigns and fits that come with warpimpact",
-        description="List the campaigns and fits that come with warpimpact, each with the question that it answers. "
-        "warpimpact new NAME copies an example.",
+        summary="list the campaigns, fits and tests that come with warpimpact",
+        description="List the campaigns, fits and tests that come with warpimpact, each with the question that it "
+        "answers. warpimpact new NAME copies an example.",
         example="examples",
     )
 
@@ -42,8 +43,8 @@ def add_new(commands: Commands) -> None:
         "new",
         _new,
         summary="start a campaign of your own from an example",
-        description="Copy a campaign or a fit that comes with warpimpact, and the files that it names. Write its "
-        f"schema ({_SCHEMA} or {_FIT_SCHEMA}), so that an editor can complete and check the keys.",
+        description="Copy a campaign, a fit or a test that comes with warpimpact, and the files that it names. Write "
+        f"its schema ({_SCHEMA}, {_FIT_SCHEMA} or {_TEST_SCHEMA}), so that an editor can complete and check the keys.",
         example="new slotted_plate -o my.toml",
     )
     parser.add_argument("name", metavar="NAME", help="name of an example; warpimpact examples lists them")
@@ -64,16 +65,19 @@ def _new(arguments: argparse.Namespace) -> None:
         raise CampaignError(f'got the unknown example "{name}"; {hint}')
     source, output = paths[name], arguments.output or Path(f"{name}.toml")
     # Commands in the comments name the file by its place in the checkout.
-    text = re.sub(rf"campaigns/(?:{_FITS}/)?{name}\.toml", lambda _: output.name, source.read_text(encoding="utf-8"))
-    copies = {source.parent / file: output.parent / file for file in _named(tomllib.loads(text))}
+    text = re.sub(
+        rf"campaigns/(?:{_FITS}/|{_FIRING}/)?{name}\.toml", lambda _: output.name, source.read_text(encoding="utf-8")
+    )
+    tables = tomllib.loads(text)
+    copies = {source.parent / file: output.parent / file for file in _named(tables)}
     for file in (output, *copies.values()):
         check_output(file, overwrite=arguments.overwrite)
     for one, copy in copies.items():
         shutil.copyfile(one, copy)
-    is_fit = source.parent.name == _FITS
-    schema = output.parent / (_FIT_SCHEMA if is_fit else _SCHEMA)
+    kind = "fit" if source.parent.name == _FITS else "test" if "target" in tables else "campaign"
+    schema = output.parent / {"fit": _FIT_SCHEMA, "test": _TEST_SCHEMA}.get(kind, _SCHEMA)
     output.write_text(f"#:schema {schema.name}\n{text}", encoding="utf-8")
-    schema.write_text(_schema_text(is_fit), encoding="utf-8")
+    schema.write_text(_schema_text(kind), encoding="utf-8")
     for written in (output, *copies.values(), schema):
         print(written)
 
@@ -83,7 +87,7 @@ def _campaigns() -> dict[str, Path]:
     from importlib.resources import files
 
     folder = Path(str(files("warpimpact.campaigns")))
-    paths = [*folder.glob("*.toml"), *folder.glob(f"{_FITS}/*.toml")]
+    paths = [*folder.glob("*.toml"), *folder.glob(f"{_FITS}/*.toml"), *folder.glob(f"{_FIRING}/*.toml")]
     return {path.stem: path for path in sorted(paths, key=lambda path: path.stem)}
 
 
@@ -91,7 +95,7 @@ def _named(value: Any) -> Iterator[str]:
     """Files that a campaign names."""
     inner = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, one in inner:
-        if key == "file" and isinstance(one, str):
+        if key in ("file", "campaign") and isinstance(one, str):
             yield one
         yield from _named(one)
 
@@ -106,27 +110,32 @@ def add_schema(commands: Commands) -> None:
         f"Better TOML, completes and checks a campaign whose first line is: #:schema {_SCHEMA}",
         example=f"schema -o {_SCHEMA}",
     )
-    parser.add_argument("--fit", action="store_true", help="print the schema of fits, which warpimpact identify takes")
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--fit", action="store_true", help="print the schema of fits, which warpimpact identify takes")
+    other.add_argument("--test", action="store_true", help="print the schema of tests, which warpimpact test takes")
     add_output(parser, "SCHEMA.json", "file (default: printed)")
     add_overwrite(parser, "an existing file")
 
 
 def _schema(arguments: argparse.Namespace) -> None:
+    text = _schema_text("fit" if arguments.fit else "test" if arguments.test else "campaign")
     if arguments.output is None:
-        print(_schema_text(arguments.fit), end="")
+        print(text, end="")
         return
     check_output(arguments.output, overwrite=arguments.overwrite)
-    arguments.output.write_text(_schema_text(arguments.fit), encoding="utf-8")
+    arguments.output.write_text(text, encoding="utf-8")
     print(arguments.output)
 
 
-def _schema_text(is_fit: bool) -> str:
+def _schema_text(kind: str) -> str:
     import json
 
     from warpimpact.campaign.schema import campaign_schema
+    from warpimpact.firing.schema import firing_schema
     from warpimpact.identification.schema import fit_schema
 
-    return json.dumps(fit_schema() if is_fit else campaign_schema(), indent=1, ensure_ascii=False) + "\n"
+    made = {"campaign": campaign_schema, "fit": fit_schema, "test": firing_schema}[kind]
+    return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"
 
 
 def add_completion(commands: Commands) -> None:

@@ -15,7 +15,7 @@ from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.identification.store import Store
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.results.files import OutputError
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.run import Interrupted
@@ -78,7 +78,7 @@ def identify_to_file(
         store.begin(resume=resume, overwrite=overwrite)
         try:
             sampled = sample(fit, device=device, store=store, progress=progress)
-            files.write(to_datatree(fit, sampled, made), output)
+            posterior_file.write(to_datatree(fit, sampled, made), output)
         except KeyboardInterrupt:
             kept = f"{store.count} batches are saved in {store.folder}; continue with --resume"
             raise Interrupted(f"interrupted; {kept if store.count else 'nothing is saved'}") from None

@@ -6,7 +6,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import KEPT, Score
 from warpimpact.identification.parameters import Parameter
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.results.variables import HIT_Y, HIT_Z
 from warpimpact.scene.display import UNITS
 from warpimpact.statistics.importance import LARGEST_K, Weights, resampled
@@ -73,7 +72,7 @@ def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.D
     noise = np.sqrt(sum(one.noise[which] ** 2 for one in sampled.scores))
     groups: dict[str, xarray.Dataset] = {
         "posterior": _parameters(fit, sampled.points[which], "draw").assign(
-            {name: (("draw", "shot"), hits[..., axis], _place(name)) for axis, name in enumerate(files.HITS)}
+            {name: (("draw", "shot"), hits[..., axis], _place(name)) for axis, name in enumerate(posterior_file.HITS)}
         ),
         "prior": _parameters(fit, rng.standard_normal((fit.sampling.draws, len(fit.parameters))), "draw"),
         "sample_stats": xarray.Dataset(
@@ -83,7 +82,7 @@ def to_datatree(fit: Fit, sampled: Sampled, made: Mapping[str, str]) -> xarray.D
                 "set": ("draw", which, {"long_name": "place in the group sets"}),
             }
         ),
-        "log_likelihood": xarray.Dataset({files.MEASURED: (("draw", "shot"), likelihood[which])}),
+        "log_likelihood": xarray.Dataset({posterior_file.MEASURED: (("draw", "shot"), likelihood[which])}),
         "observed_data": _observed(fit),
         "posterior_predictive": _computed(fit, sampled, which, own),
     }
@@ -127,7 +126,7 @@ def _parameters(fit: Fit, points: Array, dim: str) -> xarray.Dataset:
 def _described(parameter: Parameter) -> dict[str, str]:
     return {
         "units": UNITS[parameter.unit].stored,
-        files.PATH: json.dumps(parameter.path),
+        posterior_file.PATH: json.dumps(parameter.path),
         "prior": parameter.prior.model_dump_json(),
     }
 
@@ -142,8 +141,8 @@ def _along_observations(fit: Fit) -> dict[str, Any]:
     shots = [names[place] for place, _ in _labels(fit)]
     return {
         "observation": [f"{shot}: {one.label}" for shot, one in zip(shots, ones, strict=True)],
-        files.SHOT_OF: ("observation", shots),
-        files.UNITS_OF: ("observation", [one.units for one in ones]),
+        posterior_file.SHOT_OF: ("observation", shots),
+        posterior_file.UNITS_OF: ("observation", [one.units for one in ones]),
     }
 
 
@@ -151,8 +150,8 @@ def _observed(fit: Fit) -> xarray.Dataset:
     ones = [fit.shots[place].observations[index] for place, index in _labels(fit)]
     return xarray.Dataset(
         {
-            files.MEASURED: ("observation", np.array([float(one.shown(one.value)) for one in ones])),
-            files.STD: ("observation", np.array([float(one.shown(one.std)) for one in ones])),
+            posterior_file.MEASURED: ("observation", np.array([float(one.shown(one.value)) for one in ones])),
+            posterior_file.STD: ("observation", np.array([float(one.shown(one.std)) for one in ones])),
         },
         _along_observations(fit),
     )
@@ -171,8 +170,8 @@ def _computed(fit: Fit, sampled: Sampled, which: NDArray[np.int64], own: NDArray
     fitted = _numbers(fit, lambda place: scores[place].fitted[which, own])
     return xarray.Dataset(
         {
-            files.MEASURED: (over, predicted, {"long_name": "of another such shot, measured"}),
-            files.FITTED: (over, fitted, {"long_name": "computed for this shot, at its hit"}),
+            posterior_file.MEASURED: (over, predicted, {"long_name": "of another such shot, measured"}),
+            posterior_file.FITTED: (over, fitted, {"long_name": "computed for this shot, at its hit"}),
         },
         _along_observations(fit),
     )
@@ -202,21 +201,21 @@ def _attributes(fit: Fit, sampled: Sampled, made: Mapping[str, str], noise: Arra
     }
     return {
         attr.TITLE: fit.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact identify",
-        files.FIT: fit.text,
-        files.MATERIAL: _material(fit, sampled),
+        attr.HISTORY: attr.history_line("identify"),
+        posterior_file.FIT: fit.text,
+        posterior_file.MATERIAL: _material(fit, sampled),
         **made,
         attr.SEED: fit.sampling.seed,
-        files.EFFECTIVE: sampled.effective,
-        files.PARETO_K: weights.pareto_k,
-        files.HIT_NOISE: hit_noise,
-        files.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
-        files.EVIDENCE: weights.log_evidence,
-        files.WANTED: fit.sampling.effective,
-        files.SETS: len(sampled.points) // sampled.block,
+        posterior_file.EFFECTIVE: sampled.effective,
+        posterior_file.PARETO_K: weights.pareto_k,
+        posterior_file.HIT_NOISE: hit_noise,
+        posterior_file.CONVERGED: int(is_converged(fit, sampled, hit_noise)),
+        posterior_file.EVIDENCE: weights.log_evidence,
+        posterior_file.WANTED: fit.sampling.effective,
+        posterior_file.SETS: len(sampled.points) // sampled.block,
         "hits": fit.sampling.hits,
         "observations": fit.observed,
-        files.ROW_PROBABILITY: json.dumps(rows),
+        posterior_file.ROW_PROBABILITY: json.dumps(rows),
     }
 
 

@@ -9,8 +9,10 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
+from warpimpact.campaign.catalogued import catalogue_of, with_cores, with_materials
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import parsed, read_text
+from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.identification.fit import Fit, MeasuredShot, Sampling
 from warpimpact.identification.hits import CLASSES, read_hit
 from warpimpact.identification.measured import read_measured
@@ -24,8 +26,7 @@ from warpimpact.identification.parameters import (
     with_medians,
 )
 from warpimpact.results.measures import Measure, place_of_standoff
-from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import Core, Impact, Numerics, Plate, Record, Scatter, Scene, exclusions
 from warpimpact.scene.distributions import EDGE, Distribution
 from warpimpact.scene.model import Model
 from warpimpact.scene.quantities import QUANTITIES
@@ -104,15 +105,19 @@ class _FitFile(_WithScene):
     selection: tuple[Any, ...] = ()
     sampling: Sampling = Sampling()
     shot: Annotated[tuple[_ShotTable, ...], Field(min_length=1, max_length=_MOST_SHOTS)]
+    catalogue: Any = None
 
 
 def fit_from(text: str, name: str, folder: FilePath) -> Fit:
     """Read a fit from its text; `name` is what errors call it."""
-    given: _FitFile = _model(_FitFile, parsed(text, name), name)
+    data = parsed(text, name)
+    catalogue = catalogue_of(data, name, folder)
+    given: _FitFile = _model(_FitFile, with_cores(data, catalogue, name), name)
     parameters, record = read_priors(given.prior, given.tables, name), given.record
     tables = with_medians(given.tables, given.prior, parameters)
     shots = tuple(
-        _shot(one, tables, record, f"{name}: shot[{place}]", parameters) for place, one in enumerate(given.shot)
+        _shot(one, tables, record, f"{name}: shot[{place}]", parameters, catalogue)
+        for place, one in enumerate(given.shot)
     )
     selection = tuple(_condition(one, record, f"{name}: selection") for one in given.selection)
     if any(one.variable == "bending_stress" for one in selection):
@@ -144,7 +149,12 @@ def _model(kind: Any, data: Any, place: str) -> Any:
 
 
 def _shot(
-    given: _ShotTable, tables: Mapping[str, Any], record: Record, place: str, parameters: list[Parameter]
+    given: _ShotTable,
+    tables: Mapping[str, Any],
+    record: Record,
+    place: str,
+    parameters: list[Parameter],
+    catalogue: Catalogue,
 ) -> MeasuredShot:
     impact = dict(given.impact)
     scattered = {key: value for key, value in impact.items() if isinstance(value, dict)}
@@ -163,11 +173,17 @@ def _shot(
         hit=given.hit,
         impact=_model(Impact, impact, f"{place}.impact"),
         scatter=_model(Scatter, scattered, f"{place}.impact"),
-        tables=_merged(tables, given.tables),
+        tables=_with_material(_merged(tables, given.tables), impact, catalogue, place),
         own=frozenset(one.path for one in parameters if _gives(given.tables, one.path)),
         observations=observations,
         status=status,
     )
+
+
+def _with_material(tables: _Table, impact: _Table, catalogue: Catalogue, place: str) -> _Table:
+    """Tables with what the material of the plate is known for; a prior overrides it."""
+    resolved = with_materials(tables | {"impact": impact}, catalogue, place)
+    return {name: table for name, table in resolved.items() if name in tables}
 
 
 def _merged(tables: Any, own: Any) -> Any:
@@ -250,7 +266,9 @@ def _check_scenes(fit: Fit, name: str) -> None:
         where = f"{name}: shot[{place}]"
         try:
             scene = fit.scene_of(shot)
-            asked.check_together({asked.BENDING: fit.record.bending, asked.NODAL: fit.numerics.scheme == "nodal"})
+            exclusions.check_together(
+                {exclusions.BENDING: fit.record.bending, exclusions.NODAL: fit.numerics.scheme == "nodal"}
+            )
         except ValueError as error:
             raise FitError(f"{where}: {_reason(error, shot)}") from None
         _check_hit(shot, scene, where)

@@ -17,6 +17,7 @@ def fit_schema() -> Schema:
     of which a prior may give any key."""
     whole = campaign_schema()
     for definition in whole["$defs"].values():
+        definition.pop("allOf", None)  # what a name of the catalogue stands for, a prior may give, too
         definition["required"] = [name for name in definition.get("required", []) if name in ("shape", "distribution")]
         if definition.get("if") == {"required": ["areal_density"]}:  # a prior may give the thickness
             del definition["if"], definition["then"], definition["else"]
@@ -34,6 +35,7 @@ def fit_schema() -> Schema:
         "discrepancy": _table("Scale of what the model misses.", {kind: {} for kind in DISCREPANCY}),
         "selection": {"description": "What the measured cores have in common."},
         "sampling": _table("How much is computed.", _keys(Sampling)),
+        "catalogue": keys["catalogue"],
         "shot": {"type": "array", "minItems": 1, "items": _table("A measured shot.", shot)},
     }
     return {

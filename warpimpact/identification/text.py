@@ -9,7 +9,7 @@ import xarray
 
 from warpimpact.identification.posterior import LARGEST_NOISE, learnt, together
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.scene.display import STORED, Unit
 from warpimpact.statistics.importance import LARGEST_K
 
@@ -48,13 +48,13 @@ def _rows(tree: xarray.DataTree) -> list[str]:
     observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
     lines = [f"{'measured':42}{'':18}{'computed at its hit':22}{'another such shot':20}(90 % intervals)"]
     for place, label in enumerate(observed["observation"].values if "observation" in observed else ()):
-        value, std = (float(observed[name][place]) for name in (files.MEASURED, files.STD))
+        value, std = (float(observed[name][place]) for name in (posterior_file.MEASURED, posterior_file.STD))
         spans = [
             "{:.4g} to {:.4g}".format(*np.nanquantile(computed[name].values[..., place], [0.05, 0.95]))
-            for name in (files.FITTED, files.MEASURED)
+            for name in (posterior_file.FITTED, posterior_file.MEASURED)
         ]
         lines.append(f"{label!s:42}{f'{value:g} ± {std:g}':18}{spans[0]:22}{spans[1]:20}")
-    for shot, share in json.loads(str(tree.attrs[files.ROW_PROBABILITY])).items():
+    for shot, share in json.loads(str(tree.attrs[posterior_file.ROW_PROBABILITY])).items():
         lines.append(
             f"{shot}: {share:.2g} of the rows that another such shot would show are less probable than this one"
         )
@@ -81,14 +81,16 @@ def _best(tree: xarray.DataTree) -> list[str]:
 
 def _worth(tree: xarray.DataTree) -> list[str]:
     attributes = tree.attrs
-    effective, k, noise = (float(attributes[name]) for name in (files.EFFECTIVE, files.PARETO_K, files.HIT_NOISE))
+    measures = posterior_file.EFFECTIVE, posterior_file.PARETO_K, posterior_file.HIT_NOISE
+    effective, k, noise = (float(attributes[name]) for name in measures)
+    sets = attributes[posterior_file.SETS]
     lines = [
-        f"{tree.attrs[files.SETS]} sets of parameters, effective sample size {effective:.0f}, Pareto k {k:.2f}, "
+        f"{sets} sets of parameters, effective sample size {effective:.0f}, Pareto k {k:.2f}, "
         f"the hits leave ±{noise:.2g} in ln L"
     ]
-    if attributes[files.CONVERGED]:
+    if attributes[posterior_file.CONVERGED]:
         return lines
-    wanted = int(attributes[files.WANTED])
+    wanted = int(attributes[posterior_file.WANTED])
     causes = [
         (effective < wanted, f"the effective sample size is below {wanted}: give more sets"),
         (k > LARGEST_K, f"Pareto k is above {LARGEST_K}: some sets carry too much weight; give more sets"),

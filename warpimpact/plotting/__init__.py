@@ -9,7 +9,16 @@ import matplotlib as mpl
 from warpimpact.plotting.bursts import bursts_figure
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.plotting.distribution import dispersion, marginals, probability_map, uncertainty
-from warpimpact.plotting.maps import hit_map, hit_maps, layers_figure, overview, save_beside, save_maps, status_map
+from warpimpact.plotting.limit import limit_figure
+from warpimpact.plotting.maps import (
+    layers_figure,
+    overview,
+    save_beside,
+    save_maps,
+    status_map,
+    variable_map,
+    variable_maps,
+)
 from warpimpact.plotting.plate import plate_figure
 from warpimpact.plotting.study import study_figure
 from warpimpact.plotting.trajectory import course, flight, largest_load, passage
@@ -24,10 +33,9 @@ __all__ = [
     "course",
     "dispersion",
     "flight",
-    "hit_map",
-    "hit_maps",
     "largest_load",
     "layers_figure",
+    "limit_figure",
     "marginals",
     "overview",
     "passage",
@@ -38,5 +46,7 @@ __all__ = [
     "status_map",
     "study_figure",
     "uncertainty",
+    "variable_map",
+    "variable_maps",
     "weight_figure",
 ]

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from warpimpact.analysis.bursts import PASSED_ALONE, Bursts, bursts, label_of
 from warpimpact.plotting.cell import shots_text
-from warpimpact.results import attributes as attr
+from warpimpact.plotting.heading import heading
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, hide_sides
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from warpimpact.analysis.bursts import Group
     from warpimpact.results.measures import Measure
 
-_BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.55"  # the first two of Okabe and Ito
 _MM = 1e3
 
 
@@ -46,7 +46,7 @@ def bursts_figure(dataset: xarray.Dataset) -> Figure:
     below_left.set_xticks(range(1, len(result.orders) + 1))
     below_left.margins(x=0.1)
     below_right.set_xlabel("distance to the nearest earlier hit [mm]")
-    figure.suptitle(dataset.attrs.get(attr.TITLE, ""))
+    figure.suptitle(heading(dataset))
     figure.supxlabel(f"{shots_text(dataset)}; 95 % intervals; {PASSED_ALONE}", fontsize="small", color="0.3")
     return figure
 
@@ -60,10 +60,9 @@ def _draw(axes: Axes, places: Sequence[float], groups: Sequence[Group], measure:
     """Draw the estimates of some groups with their intervals."""
     values, low, high = (np.array([getattr(g.estimates[measure], n) for g in groups]) for n in ("value", "low", "high"))
     below, above = (np.nan_to_num(np.maximum(0.0, ends)) for ends in (values - low, high - values))
-    axes.errorbar(places, values, yerr=[below, above], fmt="o", color=_BLUE, markersize=4.5, capsize=2.5, zorder=3)
+    axes.errorbar(places, values, yerr=[below, above], fmt="o", color=BLUE, markersize=4.5, capsize=2.5, zorder=3)
     axes.grid(color="0.92")
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    hide_sides(axes, "top", "right")
 
 
 def _draw_distances(axes: Axes, result: Bursts, measure: Measure) -> None:
@@ -71,11 +70,11 @@ def _draw_distances(axes: Axes, result: Bursts, measure: Measure) -> None:
     low, middle, high = np.array([group.distance for group in result.distances]).T * _MM
     _draw(axes, list(middle), result.distances, measure)
     values = [group.estimates[measure].value for group in result.distances]
-    axes.hlines(values, low, high, color=_BLUE, lw=1.0, alpha=0.5)
+    axes.hlines(values, low, high, color=BLUE, lw=1.0, alpha=0.5)
     first = result.orders[0].estimates[measure]
-    axes.axhspan(first.low, first.high, color=_VERMILION, alpha=0.25, lw=0.0)
-    axes.axhline(first.value, color=_VERMILION, lw=1.0, label="first hits")
+    axes.axhspan(first.low, first.high, color=VERMILION, alpha=0.25, lw=0.0)
+    axes.axhline(first.value, color=VERMILION, lw=1.0, label="first hits")
     within = result.noticed_within(measure) * _MM
     if 0.0 < within < math.inf:
-        axes.axvline(within, color=_GREY, lw=1.0, ls="--", label="differs from first hits up to here")
+        axes.axvline(within, color=GREY, lw=1.0, ls="--", label="differs from first hits up to here")
     axes.set_xlim(left=0.0)

@@ -11,6 +11,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from warpimpact.analysis.comparison_text import hits_used
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,13 +21,12 @@ if TYPE_CHECKING:
     from warpimpact.analysis.comparison_text import Comparison, Difference
     from warpimpact.analysis.effectiveness import EffectMeasure
 
-# Colours of Okabe and Ito: they differ in every kind of colour blindness. Markers differ for a print in grey.
+# Markers differ for a print in grey.
 _STYLES = {  # by the ending of a measure's name; the last number is the distance from the line of its plate
-    "": ("mean, or share", "o", "#0072B2", -0.12),
-    "tenth": ("worst tenth", "s", "#D55E00", 0.12),
+    "": ("mean, or share", "o", BLUE, -0.12),
+    "tenth": ("worst tenth", "s", VERMILION, 0.12),
     "point": ("worst hit", "x", "#000000", 0.12),
 }
-_GREY = "0.55"
 _ROW, _MARGIN = 0.42, 0.75
 """Height of a line, and of the margin of a panel [inch]."""
 
@@ -54,7 +54,11 @@ def comparison_figure(comparison: Comparison) -> Figure:
     legend = {label: handle for some in entries for label, handle in some}  # each entry once
     figure.legend(legend.values(), legend.keys(), loc="outside lower center", ncols=4, frameon=False)
     used = "\n".join(hits_used(comparison))
-    figure.suptitle(f"{used}\n95 % intervals; hollow marker: cannot be told apart", fontsize="medium")
+    drawn = any(pair.parameters for pair in comparison.differences)
+    both = "by hits (thin lines) and by parameters (broad ones)" if drawn else ""
+    figure.suptitle(
+        f"{used}\n95 % intervals {both}".rstrip() + "; hollow marker: cannot be told apart", fontsize="medium"
+    )
     return figure
 
 
@@ -78,7 +82,7 @@ def _draw_plates(axes: Axes, comparison: Comparison, measures: Sequence[EffectMe
                     told.solid,
                     line + offset,
                     "D",
-                    color=_GREY,
+                    color=GREY,
                     fillstyle="none",
                     markersize=10.0,
                     label="solid plate of equal weight",
@@ -101,7 +105,7 @@ def _draw_differences(axes: Axes, comparison: Comparison, measures: Sequence[Eff
         axes.set_axis_off()
         axes.set_title("not ranked", fontsize="medium", loc="left")
         return
-    axes.axvline(0.0, color=_GREY, linewidth=1.0)
+    axes.axvline(0.0, color=GREY, linewidth=1.0)
     _furnish(axes, [f"{one} − {other}" for one, other in lines])
     by_ratio = measures[0].name in (comparison.at_equal_weight or ())
     difference = "difference of the ratios to the solid plates;\n" if by_ratio else "difference; "
@@ -118,13 +122,14 @@ def _draw_interval(
     label: str | None = None,
     hollow: bool = False,
 ) -> None:
-    """Draw a number with its interval."""
+    """Draw a number with its interval, or with both."""
     value, (marker, colour) = number.value, style
-    ends = None if math.isnan(number.low) else [[max(0.0, value - number.low)], [max(0.0, number.high - value)]]
+    if number.parameters is not None and not math.isnan(sum(number.parameters)):
+        axes.plot(number.parameters, [line, line], color=colour, linewidth=7.0, alpha=0.3, solid_capstyle="butt")
     axes.errorbar(
         value,
         line,
-        xerr=ends,
+        xerr=bars(value, number.low, number.high),
         fmt=marker,
         color=colour,
         markerfacecolor="white" if hollow else colour,
@@ -142,8 +147,7 @@ def _furnish(axes: Axes, lines: Sequence[str]) -> None:
     axes.margins(x=0.08)
     axes.locator_params(axis="x", nbins=5)
     axes.ticklabel_format(axis="x", useOffset=False)
-    for side in ("top", "right", "left"):
-        axes.spines[side].set_visible(False)
+    hide_sides(axes, "top", "right", "left")
     axes.tick_params(axis="y", length=0.0)
 
 

@@ -25,6 +25,8 @@ from warpimpact.plotting.cell import (
     struck,
     tree_of,
 )
+from warpimpact.plotting.heading import heading
+from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
@@ -39,7 +41,6 @@ if TYPE_CHECKING:
 
 _MM = 1e3
 _LONGER_SIDE = 4.2  # of a map on paper [inch]
-_BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
 _BANDS = {"5 to 95 %": (0.05, 0.95, 0.2), "25 to 75 %": (0.25, 0.75, 0.4)}  # two quantiles and the opacity
 _PER_STRIP, _MOST_STRIPS = 50, 48  # fewest hits of a strip; most strips along an axis
 _FINE = 100  # pixels along the longer side of a smoothed map
@@ -55,7 +56,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
     column = shown(dataset, variable, standoff)
     size = _map_size(dataset)
     figure = Figure(figsize=(size[0] + 4.6, size[1] + 2.9), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{column.title}")
+    figure.suptitle(f"{heading(dataset)}\n{column.title}")
     centre = figure.subplots()
     artist = draw_values(centre, dataset, column.values, scale_of([column.values], signed=column.signed))
     exists = np.isfinite(column.values)
@@ -71,7 +72,7 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
         above.set_ylabel(column.label)
         beside.set_xlabel(column.label)
         figure.colorbar(artist, cax=bar).set_ticks([])
-        histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=_BLUE, alpha=0.5)
+        histogram.hist(values, bins=min(40, 4 + len(values) // 20), orientation="horizontal", color=BLUE, alpha=0.5)
         histogram.axhline(np.median(values), color="black", lw=1.2)
         histogram.set(ylim=artist.get_clim() if np.ptp(values) else None, xlabel="hits", ylabel=column.label)
         histogram.yaxis.tick_right()
@@ -83,14 +84,14 @@ def marginals(dataset: xarray.Dataset, variable: str, standoff: float | None = N
 def dispersion(dataset: xarray.Dataset, standoff: float | None = None) -> Figure:
     """Residual velocity against tilt at a stand-off (None: the largest), with the distribution of each."""
     figure = Figure(figsize=(7.5, 6.5), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\ncores that passed the {struck(dataset)}")
+    figure.suptitle(f"{heading(dataset)}\ncores that passed the {struck(dataset)}")
     grid = {"width_ratios": [5.0, 1.2], "height_ratios": [1.2, 5.0]}
     (above, corner), (centre, beside) = figure.subplots(2, 2, sharex="col", sharey="row", gridspec_kw=grid)
     corner.remove()
     tilt, velocity = draw_dispersion(centre, dataset, standoff)
     for axes, values, orientation in ((above, tilt, "vertical"), (beside, velocity, "horizontal")):
         if len(values):
-            axes.hist(values, bins=40, orientation=orientation, color=_BLUE, alpha=0.5)
+            axes.hist(values, bins=40, orientation=orientation, color=BLUE, alpha=0.5)
         else:
             axes.set(xticks=[], yticks=[])
         axes.label_outer()
@@ -109,10 +110,10 @@ def draw_dispersion(axes: Axes, dataset: xarray.Dataset, standoff: float | None 
         density = axes.hexbin(x, y, gridsize=60, mincnt=1, bins="log", cmap="viridis", linewidths=0.1)
         axes.figure.colorbar(density, ax=axes, location="bottom", shrink=0.6, label="hits per hexagon", format="{x:g}")
     else:
-        axes.scatter(x, y, s=7, color=_BLUE, alpha=0.4, linewidths=0)
+        axes.scatter(x, y, s=7, color=BLUE, alpha=0.4, linewidths=0)
     if len(x):
-        axes.axvline(np.median(x), color=_VERMILION, lw=1.0, ls="--", label="medians")
-        axes.axhline(np.median(y), color=_VERMILION, lw=1.0, ls="--")
+        axes.axvline(np.median(x), color=VERMILION, lw=1.0, ls="--", label="medians")
+        axes.axhline(np.median(y), color=VERMILION, lw=1.0, ls="--")
         axes.legend(frameon=False, loc="best")
     else:
         axes.text(0.5, 0.5, "no core behind the " + struck(dataset), transform=axes.transAxes, ha="center", va="center")
@@ -225,7 +226,7 @@ def _local_maps(dataset: xarray.Dataset, images: Array, labels: Sequence[str], t
     a probability is that of all of them."""
     width, height = _map_size(dataset)
     figure = Figure(figsize=(len(images) * (width + 2.0) + (len(images) < 2), height + 1.9), layout="constrained")
-    figure.suptitle(f"{dataset.attrs.get(attr.TITLE, '')}\n{title}")
+    figure.suptitle(f"{heading(dataset)}\n{title}")
     panels = figure.subplots(1, len(images), sharex=True, sharey=True, squeeze=False)[0]
     for axes, image, label in zip(panels, images, labels, strict=True):
         scale = scale_of([np.array([0.0, 1.0])] if label.startswith("P(") else [image.ravel()])
@@ -278,7 +279,7 @@ def _draw_strips(axes: Axes, places: Array, values: Array, *, upright: bool) -> 
 
     fill = axes.fill_betweenx if upright else axes.fill_between
     for label, (low, high, alpha) in _BANDS.items():
-        fill(middles, quantiles(low), quantiles(high), color=_BLUE, alpha=alpha, lw=0, label=label)
+        fill(middles, quantiles(low), quantiles(high), color=BLUE, alpha=alpha, lw=0, label=label)
     median = (quantiles(0.5), middles) if upright else (middles, quantiles(0.5))
     axes.plot(*median, color="black", lw=1.2, label="median")
     axes.tick_params(labelleft=not upright, labelbottom=upright)

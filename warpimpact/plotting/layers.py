@@ -9,6 +9,7 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.slabs import LayerField, fields_behind
+from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -28,7 +29,7 @@ def layers(dataset: xarray.Dataset) -> Figure:
     found, times = fields_behind(dataset), dataset[v.SNAPSHOT].values
     figure = Figure(figsize=(2.5 * len(times) + 1.6, 2.9 * len(found) + 0.9), layout="constrained")
     figure.suptitle(
-        f"{dataset.attrs[attr.TITLE]}\nhit {dataset.attrs[attr.HIT]}: resistance left in the layers, seen from behind"
+        f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: resistance left in the layers, seen from behind"
     )
     panels = figure.subplots(len(found), len(times), squeeze=False, sharex="row", sharey="row")
     for row, layer in zip(panels, found, strict=True):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from itertools import cycle
 from textwrap import fill
 from typing import TYPE_CHECKING
 
@@ -12,16 +14,19 @@ from matplotlib.figure import Figure
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.proxy import inclination
 from warpimpact.plotting.cell import draw_values, limits, scale_of, shown
+from warpimpact.plotting.heading import heading
+from warpimpact.plotting.style import BLUE, GREY, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
 from warpimpact.studies.limit import QUANTILES, quantiles
 from warpimpact.studies.limit_text import promise_line, shown_unit
+from warpimpact.studies.published import published_beside
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_BLUE, _VERMILION = "#0072B2", "#D55E00"  # colours of Okabe and Ito
+_OTHERS = ("#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#000000")
 _CURVE = {
     "velocity": ("impact velocity", "share of the hits that perforate"),
     "thickness": ("thickness of {}", "share of the hits whose limit is thinner"),
@@ -54,7 +59,9 @@ def limit_figure(dataset: xarray.Dataset) -> Figure:
 
 def _inscribe(figure: Figure, dataset: xarray.Dataset) -> None:
     note = fill(f"{dataset.sizes['hit']} hits, {promise_line(dataset)}", 110)
-    figure.suptitle(f"{dataset.attrs[attr.TITLE]}\n{note}", fontsize=10)
+    figure.suptitle(f"{heading(dataset)}\n{note}", fontsize=10)
+    if sources := dict.fromkeys(row.published.source for row in published_beside(dataset)):
+        figure.supxlabel(fill("published: " + "; ".join(sources), 110), fontsize=8)
 
 
 def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
@@ -66,7 +73,7 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
     value, obliquity = dataset[v.LIMITS[quantity].value].values, dataset[v.OBLIQUITY].values
     yawed = np.ptp(obliquity) == 0.0
     along = np.degrees(inclination(dataset)) if yawed else obliquity
-    axes.plot(along, factor * value, "o", color=_BLUE, label=f"limit {quantity}")
+    axes.plot(along, factor * value, "o", color=BLUE, label=f"limit {quantity}")
     first = int(np.argmin(obliquity))
     if np.ptp(obliquity) > 0.0 and np.isfinite(value[first]):
         angles = np.linspace(obliquity.min(), obliquity.max())
@@ -74,11 +81,13 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
         law = growth if quantity == "velocity" else 1.0 / growth
         label = "as 1/cos(obliquity)" if quantity == "velocity" else "as cos(obliquity)"
         axes.plot(angles, factor * value[first] * law, color="0.5", linewidth=1.0, label=label)
+    if not yawed:
+        _draw_published(axes, dataset)
     across = "between axis and line of fire on impact" if yawed else "obliquity"
     reference = solid_limits(dataset)
     if reference is not None:
         solid = np.broadcast_to(reference[v.LIMITS[quantity].value].values, value.shape)
-        axes.plot(along, factor * solid, "D", color="0.55", fillstyle="none", label=_solid_label(dataset, quantity))
+        axes.plot(along, factor * solid, "D", color=GREY, fillstyle="none", label=_solid_label(dataset, quantity))
     axes.set(xlabel=f"{across} [°]", ylabel=f"limit {quantity} [{unit}]")
     axes.grid(color="0.9")
     axes.set_axisbelow(True)
@@ -87,12 +96,45 @@ def _over_obliquity(dataset: xarray.Dataset, quantity: str) -> Figure:
     return figure
 
 
+def _draw_published(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Published limits against the obliquity, rows of one label alike."""
+    rows = published_beside(dataset)
+    for (label, marker), colour in zip(
+        zip(dict.fromkeys(row.label for row in rows), "s^vP*", strict=False), _OTHERS, strict=False
+    ):
+        some = [row.published for row in rows if row.label == label]
+        axes.errorbar(
+            [math.degrees(one.obliquity) for one in some],
+            [one.velocity for one in some],
+            yerr=[one.standard_deviation or math.nan for one in some]
+            if any(one.standard_deviation for one in some)
+            else None,
+            fmt=marker,
+            color=colour,
+            fillstyle="none",
+            capsize=3.0,
+            label=label,
+        )
+
+
 def _solid_label(dataset: xarray.Dataset, quantity: str) -> str:
     """Of the solid plate; its thickness stands for the whole target, not for the layer that was searched."""
     several = ", mean" if dataset.sizes.get("solid_hit", 1) > 1 and quantity == "velocity" else ""
     if quantity == "velocity":
         return f"solid plate of equal areal density{several}"
     return "solid plate in place of the whole target"
+
+
+def _mark_published(axes: Axes, dataset: xarray.Dataset) -> None:
+    """Published limits at the obliquity of the hits, as lines across the share of the hits."""
+    for row, colour in zip((one for one in published_beside(dataset) if not math.isnan(one.computed)), cycle(_OTHERS)):
+        velocity, error = row.published.velocity, row.published.standard_deviation
+        axes.axvline(velocity, color=colour, linewidth=1.2, linestyle=":", label=row.label)
+        if error:
+            axes.axvspan(velocity - error, velocity + error, color=colour, alpha=0.12)
+        low, high = axes.get_xlim()
+        axes.set_xlim(min(low, velocity - 0.03 * (high - low)), max(high, velocity + 0.03 * (high - low)))
+        axes.legend(loc="lower right", frameon=False, fontsize="small")
 
 
 def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
@@ -106,25 +148,26 @@ def _draw_curve(axes: Axes, dataset: xarray.Dataset, quantity: str) -> None:
         margin = 0.05 * max(np.ptp(found[finite]), 0.02 * found[finite].max())
         ends = found[finite][0] - margin, found[finite][-1] + margin
         steps = [ends[0], *found[finite], ends[1]], [0.0, *share[finite], share[finite][-1]]
-        axes.step(factor * np.array(steps[0]), steps[1], where="post", color=_BLUE, linewidth=1.5)
+        axes.step(factor * np.array(steps[0]), steps[1], where="post", color=BLUE, linewidth=1.5)
         axes.set_xlim(*(factor * np.array(ends)))
     for name, estimate in quantiles(dataset).items():
         level = QUANTILES[f"V{name[1:]}"]
         if np.isfinite(estimate.value):
             low, high = factor * np.array([estimate.low, estimate.high])
-            axes.plot([low, high], [level, level], color=_VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
-            axes.plot(factor * estimate.value, level, "o", color=_VERMILION, markersize=5)
+            axes.plot([low, high], [level, level], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
+            axes.plot(factor * estimate.value, level, "o", color=VERMILION, markersize=5)
             text = f" {name} = {factor * estimate.value:.4g} {unit}"
             axes.annotate(text, (factor * estimate.value, level), xytext=(8, -12), textcoords="offset points")
     reference = solid_limits(dataset)
     if reference is not None:
         mean = factor * float(np.nanmean(reference[v.LIMITS[quantity].value].values))
         if np.isfinite(mean):
-            axes.axvline(mean, color="0.55", linewidth=1.2, linestyle="--", label=_solid_label(dataset, quantity))
+            axes.axvline(mean, color=GREY, linewidth=1.2, linestyle="--", label=_solid_label(dataset, quantity))
             low, high = axes.get_xlim()
             margin = 0.03 * (high - low)
             axes.set_xlim(min(low, mean - margin), max(high, mean + margin))
             axes.legend(loc="lower right", frameon=False, fontsize="small")
+    _mark_published(axes, dataset)
     layer = int(dataset.attrs[attr.LIMIT_LAYER])
     whose, share_label = _CURVE[quantity]
     label = whose.format(f"layer {layer}" if layer else "the plate")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,9 +23,9 @@ from warpimpact.plotting.distribution import (
     mean_and_spread,
     uncertainty,
 )
-from warpimpact.results import attributes as attr
+from warpimpact.plotting.heading import add_heading, heading, names
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import status_codes
+from warpimpact.results.dataset import passed, status_codes
 from warpimpact.results.files import OutputError
 
 if TYPE_CHECKING:
@@ -40,11 +41,13 @@ _LONGER_SIDE = 4.2
 _LEFT, _RIGHT, _ABOVE, _BELOW = 0.75, 1.15, 0.55, 1.2
 _NARROWEST_PANEL = 5.4  # holds the legend
 _HEAD, _FOOT = 0.5, 0.3
+_LINE, _NAMES = 0.2, 60  # of the names: height, and the most characters
 _BELOW_NO_LEGEND, _FOOT_WITH_LEGEND = 0.65, 0.85
 _MOST_COLUMNS = 3
+_LETTERS = 15  # of a note in an inch
 
 
-def hit_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
+def variable_map(dataset: xarray.Dataset, variable: str, standoff: float | None = None) -> Figure:
     """Map of one variable of the Dataset over the hit points; hits without a value are grey.
 
     Where hits draw their parameters from a posterior, it shows the mean and the spread at every place. Args and errors
@@ -57,11 +60,11 @@ def hit_map(dataset: xarray.Dataset, variable: str, standoff: float | None = Non
     return figure
 
 
-def hit_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
+def variable_maps(datasets: Mapping[str, xarray.Dataset], variable: str, standoff: float | None = None) -> Figure:
     """The same map of several results side by side, in the same colours and to the same scale.
 
     Args:
-        datasets: results by the names that their maps get; the others as in `hit_map`.
+        datasets: results by the names that their maps get; the others as in `variable_map`.
     """
     figure, panels = _sheet(list(datasets.values()), columns=min(_MOST_COLUMNS, len(datasets)))
     columns = [averaged(dataset, shown(dataset, variable, standoff)) for dataset in datasets.values()]
@@ -92,8 +95,9 @@ def overview(dataset: xarray.Dataset) -> Figure:
     columns = [shown(dataset, variable) for variable in _MAIN if variable != v.TILT or len(standoffs)]
     if len(statuses) == 1 and len(standoffs) > 1:
         columns.insert(2, shown(dataset, v.TILT, float(standoffs[0])))
+    columns = [column for column in columns if np.isfinite(column.values).any()]
     names = {code: words(name) for name, code in status_codes(dataset).items()}
-    alike = f"; all {names[int(statuses[0])]}" if len(statuses) == 1 else ""
+    alike = f"; all {names[int(statuses[0])]}" if len(statuses) == 1 and columns else ""
     figure, panels = _sheet_of_one(dataset, maps=len(columns) + (not alike), columns=2, note=alike)
     for axes, column in zip(panels, columns, strict=False):
         _draw(axes, dataset, averaged(dataset, column))
@@ -105,7 +109,7 @@ def overview(dataset: xarray.Dataset) -> Figure:
 
 def layers_figure(dataset: xarray.Dataset) -> Figure:
     """Of every layer, a row each: how the cores ended in it, their velocity behind it, and their tilt there: at the
-    farthest stand-off behind it that flight is free to, or as they leave it.
+    farthest stand-off behind it that flight is free to, or as they leave it. Of a layer that no core left, their depth.
 
     Args:
         dataset: a result with layers behind the plate.
@@ -115,10 +119,20 @@ def layers_figure(dataset: xarray.Dataset) -> Figure:
     for layer, (status, *others) in enumerate(zip(*[iter(panels)] * 3, strict=True)):
         draw_status(status, dataset, layer)
         columns = [shown(dataset, v.LAYER_RESIDUAL_VELOCITY, layer=layer), _tilt_behind(dataset, layer)]
-        for axes, column in zip(others, columns, strict=True):
+        if not np.isfinite(columns[0].values).any():
+            columns = [_depth_in(dataset, layer)]
+        for axes, column in zip(others, columns, strict=False):
             _draw(axes, dataset, column, layer=layer)
+        for axes in others[len(columns) :]:
+            axes.remove()
     _share_legend(figure, panels)
     return figure
+
+
+def _depth_in(dataset: xarray.Dataset, layer: int) -> Shown:
+    column = shown(dataset, v.DEPTH)
+    values = np.where(dataset[v.STOPPED_IN].values == layer, column.values, np.nan)
+    return column._replace(values=values, title=f"depth in layer {layer}\nthat any point of the core reached")
 
 
 def _tilt_behind(dataset: xarray.Dataset, layer: int) -> Shown:
@@ -131,7 +145,8 @@ def _tilt_behind(dataset: xarray.Dataset, layer: int) -> Shown:
 
 
 def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bool = False) -> list[Path]:
-    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths.
+    """Write the figures of one result as PNG files ``<stem>_<figure>.png`` and return their paths. What would have no
+    values is left out.
 
     Raises:
         OutputError: one of them exists, and must not be replaced.
@@ -144,9 +159,12 @@ def save_maps(dataset: xarray.Dataset, folder: Path, stem: str, *, overwrite: bo
         at_standoffs = v.STANDOFF in variable.dims
         for standoff in dataset[v.STANDOFF].values.tolist() if at_standoffs else [None]:
             name = variable if standoff is None else f"{variable}_{standoff * _MM:g}mm"
-            figures[name] = hit_map(dataset, variable, standoff)
-    figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
-    if dataset.sizes["standoff"]:
+            if np.isfinite(shown(dataset, variable, standoff).values).any():
+                figures[name] = variable_map(dataset, variable, standoff)
+    behind = bool(passed(dataset).any())
+    if behind:
+        figures["marginals"] = marginals(dataset, v.RESIDUAL_VELOCITY)
+    if behind and dataset.sizes["standoff"]:
         figures["dispersion"] = dispersion(dataset)
     if is_uncertain(dataset):
         figures["uncertainty"] = uncertainty(dataset, v.RESIDUAL_VELOCITY)
@@ -167,7 +185,7 @@ def save_beside(
     """
     there = all(dataset.sizes["standoff"] for dataset in datasets.values())
     figures: dict[str, Figure] = {
-        variable: hit_maps(datasets, variable) for variable in _MAIN if variable != v.TILT or there
+        variable: variable_maps(datasets, variable) for variable in _MAIN if variable != v.TILT or there
     }
     return _saved(figures, folder, stem, overwrite=overwrite)
 
@@ -184,15 +202,15 @@ def _saved(figures: Mapping[str, Figure], folder: Path, stem: str, *, overwrite:
 
 def _sheet_of_one(dataset: xarray.Dataset, *, maps: int, columns: int, note: str = "") -> tuple[Figure, list[Axes]]:
     """A sheet of several maps of one result, which says what it shows."""
-    figure, panels = _sheet([dataset] * maps, columns=columns)
+    figure, panels = _sheet([dataset] * maps, columns=columns, lines=len(names(dataset, _NAMES)))
     folded = "; all hits of the bursts, folded into the cell" if is_folded(dataset) else ""
     told = f"{shots_text(dataset)}; seen from behind the plate{note}{folded}"
-    _inscribe(figure, dataset.attrs.get(attr.TITLE, ""), told)
+    _inscribe(figure, heading(dataset, _NAMES), told)
     return figure, panels
 
 
-def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure, list[Axes]]:
-    """Figure with a place for a map of each result, row by row, all to one scale.
+def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int, lines: int = 0) -> tuple[Figure, list[Axes]]:
+    """Figure with a place for a map of each result, row by row, all to one scale; `lines` of text follow the title.
 
     The maps show the whole cell and every hit. Their size follows from that extent; the room round them is
     the same on every figure, so that maps of one plate can be laid side by side.
@@ -203,7 +221,8 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure,
     rows, (widest, tallest) = -(-len(datasets) // columns), sizes.max(axis=0)
     panel_width = max(_LEFT + widest + _RIGHT, _NARROWEST_PANEL)
     panel_height = _ABOVE + tallest + below
-    width, height = columns * panel_width, _HEAD + rows * panel_height + foot
+    head = _HEAD + _LINE * lines
+    width, height = columns * panel_width, head + rows * panel_height + foot
     figure = Figure(figsize=(width, height))
     panels = []
     for number, (map_width, map_height) in enumerate(sizes):
@@ -216,8 +235,9 @@ def _sheet(datasets: Sequence[xarray.Dataset], *, columns: int) -> tuple[Figure,
 
 def _inscribe(figure: Figure, title: str, note: str) -> None:
     height = figure.get_figheight()
-    figure.suptitle(title, y=1.0 - 0.12 / height, va="top", wrap=True)
-    figure.supxlabel(note, y=0.12 / height, va="bottom", fontsize="small", color="0.3")
+    add_heading(figure, title)
+    lines = fill(note, int(_LETTERS * figure.get_figwidth()))
+    figure.supxlabel(lines, y=0.12 / height, va="bottom", fontsize="small", color="0.3")
 
 
 def _share_legend(figure: Figure, panels: Sequence[Axes]) -> None:

@@ -17,6 +17,7 @@ from matplotlib.path import Path
 
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.plotting.dimensions import draw_dimensions
+from warpimpact.plotting.heading import add_heading
 from warpimpact.scene import NoPattern, Target
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "
     parts = (f"{name} {number}".replace(" ", "\u00a0") for name, number in numbers.items())  # no break within a part
     axes.set_title(fill(", ".join(parts), 70), fontsize="medium")
     inch = 1.0 / figure.get_figheight()
-    figure.suptitle(title, y=1.0 - 0.12 * inch, va="top", wrap=True)
+    add_heading(figure, title)
     figure.legend(
         handles=[steel, *patches],
         loc="lower center",

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from warpimpact.identification.posterior import learnt, parameters_of
 from warpimpact.identification.reading import fit_from
 from warpimpact.identification.text import unit_of
+from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,9 +23,11 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-_BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.6"
+_GREY = "0.6"
 _MM = 1e3
 _POINTS = 600
+_CELLS = 5.0
+"""Cells of holes that a figure shows at most on either side of the middle; a fit looks for hits in the first."""
 
 
 def save_posterior(tree: xarray.DataTree, folder: Path, stem: str) -> Iterator[Path]:
@@ -67,7 +70,7 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
             else:
                 some = slice(None, None, max(1, len(x) // _POINTS))
                 axes.scatter(prior[some], _values(tree, "prior", below)[0][some], s=2, color=_GREY, alpha=0.25, lw=0)
-                axes.scatter(x[some], y[some], s=4, color=_BLUE, alpha=0.45, lw=0)
+                axes.scatter(x[some], y[some], s=4, color=BLUE, alpha=0.45, lw=0)
                 axes.set_ylim(_limits(_values(tree, "prior", below)[0], y))
             axes.set_xlim(_limits(prior, x))
             axes.tick_params(labelsize="x-small", labelbottom=row == len(names) - 1, labelleft=column == 0 and row > 0)
@@ -79,8 +82,8 @@ def pairs_figure(tree: xarray.DataTree) -> Figure:
 
 
 def _worth(tree: xarray.DataTree) -> str:
-    ended = "" if tree.attrs[files.CONVERGED] else ", NOT CONVERGED"
-    return f"effective sample size {tree.attrs[files.EFFECTIVE]:.0f}{ended}"
+    ended = "" if tree.attrs[posterior_file.CONVERGED] else ", NOT CONVERGED"
+    return f"effective sample size {tree.attrs[posterior_file.EFFECTIVE]:.0f}{ended}"
 
 
 def _limits(prior: Array, posterior: Array) -> tuple[float, float]:
@@ -91,13 +94,14 @@ def _limits(prior: Array, posterior: Array) -> tuple[float, float]:
 def _density(axes: Axes, prior: Array, posterior: Array) -> None:
     edges = np.linspace(*_limits(prior, posterior), 31).tolist()
     axes.hist(prior, bins=edges, density=True, color=_GREY, alpha=0.5)
-    axes.hist(posterior, bins=edges, density=True, color=_BLUE, alpha=0.6)
+    axes.hist(posterior, bins=edges, density=True, color=BLUE, alpha=0.6)
 
 
 def measured_figure(tree: xarray.DataTree) -> Figure:
     """Every measured number with its uncertainty beside what is computed for it: 50 and 90 % intervals."""
     observed, computed = tree["observed_data"].to_dataset(), tree["posterior_predictive"].to_dataset()
-    units = [str(one) for one in observed[files.UNITS_OF].values] if files.UNITS_OF in observed else []
+    stored = observed[posterior_file.UNITS_OF].values if posterior_file.UNITS_OF in observed else ()
+    units = [str(one) for one in stored]
     kinds = list(dict.fromkeys(units)) or ["1"]
     counts = [max(1, units.count(kind)) for kind in kinds]
     figure = Figure(figsize=(10.0, 2.6 + 0.55 * sum(counts)), layout="constrained")
@@ -107,21 +111,21 @@ def measured_figure(tree: xarray.DataTree) -> Figure:
         rows = [place for place, unit in enumerate(units) if unit == kind]
         labels = [str(observed["observation"].values[place]) for place in rows]
         for line, place in enumerate(rows):
-            for offset, name, colour in ((-0.16, files.MEASURED, _GREY), (0.16, files.FITTED, _BLUE)):
+            for offset, name, colour in ((-0.16, posterior_file.MEASURED, _GREY), (0.16, posterior_file.FITTED, BLUE)):
                 values = computed[name].values[..., place].ravel()
                 values = values[np.isfinite(values)]
                 if len(values):
                     low, quarter, three, high = np.quantile(values, [0.05, 0.25, 0.75, 0.95])
                     axes.plot([low, high], [line + offset] * 2, color=colour, lw=1.5)
                     axes.plot([quarter, three], [line + offset] * 2, color=colour, lw=5, solid_capstyle="butt")
-            value, std = (float(observed[name][place]) for name in (files.MEASURED, files.STD))
-            axes.errorbar(value, line, xerr=std, fmt="o", color=_VERMILION, capsize=3, ms=5, zorder=4)
+            value, std = (float(observed[name][place]) for name in (posterior_file.MEASURED, posterior_file.STD))
+            axes.errorbar(value, line, xerr=std, fmt="o", color=VERMILION, capsize=3, ms=5, zorder=4)
         axes.set_yticks(range(len(rows)), labels)
         axes.set_ylim(len(rows) - 0.5, -0.5)
         axes.set_xlabel({"m s-1": "m/s", "degree": "degrees"}.get(kind, kind))
         axes.grid(axis="x", color="0.9")
         axes.set_axisbelow(True)
-    handles = [_line(_VERMILION, "measured, ±1 standard uncertainty", "o"), _line(_BLUE, "computed at its hit")]
+    handles = [_line(VERMILION, "measured, ±1 standard uncertainty", "o"), _line(BLUE, "computed at its hit")]
     handles.append(_line(_GREY, "another such shot, measured"))
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -138,7 +142,7 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
 
     The plate is drawn at the posterior's medians; where the spacing of its holes is unknown, so are their places.
     """
-    fit = fit_from(str(tree.attrs[files.FIT]), "the fit of this posterior", Path())
+    fit = fit_from(str(tree.attrs[posterior_file.FIT]), "the fit of this posterior", Path())
     posterior, best = tree["posterior"].to_dataset(), tree["best"].to_dataset()
     medians = {one.path: float(np.median(posterior[one.name])) for one in fit.scene_parameters if one.unit != "rad"}
     across = min(3, len(fit.shots))
@@ -149,16 +153,17 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
     for place, shot in enumerate(fit.shots):
         axes = panels[place]
         scene = fit.scene_of(shot, medians)
-        y, z = (_MM * posterior[name].values[..., place].ravel() for name in files.HITS)
-        half = [0.55 * side * _MM for side in scene.target.layers[0].sampled_cell]
-        half = [max(one, float(np.abs(at).max()) * 1.05) for one, at in zip(half, (y, z), strict=True)]
+        y, z = (_MM * posterior[name].values[..., place].ravel() for name in posterior_file.HITS)
+        cell = [side * _MM for side in scene.target.layers[0].sampled_cell]
+        far = [float(np.abs(at).max()) * 1.05 for at in (y, z)]
+        half = [min(max(0.55 * side, most), _CELLS * side) for side, most in zip(cell, far, strict=True)]
         ranges = [(-one / _MM, one / _MM) for one in half]
         axes.set_facecolor("0.85")
         for outline in scene.target.layers[0].pattern.outlines(*ranges):
             axes.fill(*(_MM * outline.T), facecolor="white", edgecolor="black", lw=0.8)
-        axes.scatter(y, z, s=5, color=_BLUE, alpha=0.35, lw=0, label="posterior")
-        at = (_MM * float(best[name][place]) for name in files.HITS)
-        axes.plot(*at, "X", color=_VERMILION, ms=8, mec="white", label="smallest misfit")
+        axes.scatter(y, z, s=5, color=BLUE, alpha=0.35, lw=0, label="posterior")
+        at = (_MM * float(best[name][place]) for name in posterior_file.HITS)
+        axes.plot(*at, "X", color=VERMILION, ms=8, mec="white", label="smallest misfit")
         axes.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), aspect="equal", xlabel="y [mm]", ylabel="z [mm]")
         axes.set_title(str(posterior["shot"].values[place]))
     for axes in panels[len(fit.shots) :]:

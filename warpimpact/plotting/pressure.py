@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from warpimpact.analysis.surface import AROUND, largest_in_plate, pressed
+from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -28,7 +29,7 @@ def pressure(dataset: xarray.Dataset) -> Figure:
     surface = pressed(dataset, step)
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
     figure.suptitle(
-        f"{dataset.attrs[attr.TITLE]}\nhit {dataset.attrs[attr.HIT]}: "
+        f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: "
         f"normal stress under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
     )
     axes = figure.add_subplot(projection="3d")

@@ -8,6 +8,8 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.plotting.heading import heading
+from warpimpact.plotting.style import BLUE, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.studies.accuracy import QUOTED
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 _PANELS = {v.RESIDUAL_VELOCITY: "residual velocity [m/s]", v.TILT: "tilt [°]"}
 _BELOW_FLOOR = 0.4  # lowest error shown, in units of the uncertainty
 # Colours of Okabe and Ito: they differ in every kind of colour blindness.
-_BLUE, _VERMILION, _GREY = "#0072B2", "#D55E00", "0.62"
+_GREY = "0.62"
 
 
 def study_figure(dataset: xarray.Dataset) -> Figure:
@@ -34,7 +36,7 @@ def study_figure(dataset: xarray.Dataset) -> Figure:
         _draw(axes, quoted, quantity)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False)
     figure.suptitle(
-        f"{dataset.attrs[attr.TITLE]}\n{dataset.sizes['hit']} hits, tilt at {quoted[v.STANDOFF].item() * 1e3:g} mm; "
+        f"{heading(dataset)}\n{dataset.sizes['hit']} hits, tilt at {quoted[v.STANDOFF].item() * 1e3:g} mm; "
         f"{dataset.attrs[attr.DEVICE]}, {dataset.attrs[attr.HISTORY][:10]}"
     )
     return figure
@@ -55,18 +57,18 @@ def _draw(axes: Axes, quoted: xarray.Dataset, quantity: v.Variable) -> None:
         return settings[v.HITS_PER_SECOND].values, settings[v.ERRORS[quantity]].values
 
     floor = quoted[v.CHANGES[quantity]].values[-1]
-    axes.plot(*points(on_front), color=_BLUE, linewidth=1.5, zorder=2, label="front: no faster setting is as exact")
+    axes.plot(*points(on_front), color=BLUE, linewidth=1.5, zorder=2, label="front: no faster setting is as exact")
     axes.scatter(*points(quoted.isel(setting=~literal)), s=28, color=_GREY, zorder=3, label="other settings")
-    axes.scatter(*points(on_front), s=28, color=_BLUE, zorder=4)
+    axes.scatter(*points(on_front), s=28, color=BLUE, zorder=4)
     axes.scatter(
-        *points(quoted.isel(setting=literal)), s=48, color=_VERMILION, marker="X", zorder=4, label="literal scheme"
+        *points(quoted.isel(setting=literal)), s=48, color=VERMILION, marker="X", zorder=4, label="literal scheme"
     )
     named = quoted.isel(setting=np.char.startswith(quoted[v.SETTING].values.astype(str), "level "))
     axes.scatter(*points(named), s=110, facecolors="none", edgecolors="black", zorder=5, label="levels of the ladder")
     axes.margins(x=0.22, y=0.15)
     if floor > 0.0:
         bottom = min(axes.get_ylim()[0], _BELOW_FLOOR * floor)
-        axes.axhspan(bottom, floor, color=_VERMILION, alpha=0.12, linewidth=0, label="converged answer uncertain")
+        axes.axhspan(bottom, floor, color=VERMILION, alpha=0.12, linewidth=0, label="converged answer uncertain")
         axes.set_ylim(bottom=bottom)
     for setting in named[v.SETTING].values:
         _name(axes, *points(named.sel(setting=[setting])), setting, right=-5, up=7, ha="right")

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from warpimpact.analysis.summary import estimated
 from warpimpact.plotting.cell import words
+from warpimpact.plotting.heading import heading
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
@@ -65,7 +66,7 @@ def sweep_figure(sweep: xarray.Dataset) -> Figure:
     left_out = _product(sweep.sizes[name] for name in others) - len(lines)
     note = f"; {left_out} more combinations are not shown" if left_out > 0 else ""
     hits = f"{sweep.sizes['hit']} hits at every point, 95 % intervals"
-    figure.suptitle(f"{sweep.attrs[attr.TITLE]}\n{hits}{counted}{note}")
+    figure.suptitle(f"{heading(sweep)}\n{hits}{counted}{note}")
     return figure
 
 
@@ -89,8 +90,7 @@ def _measures(sweep: xarray.Dataset) -> list[Measure]:
 def _label(measure: Measure) -> str:
     if measure.kind == "share":
         return f"share {words(measure.variable)}"
-    at = f" at {measure.standoff * 1e3:g} mm" if measure.standoff else ""
-    return f"mean {words(measure.variable)}{at} [{measure.display.shown}]\nof the cores that passed"
+    return f"mean {words(measure.variable)}{measure.place} [{measure.display.shown}]\nof the cores that passed"
 
 
 def _axis_label(values: xarray.DataArray) -> str:

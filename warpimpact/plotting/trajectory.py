@@ -20,9 +20,11 @@ from matplotlib.patheffects import Normal, Stroke
 from warpimpact.analysis.slabs import depth_of, slabs
 from warpimpact.analysis.surface import pressed
 from warpimpact.plotting.cell import struck, words
+from warpimpact.plotting.heading import heading
 from warpimpact.plotting.layers import layers
 from warpimpact.plotting.poses import Pose, pose_at_step, poses_behind, poses_in_plate, silhouette
 from warpimpact.plotting.pressure import pressure
+from warpimpact.plotting.style import BLUE, GREY, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
 
 _MM, _US = 1e3, 1e6
 _ANGLES = {"y": v.YAW, "z": v.PITCH}  # view → projected angle of the axis that it shows
-_COMPONENTS = {"x": "black", "y": "#0072B2", "z": "#D55E00"}  # colours of Okabe and Ito
+_COMPONENTS = {"x": "black", "y": BLUE, "z": VERMILION}
 # Blue and green as in the paper's fig. 5, but light, because the core is dark.
 _LOADS = {v.FORCE: ("#56B4E9", "kN", 1e-3), v.MOMENT: ("#009E73", "N m", 1.0)}
 _STEEL = "0.8"
@@ -64,7 +66,7 @@ def flight(dataset: xarray.Dataset) -> Figure:
     for view, axes in views.items():
         for label, pose in poses.items():
             outline = silhouette(dataset, pose, view) * _MM
-            axes.add_patch(Polygon(outline, facecolor="0.55", edgecolor="black"))
+            axes.add_patch(Polygon(outline, facecolor=GREY, edgecolor="black"))
             angle = np.degrees(np.arctan2(pose.axis["xyz".index(view)], pose.axis[0]))
             angle = round(float(angle), 1) + 0.0  # no "-0.0"
             axes.text(
@@ -88,7 +90,7 @@ def largest_load(dataset: xarray.Dataset) -> Figure:
     what = f"under the largest force, at {float(dataset[v.TIME][step]) * _US:.1f} µs"
     figure, views = two_views(dataset, [pose], what, room=_ARROW)
     for view, axes in views.items():
-        axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor="0.55", edgecolor="black"))
+        axes.add_patch(Polygon(silhouette(dataset, pose, view) * _MM, facecolor=GREY, edgecolor="black"))
         _draw_force(axes, dataset, step, view)
         _draw_moment(axes, dataset, step, view)
     _add_legend(figure, views["y"])
@@ -181,7 +183,7 @@ def plate(dataset: xarray.Dataset) -> Figure:
             lw=1.0,
             path_effects=edge,
         )
-        panel.plot(dataset[v.HIT_Y] * _MM, dataset[v.HIT_Z] * _MM, "+", color="#D55E00", ms=10, mew=2)
+        panel.plot(dataset[v.HIT_Y] * _MM, dataset[v.HIT_Z] * _MM, "+", color=VERMILION, ms=10, mew=2)
         panel.set(xlim=limits["y"], ylim=limits["z"], title=f"{float(snapshot[v.SNAPSHOT]) * _US:.1f} µs")
     for panel in panels[-1]:
         panel.set_xlabel("y [mm]")
@@ -204,7 +206,7 @@ def save_figures(dataset: xarray.Dataset, folder: Path, stem: str) -> list[Path]
 
 
 def _title(dataset: xarray.Dataset, what: str) -> str:
-    return f"{dataset.attrs[attr.TITLE]}\nhit {dataset.attrs[attr.HIT]}: {what}"
+    return f"{heading(dataset)}\nhit {dataset.attrs[attr.HIT]}: {what}"
 
 
 def two_views(
@@ -250,7 +252,7 @@ def _draw_components(axes: Axes, time: xarray.DataArray, values: xarray.DataArra
 
 def _draw_energy(axes: Axes, time: xarray.DataArray, dataset: xarray.Dataset) -> None:
     """Kinetic energy of translation on the left axis, and the much smaller one of rotation on the right axis."""
-    drawn = ((axes, v.TRANSLATIONAL_ENERGY, "black"), (axes.twinx(), v.ROTATIONAL_ENERGY, "#D55E00"))
+    drawn = ((axes, v.TRANSLATIONAL_ENERGY, "black"), (axes.twinx(), v.ROTATIONAL_ENERGY, VERMILION))
     for side, energy, colour in drawn:
         side.plot(time, dataset[energy], color=colour)
         side.set_ylabel(f"{words(energy)} [J]", color=colour)

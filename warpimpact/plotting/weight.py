@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note
+from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,13 +20,11 @@ if TYPE_CHECKING:
     from warpimpact.analysis.comparison_text import Comparison, Contestant
     from warpimpact.analysis.effectiveness import EffectMeasure
 
-# Colours of Okabe and Ito, as in the figure of a comparison.
 _STYLES = {
-    "": ("mean, or share", "o", "#0072B2"),
-    "_worst_tenth": ("worst tenth", "s", "#D55E00"),
+    "": ("mean, or share", "o", BLUE),
+    "_worst_tenth": ("worst tenth", "s", VERMILION),
     "_worst_point": ("worst hit", "x", "#000000"),
 }
-_GREY = "0.55"
 _AGAINST_WEIGHT = ("base_perforated_share", "base_depth", "limit_velocity")
 _THICKNESS, _NEEDED = "limit_thickness", "limit_areal_density"
 
@@ -74,7 +73,7 @@ def _draw_against_weight(axes: Axes, comparison: Comparison, name: str) -> None:
             if (measure := told.get(name + ending)) is not None:
                 _draw_point(axes, plate.areal_density, measure, style)
         if not math.isnan(told[name].solid):
-            solid: dict[str, Any] = {"color": _GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
+            solid: dict[str, Any] = {"color": GREY, "fillstyle": "none", "markersize": 11.0, "linestyle": "none"}
             axes.plot(plate.areal_density, told[name].solid, "D", label="solid plate of the same weight", **solid)
         _name(axes, plate.name, (plate.areal_density, told[name].value), middle)
     _furnish(axes, _by_name(comparison.plates[0])[name], "areal density of the whole target [kg/m²]")
@@ -94,7 +93,7 @@ def _draw_needed(axes: Axes, comparison: Comparison, name: str) -> None:
         _name(axes, plate.name, (told[_NEEDED].value, told[name].value), middle)
     needed = {_by_name(plate)[_NEEDED].solid for plate in comparison.plates}
     for solid in filter(math.isfinite, needed):
-        axes.axvline(solid, color=_GREY, linestyle="--", label="what a solid plate in place of the target needs")
+        axes.axvline(solid, color=GREY, linestyle="--", label="what a solid plate in place of the target needs")
     _furnish(axes, _by_name(comparison.plates[0])[name], "areal density that the target needs [kg/m²]")
 
 
@@ -111,20 +110,14 @@ def _draw_point(
 ) -> None:
     """A measure over an areal density, with its interval, and that of the density where it is one of a measure."""
     label, marker, colour = style
-    ends = _ends(measure.value, measure.low, measure.high)
-    beside = None if across is None else _ends(density, *across)
+    ends = bars(measure.value, measure.low, measure.high)
+    beside = None if across is None else bars(density, *across)
     point: dict[str, Any] = {"color": colour, "markersize": 6.5, "capsize": 3.0, "zorder": 3}
     axes.errorbar(density, measure.value, yerr=ends, xerr=beside, fmt=marker, label=label, **point)
 
 
 def _middle(densities: Sequence[float]) -> float:
     return 0.5 * (min(densities) + max(densities))
-
-
-def _ends(value: float, low: float, high: float) -> list[list[float]] | None:
-    if math.isnan(low) or math.isnan(high):
-        return None
-    return [[max(0.0, value - low)], [max(0.0, high - value)]]
 
 
 def _name(axes: Axes, name: str, place: tuple[float, float], middle: float) -> None:
@@ -143,5 +136,4 @@ def _furnish(axes: Axes, measure: EffectMeasure, label: str) -> None:
     axes.grid(color="0.92")
     axes.margins(x=0.18)
     axes.ticklabel_format(axis="both", useOffset=False)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    hide_sides(axes, "top", "right")

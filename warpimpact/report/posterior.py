@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from warpimpact.identification.text import posterior_text
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import attributes as attr
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.results.files import aside
 
 _FIGURES = {
@@ -44,7 +44,7 @@ def write_posterior_report(tree: xarray.DataTree, path: Path) -> None:
         "content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
         f"<title>{title}</title><style>{_STYLE}</style></head><body><h1>{title}</h1>"
         f"<pre>{escape(posterior_text(tree))}</pre>{drawn}"
-        f"<h2>The fit</h2><pre>{escape(str(told[files.FIT]))}</pre><p>{made}</p></body></html>\n"
+        f"<h2>The fit</h2><pre>{escape(str(told[posterior_file.FIT]))}</pre><p>{made}</p></body></html>\n"
     )
     with aside(path) as file:
         file.write_text(page, encoding="utf-8")

@@ -24,7 +24,7 @@ import warpimpact
 from warpimpact.analysis.effectiveness import SHOWN_UNITS
 from warpimpact.analysis.numbers import interval_text, intervals_text, number_text
 from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data, worst_and_spread
-from warpimpact.report.words import compared, conclusion, study_table, told
+from warpimpact.report.words import compared, conclusion, result_content, study_table
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import hit_numbers
 from warpimpact.results.files import aside
@@ -57,7 +57,7 @@ def write_report(
         OutputError: the file cannot be written.
         ResultError, CampaignError: a hit cannot be replayed.
     """
-    results = [told(name, dataset) for name, dataset in datasets.items()]
+    results = [result_content(name, dataset) for name, dataset in datasets.items()]
     worst = [
         list(dict.fromkeys(measure.hit for measure in result["measures"] if measure.hit is not None))
         for result in results

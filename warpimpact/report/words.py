@@ -18,7 +18,7 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effectiveness
 from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
-from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note, slices
+from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note, slices, status_shares
 from warpimpact.analysis.survival import draws_note
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
@@ -26,7 +26,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import passed
 from warpimpact.results.files import ResultError
-from warpimpact.results.measures import STATUSES, Measure
 from warpimpact.results.outlines import outlines
 from warpimpact.studies.accuracy_text import study_text
 
@@ -55,7 +54,7 @@ class Row(NamedTuple):
     interval: str
 
 
-def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
+def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     """Text, tables and drawing of a result for the page; of an open file, one slice at a time is in memory."""
     attributes, measures = dataset.attrs, effectiveness(dataset)
     promise = promise_text(dataset)
@@ -66,6 +65,7 @@ def told(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
         "hits": dataset.sizes["hit"],
         "passed": sum(int(passed(part).sum()) for part in slices(dataset[[v.STATUS]])),
         "asked": _asked(dataset),
+        "evidence": attributes.get(attr.EVIDENCE, "").splitlines(),
         "campaign": attributes.get(attr.CAMPAIGN, ""),
         "promise": promise,
         "numerics": numerics,
@@ -189,20 +189,18 @@ def _plain(value: object) -> str:
 
 
 def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
-    for measure, estimate in estimated(dataset, [Measure.parse(f"P({name})") for name in STATUSES]).items():
-        if estimate.value > 0.0:
-            yield Row(
-                words(measure.variable), f"{estimate.value:.2%}", intervals_text(*ends_of(estimate), "{:.2%}".format)
-            )
+    for status, share in status_shares(dataset).items():
+        yield Row(words(status), f"{share.value:.2%}", intervals_text(*ends_of(share), "{:.2%}".format))
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
     means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
-            at = f" at {measure.standoff * _MM:g} mm" if measure.standoff else ""
             interval = intervals_text(*ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
-            yield Row(f"mean {words(measure.variable)}{at}", measure.display.text(estimate.value, ".2f"), interval)
+            yield Row(
+                f"mean {words(measure.variable)}{measure.place}", measure.display.text(estimate.value, ".2f"), interval
+            )
 
 
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import platform
 import subprocess
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -91,6 +92,11 @@ CORE = _declared("core", "table", _SI)
 PLATE = _declared("plate", "table", _SI)
 IMPACT = _declared("impact", "table", _SI)
 MATERIAL = _declared("material", "table", _SI)
+EVIDENCE = _declared("evidence")
+"""Names of threat and materials with the state of their evidence, and what is beyond it: a line each; not there where
+nothing is to be said."""
+NOT_TESTED = "not tested: "
+"""Begins a line of the evidence that is a doubt."""
 DISCREPANCY = _declared("discrepancy", "table")
 """JSON of the standard deviation that a posterior's model misses by, by units of the Dataset."""
 DISCREPANCY_COUNTS = _declared("discrepancy_counts", "number")
@@ -149,6 +155,11 @@ def with_units(attributes: Mapping[str, Any]) -> dict[str, Any]:
         if name in ATTRIBUTES and (units := ATTRIBUTES[name].units):
             described[f"{name}_units"] = units
     return described
+
+
+def history_line(command: str) -> str:
+    """A line of the history: the time, and the command that has made a result."""
+    return f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact {command}"
 
 
 def versions() -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +11,8 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
+from warpimpact.scene.shots import FARTHEST
+from warpimpact.scene.units import LARGEST
 
 if TYPE_CHECKING:
     import xarray
@@ -44,7 +46,7 @@ def fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | None:
         known: the variables that may be in it.
     """
     found = (_variable_fault(dataset[str(one)], one) for one in known if one in dataset.variables)
-    return next(filter(None, found), None) or _map_fault(dataset, known) or _attribute_fault(dataset.attrs)
+    return next(filter(None, found), None) or _attribute_fault(dataset.attrs) or _map_fault(dataset, known)
 
 
 def study_fault(dataset: xarray.Dataset) -> str | None:
@@ -91,12 +93,12 @@ def _map_fault(dataset: xarray.Dataset, known: Collection[v.Variable]) -> str | 
     if not all(np.isin(status[at : at + _SLICE].values, codes).all() for at in range(0, len(status), _SLICE)):
         return f'its variable "{v.STATUS}" has unknown codes'
     for place in (dataset[name] for name in (v.HIT_Y, v.HIT_Z) if name in dataset.variables):
-        if not all(np.isfinite(place[at : at + _SLICE].values).all() for at in range(0, place.size, _SLICE)):
-            return f'its variable "{place.name}" has values that are not numbers'
+        if not all((np.abs(place[at : at + _SLICE].values) <= FARTHEST).all() for at in range(0, place.size, _SLICE)):
+            return f'its variable "{place.name}" has values that are not numbers, or are more than {FARTHEST:g} m'
     if v.STANDOFF in dataset.coords:
         standoffs = dataset[v.STANDOFF].values
-        if not (np.isfinite(standoffs).all() and np.unique(standoffs).size == standoffs.size):
-            return f'its variable "{v.STANDOFF}" has values that are not numbers, or one of them twice'
+        if not ((np.abs(standoffs) <= LARGEST).all() and np.unique(standoffs).size == standoffs.size):
+            return f'its variable "{v.STANDOFF}" has values that are no lengths, or one of them twice'
     return None
 
 
@@ -139,6 +141,49 @@ def _attribute_fault(attributes: dict[str, Any]) -> str | None:
 
 
 def _is_allowed(name: str, value: Any) -> bool:
+    return _is_of_its_kind(name, value) and _HELD.get(name, lambda value: True)(value)
+
+
+def _is_core(value: str) -> bool:
+    from pydantic import TypeAdapter, ValidationError
+
+    from warpimpact.scene import AnyCore
+
+    try:
+        TypeAdapter[Any](AnyCore).validate_json(value)
+    except ValidationError:
+        return False
+    return True
+
+
+def _is_resolution(value: str) -> bool:
+    from warpimpact.scene import Numerics
+
+    try:
+        return Numerics.model_validate_json(value).explicit is not None
+    except ValueError:
+        return False
+
+
+def _has_number(key: str) -> Callable[[str], bool]:
+    return lambda value: isinstance(json.loads(value).get(key), int | float)
+
+
+_HELD: dict[str, Callable[[Any], bool]] = {
+    attr.CORE: _is_core,
+    attr.RESOLUTION: _is_resolution,
+    attr.ACCURACY: _has_number("share"),
+    attr.MATERIAL: _has_number("resistance"),
+    attr.NUMERICS_GIVEN: lambda value: "fidelity" in json.loads(value),
+    attr.DISCREPANCY: lambda value: all(isinstance(one, int | float) for one in json.loads(value).values()),
+    attr.LAYERS: lambda value: all(isinstance(one, dict) for one in json.loads(value).values()),
+    attr.LIMIT: lambda value: value in v.LIMITS,
+    attr.PLATE_PERIOD: lambda value: bool(((np.asarray(value) > 0.0) & (np.asarray(value) <= LARGEST)).all()),
+}
+"""What the readers of an attribute rely on beyond its kind."""
+
+
+def _is_of_its_kind(name: str, value: Any) -> bool:
     if name in v.OUTLINE_VARIABLES:
         return np.asarray(value).dtype.kind == "f"
     if name not in attr.ATTRIBUTES:

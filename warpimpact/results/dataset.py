@@ -52,6 +52,8 @@ def to_table(
     period: tuple[float, float],
     attributes: Mapping[str, Any],
     double: bool = False,
+    solid: Mapping[str, Any] | None = None,
+    left_out: Collection[str] = (),
 ) -> Table:
     """Gather shots and outcomes into the columns of the hit map.
 
@@ -65,6 +67,8 @@ def to_table(
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
         double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
+        solid: Columns of the solid plate (v.SOLID_VARIABLES, v.SOLID_LIMITS), SI and radians.
+        left_out: Variables that are not stored.
     """
     coordinates: dict[str, Any] = {
         v.HIT: np.arange(len(shots), dtype=np.int32),
@@ -75,8 +79,9 @@ def to_table(
     }
     if v.LAYER_STANDOFF_TILT in outcomes:
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
+    coordinates |= solid or {}
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
-    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES)
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES, *v.GROUPS["solid"])
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     own = own_columns(scene.target, shots)
     values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
@@ -84,10 +89,11 @@ def to_table(
     values |= vars(outcomes) | faces(scene.target)
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
-    variables = (name for name in v.hit_variables() if name in values)
+    variables = (name for name in v.hit_variables() if name in values and name not in left_out)
+    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES}
     return Table.of(
-        stored_columns(variables, values, () if double else v.computed_variables()),
-        stored_columns((name for name in along if name in coordinates), coordinates),
+        stored_columns(variables, values, single),
+        stored_columns((name for name in along if name in coordinates), coordinates, single),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
 
@@ -97,16 +103,9 @@ def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any)
     return in_memory(to_table(scene, shots, outcomes, **arguments).to_xarray())
 
 
-def solid_coordinates(outcomes: Outcomes, *, double: bool = False) -> dict[str, tuple[Any, ...]]:
-    """Outcomes of the first shots against the solid plate of equal areal density, as coordinates of the Dataset of all
-    shots.
-
-    Args:
-        outcomes: SI and radians.
-        double: as in `to_dataset`.
-    """
-    values: dict[str, Any] = {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
-    return stored_columns(v.SOLID_VARIABLES, values, () if double else v.SOLID_VARIABLES)
+def solid_columns(outcomes: Outcomes) -> dict[str, Any]:
+    """What is stored of the first shots at the solid plate of equal areal density, SI and radians."""
+    return {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 from collections.abc import Callable, Collection, Iterator
@@ -14,7 +13,7 @@ import netCDF4
 
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.checks import fault, history_fault, packing_fault, study_fault, unusable
+from warpimpact.results.checks import fault, history_fault, packing_fault, parsed_json, study_fault, unusable
 from warpimpact.results.dataset import numbered
 from warpimpact.results.interrupts import uninterrupted
 from warpimpact.results.netcdf import write_table
@@ -161,8 +160,8 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
     with _netcdf(path) as dataset:
         if v.SETTING in dataset.variables:
             raise ResultError(f"{path}: is a study of the numerics, as warpimpact study writes, not a map of hits")
-        if attr.SWEEP in dataset.attrs and dataset.get(v.STATUS, dataset).dims != (v.HIT,):
-            inputs = list(json.loads(dataset.attrs[attr.SWEEP]))
+        inputs = list(parsed_json(dataset.attrs.get(attr.SWEEP)) or ())
+        if inputs and dataset.get(v.STATUS, dataset).dims != (v.HIT,):
             raise ResultError(
                 f"{path}: is a sweep of {' and '.join(inputs)}; its points are results, or choose one with "
                 f"isel({', '.join(f'{name}=0' for name in inputs)})"

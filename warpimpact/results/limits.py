@@ -14,15 +14,6 @@ from warpimpact.results.dataset import hit_numbers, stored_columns
 if TYPE_CHECKING:
     import xarray
 
-    from warpimpact.results.table import AResult
-    from warpimpact.solver.limit import Limits
-
-
-def with_solid_limits(dataset: AResult, quantity: str, limits: Limits) -> AResult:
-    """The Dataset with the limits of its first shots at the solid plate, as coordinates."""
-    name = v.SOLID_LIMITS[quantity]
-    return dataset.assign_coords(stored_columns((name,), {name: limits.value}))
-
 
 def solid_limits(dataset: xarray.Dataset) -> xarray.Dataset | None:
     """The limits at the solid plate as a result of limits: along "hit", with the attributes of that plate. None if the

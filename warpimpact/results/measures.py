@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, images, is_choice, passed, shots_at_a_plate
 from warpimpact.scene.display import STORED, Unit
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
-from warpimpact.statistics.intervals import Dealt, Estimate
+from warpimpact.statistics.intervals import Dealing, Dealt, Estimate, Estimating
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -108,6 +108,11 @@ class Measure:
         return cls(text, kind, name, standoff)
 
     @property
+    def place(self) -> str:
+        """Where it is measured, such as " at 130 mm"; empty where it has no stand-off."""
+        return f" at {self.standoff * 1e3:g} mm" if self.standoff else ""
+
+    @property
     def least(self) -> float:
         """What no value is below."""
         return -math.inf if self.variable in _SIGNED else 0.0
@@ -184,7 +189,7 @@ class Tally:
         dealt: `replicates`, `images` and `confidence` as in `Dealt`.
     """
 
-    def __init__(self, measure: Measure, **dealt: Any) -> None:
+    def __init__(self, measure: Measure, **dealt: Unpack[Estimating]) -> None:
         kind = "share" if measure.is_binary else measure.kind
         self.measure, self._dealt = measure, Dealt(kind, share=measure.share, **dealt)
 
@@ -197,7 +202,7 @@ class Tally:
         return self._dealt.estimate().within(self.measure.least)
 
 
-def dealing(dataset: Result) -> dict[str, Any]:
+def dealing(dataset: Result) -> Dealing:
     """Arguments of `Dealt` that fit the sampling of a result. The shots at one plate count as one, like images. Chosen
     hits are no longer dealt out in turn."""
     if is_choice(dataset):

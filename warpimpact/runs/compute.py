@@ -13,19 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.posterior import Posterior
+from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import solid_coordinates
+from warpimpact.results.dataset import solid_columns
 from warpimpact.results.table import Table
-from warpimpact.runs.describe import computed_by, described, found_attributes, is_double
+from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
-from warpimpact.scene import Numerics, Shots
+from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.quantities import BY_LAYER
+from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import Found, HitErrors, pilot_size
-from warpimpact.solver.prepare import Prepared, prepare
-from warpimpact.solver.simulate import build, computed, pilot_of, spread_places
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import marched, pilot_of, spread_places
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
@@ -83,24 +85,15 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     Raises:
         DeviceError: the device is absent.
     """
-    images = len(campaign.symmetries)
-    numerics = numerics_of(campaign, task.found)
-    begin = time.perf_counter()
-    prepared = prepare(campaign.scene, task.shots[::images], numerics)
-    preparing = time.perf_counter() - begin
-    build(prepared, worker.device)  # first, so that the measured time is that of computing alone
-    begin = time.perf_counter()
-    outcomes = _outcomes(campaign.drawn, prepared, numerics, worker, of_images(progress, images))
-    elapsed = preparing + time.perf_counter() - begin
-    attributes = computed_by(campaign, worker.device, len(prepared.shots), elapsed)
+    images, numerics, drawn = len(campaign.symmetries), numerics_of(campaign, task.found), campaign.drawn
+    progress = of_images(progress, images)
+    outcomes, elapsed = _outcomes(drawn, campaign.scene, task.shots[::images], numerics, worker, progress)
+    solid = None
+    if task.solid is not None:
+        solid = solid_columns(_outcomes(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
+    attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
-    table = described(campaign, task.shots, outcomes, prepared.resolution, attributes)
-    if task.solid is None:
-        return table
-    reference = campaign.scene.model_copy(update={"target": campaign.target.solid})
-    prepared = prepare(reference, at_solid(campaign, task.solid), numerics)
-    outcomes = _outcomes(campaign.drawn, prepared, numerics, worker)
-    return table.assign_coords(solid_coordinates(outcomes, double=is_double(campaign)))
+    return described(campaign, task.shots, outcomes, numerics, attributes, solid)
 
 
 def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
@@ -111,6 +104,11 @@ def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
 def of_images(progress: Progress | None, images: int) -> Progress | None:
     """Progress in hits of which so many are computed as one."""
     return progress and (lambda done, total: progress(done * images, total * images))
+
+
+def part_of(progress: Progress | None, before: int, total: int) -> Progress | None:
+    """Progress of some shots, behind so many others, in that of all."""
+    return progress and (lambda done, _: progress(before + done, total))
 
 
 def found_in(result: Result) -> tuple[Numerics, bool, float]:
@@ -133,8 +131,9 @@ def _errors(found: Found | None) -> dict[str, float]:
     return {name: error for name, error in told.items() if not math.isnan(error)}
 
 
-def at_solid(campaign: Campaign, shots: Shots) -> Shots:
-    """Shots at the solid plate of equal areal density: it is as heavy as the target of each shot."""
+def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
+    """The solid plate of equal areal density in place of the target, and shots at it: it is as heavy as the target of
+    each shot."""
     target, plate = campaign.target, campaign.plate
     own: dict[str, Any] = {name: shots.columns[name][:, :1] if shots.differs(name, 0) else None for name in BY_LAYER}
     if shots.thickness is not None:
@@ -143,7 +142,7 @@ def at_solid(campaign: Campaign, shots: Shots) -> Shots:
             share = layer.areal_density / layer.thickness / plate.density
             thickness = thickness + share * shots.own_of(target, "thickness", k)
         own["thickness"] = np.broadcast_to(thickness, len(shots)).copy()
-    return replace(shots, **own)
+    return campaign.scene.model_copy(update={"target": target.solid}), replace(shots, **own)
 
 
 def pilot_shots(campaign: Campaign, most: int) -> Shots:
@@ -164,18 +163,21 @@ def pilot_shots(campaign: Campaign, most: int) -> Shots:
 
 def _outcomes(
     drawn: Posterior | None,
-    prepared: Prepared,
+    scene: Scene,
+    shots: Shots,
     numerics: Numerics,
     worker: Worker,
     progress: Progress | None = None,
-) -> Outcomes:
-    """Outcomes of what was prepared. Draws of a posterior may need scenes of their own."""
-    if drawn is None or not drawn.of_scene:
-        return computed(prepared, worker, progress)
-    shots, places, parts = prepared.shots, list[NDArray[np.int64]](), list[Outcomes]()
-    for which, own in drawn.scenes(prepared.scene, shots):
-        parts.append(computed(prepare(own, shots[which], numerics), worker))
+) -> tuple[Outcomes, float]:
+    """Outcomes of shots, and the time [s] that it took to prepare and to compute them, but not to build kernels."""
+    places, parts, building, done = list[NDArray[np.int64]](), list[Outcomes](), 0.0, 0
+    begin = time.perf_counter()
+    for which, own in scenes_of(drawn, scene, shots):
+        prepared = prepare(own, shots[which], numerics)
+        memory = Memory(prepared, find_device(worker.device))
+        building += memory.build()
+        parts.append(marched(memory, worker, part_of(progress, done, len(shots))))
         places.append(which)
-        if progress is not None:
-            progress(sum(map(len, places)), len(shots))
-    return Outcomes.joined(parts)[np.argsort(np.concatenate(places), kind="stable")]
+        done += len(which)
+    elapsed = time.perf_counter() - begin - building
+    return Outcomes.joined(parts)[np.argsort(np.concatenate(places), kind="stable")], elapsed

@@ -5,43 +5,54 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.evidence import evidence_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import to_table
 from warpimpact.results.table import Table
-from warpimpact.scene import Accuracy, Burst, Shots
+from warpimpact.scene import Accuracy, Burst, Numerics, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
+from warpimpact.solver.materials import weakens
 from warpimpact.solver.pilot import Found
-from warpimpact.solver.resolution import Resolution
+from warpimpact.solver.resolution import Resolution, resolve
 
 
 def described(
-    campaign: Campaign, shots: Shots, outcomes: Outcomes, resolution: Resolution, attributes: Mapping[str, Any]
+    campaign: Campaign,
+    shots: Shots,
+    outcomes: Outcomes,
+    numerics: Numerics,
+    attributes: Mapping[str, Any],
+    solid: Mapping[str, Any] | None = None,
 ) -> Table:
     """The columns of some shots of a campaign.
 
     Args:
         shots: whole groups of images.
         outcomes: of the first shot of every group.
-        resolution: with which they were computed.
+        numerics: with which they were computed.
         attributes: those of how they were computed (`computed_by`), and of what is not the same in any campaign.
+        solid: columns of the first shots at the solid plate of equal areal density, SI and radians.
     """
-    table = to_table(
+    told = _campaign(campaign)
+    told |= _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
+    told |= {attr.EVIDENCE: "\n".join(lines)} if (lines := evidence_of(campaign)) else {}
+    return to_table(
         campaign.scene,
         shots,
         outcomes.unfolded(campaign.symmetries),
         period=campaign.hits.covered(campaign.plate),
-        attributes={**_campaign(campaign), **_numerics(campaign, resolution), **attributes},
+        attributes={**told, **attributes},
         double=is_double(campaign),
+        solid=solid,
+        left_out=() if campaign.output.exit_state else v.EXIT_VARIABLES,
     )
-    return table if campaign.output.exit_state else table.drop_vars(v.EXIT_VARIABLES)
 
 
 def is_double(campaign: Campaign) -> bool:
@@ -87,7 +98,7 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
     ligament = campaign.plate.ligament
     told = {
         attr.TITLE: campaign.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact run",
+        attr.HISTORY: attr.history_line("run"),
         attr.CAMPAIGN: campaign.text,
         attr.SAMPLING: campaign.hits.sampling,
         attr.SEED: campaign.hits.seed,

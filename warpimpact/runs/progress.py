@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
 
 from warpimpact.results.measures import Measure
 from warpimpact.solver.pilot import Found
@@ -37,3 +41,37 @@ class RunProgress:
 
 
 Follow = Callable[[RunProgress], None]
+
+
+@contextmanager
+def followed(given: Follow | None) -> Iterator[Follow]:
+    """The function that follows a run: the given one, or a bar in a notebook; elsewhere nothing is shown."""
+    if given is not None or not _in_a_notebook():
+        yield given or (lambda now: None)
+        return
+    with _bar()(unit="hit") as bar:
+
+        def show(now: RunProgress) -> None:
+            bar.total = now.total
+            text = "a pilot looks for the resolution" if now.piloting else f"{now.failed} failed" if now.failed else ""
+            bar.set_postfix_str(text, refresh=False)
+            bar.update(now.done - bar.n)
+
+        yield show
+        bar.refresh()
+
+
+def _bar() -> Any:
+    """The bars of notebooks where they can be shown, else those of a terminal."""
+    if find_spec("ipywidgets"):
+        from tqdm.notebook import tqdm as widget
+
+        return widget
+    from tqdm import tqdm
+
+    return tqdm
+
+
+def _in_a_notebook() -> bool:
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return type(shell).__name__ == "ZMQInteractiveShell"

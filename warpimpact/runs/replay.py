@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.posterior import scenes_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
@@ -67,8 +67,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     drawn = sampler.shots(hit - image - before, len(group) + before)
     images = _at_their_limit(scene, drawn, result, place)
     computed, shot = images[: 1 + before], images[image + before :][:1]
-    if campaign.drawn is not None:
-        ((_, scene),) = campaign.drawn.scenes(scene, computed)
+    ((_, scene),) = scenes_of(campaign.drawn, scene, computed)
     again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
     home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)
@@ -81,7 +80,7 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
             f"hit: got {hit}, but the campaign and the files it names now give another shot than the stored one"
         )
     attributes = {name: value for name, value in result.attrs.items() if name not in _OF_A_MAP} | {
-        attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact replay",
+        attr.HISTORY: f"{result.attrs[attr.HISTORY]}\n{attr.history_line('replay')}",
         attr.HIT: hit,
         attr.AGREEMENT: _agreement(end, stored),
         **attr.versions(),

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,12 +21,13 @@ from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
-from warpimpact.runs.progress import Follow, RunProgress
+from warpimpact.runs.progress import Follow, RunProgress, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manifest
 from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
 from warpimpact.solver.pilot import Found
+from warpimpact.statistics.intervals import Dealing
 from warpimpact.statistics.stopping import looks
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
-        progress: called several times a second.
+        progress: called several times a second; without it a notebook shows a bar.
 
     Returns:
         The Dataset of results/dataset.py, one entry per hit.
@@ -55,9 +55,9 @@ def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = N
         DeviceError: the device is absent.
     """
     total = len(campaign.sampler())
-    with local_team(campaign, device) as team:
+    with local_team(campaign, device) as team, followed(progress) as follow:
         shards = Shards(extent(total, campaign.at_a_plate))
-        end = _fill(campaign, shards, team, progress or (lambda now: None))
+        end = _fill(campaign, shards, team, follow)
     table = joined(shards.shard(index) for index in range(end.shards))
     return in_memory(table.assign_attrs(_attributes(table, end)).to_xarray())
 
@@ -95,7 +95,8 @@ def run_to_file(
         if not parts.begin(resume=resume, overwrite=overwrite):
             return
         try:
-            end = _fill(campaign, parts, members, progress or (lambda now: None))
+            with followed(progress) as follow:
+                end = _fill(campaign, parts, members, follow)
             parts.finish(end.shards, lambda first: _attributes(first, end))
         except KeyboardInterrupt:
             raise Interrupted(f"interrupted; {_kept(parts)}") from None
@@ -218,7 +219,7 @@ class _Watch:
         self._rule = campaign.stop
         tilts = [f"mean(tilt@{last * 1e3:.10g}mm)" for last in campaign.output.standoffs[-1:]]
         measures = measures or ("mean(residual_velocity)", *tilts)
-        dealt = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
+        dealt: Dealing = {"replicates": campaign.replicates, "images": len(campaign.symmetries) * campaign.at_a_plate}
         self._tallies = [Tally(Measure.parse(measure), **dealt) for measure in measures]
         if self._rule is not None:
             rule = self._rule
@@ -289,7 +290,7 @@ class _Watch:
 def _attributes(table: Table, end: _End) -> dict[str, Any]:
     """Global attributes of a complete result over those of its first shard."""
     return {
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} {table.attrs[attr.HISTORY].partition(' ')[2]}",
+        attr.HISTORY: attr.history_line(table.attrs[attr.HISTORY].partition(" warpimpact ")[2]),
         attr.COMPUTE_TIME: end.compute_time,
         attr.HITS_PER_SECOND: end.hits / images(table) / end.compute_time,
         **_computed(table, end.hits),

@@ -11,7 +11,7 @@ from pydantic import Field, ValidationInfo, model_validator
 
 from .files import input_file, read_table
 from .model import Array, Model
-from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass, PositiveStress
+from .units import Length, Number, PositiveDensity, PositiveInertia, PositiveLength, PositiveMass, PositiveStress, Title
 
 # Gauss–Legendre on 32 nodes is exact to degree 63: r⁴ of any polynomial core up to degree 15.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(32)
@@ -45,6 +45,11 @@ class Core(Model, ABC):
         inertia_axial, inertia_transverse: moments of inertia [kg m²] about the axis, and about a line across it through
             the centre of mass; likewise.
         strength: nominal bending stress above which the core counts as broken [Pa]; None is a core that never breaks.
+        threat: name of a bullet in the catalogue. In a file it gives shape, mass and velocity; a key beside it
+            overrides what it gives.
+        standard: whose velocity of that bullet is taken, if impact.velocity is not given; the first one of the
+            catalogue, unless given.
+        velocity_tolerance: whether that velocity scatters evenly within the tolerance of the standard.
     """
 
     mass: PositiveMass | None = None
@@ -53,6 +58,9 @@ class Core(Model, ABC):
     inertia_axial: PositiveInertia | None = None
     inertia_transverse: PositiveInertia | None = None
     strength: PositiveStress | None = None
+    threat: Title | None = None
+    standard: Title | None = None
+    velocity_tolerance: Annotated[bool, Field(strict=True)] = False
 
     if TYPE_CHECKING:  # a field of the drawn cores, a property of the tabulated one
 

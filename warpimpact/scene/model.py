@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, model_validator
 
+from .drawing import html_of
 from .units import MOST_QUOTED, quoted
 
 Array = NDArray[np.float64]
@@ -47,6 +48,10 @@ class Model(BaseModel):
     def __eq__(self, other: object) -> bool:
         """Whether all fields are equal; values computed from them do not count."""
         return isinstance(other, Model) and type(self) is type(other) and self._values == other._values
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return html_of(self)
 
     @property
     def _values(self) -> tuple[Any, ...]:

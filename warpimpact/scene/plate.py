@@ -16,6 +16,7 @@ from .units import (
     PositiveDensity,
     PositiveLength,
     PositiveTime,
+    Title,
 )
 
 INTERVAL = 1.0e-6
@@ -43,6 +44,8 @@ class Plate(Model):
         degradation_depth: d, how far from a contact it weakens along the thickness [m]. A plate no thicker than that
             weakens as a whole, as in the paper; every depth of a thicker one loses the same share of its resistance.
         density: of the material [kg/m³].
+        material: its name in the catalogue. In a file it gives resistance, shear_coefficient and density, and the law
+            of [interaction]; a key beside it overrides what it gives.
         size: extent along y and z of a finite plate centred on the origin [m]; a plate without it is unbounded.
         margin: width of a band along the rim that has no holes [m]. A hole that would reach into it is left out.
             Without a margin the rim cuts holes.
@@ -58,6 +61,7 @@ class Plate(Model):
     degradation_length: PositiveLength = 0.5e-3
     degradation_depth: PositiveLength = 4.0e-3
     density: PositiveDensity = 7850.0
+    material: Title | None = None
     size: tuple[PositiveLength, PositiveLength] | None = None
     margin: PositiveLength | None = None
     pattern: AnyPattern = NoPattern()

@@ -20,6 +20,8 @@ from .units import Angle, AngularVelocity, Obliquity, PositiveSpeed, Tilt, quant
 
 _RIGHT_ANGLE = np.pi / 2
 
+FARTHEST = 100.0
+"""Of hits from the origin [m]."""
 _REPLICATES = 16
 """Unless told otherwise, whatever the count: a larger one keeps the earlier shots. Student's interval over 16 means is
 9 % wider than over very many."""

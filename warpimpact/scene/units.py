@@ -17,7 +17,7 @@ from .display import UNITS, Unit
 
 MOST_QUOTED = 80
 """Characters of input that a message quotes at most, and those of a number with its unit."""
-_LARGEST = 1e30
+LARGEST = 1e30
 """Of a quantity in SI: what is computed of it, such as a volume, stays finite."""
 _RIGHT_ANGLE = math.pi / 2
 _TOWER = re.compile(r"(?:\*\*|\^)\s*(?:[-+]?\d{3}|\(|[-+]?\d+\s*(?:\*\*|\^))|[)⁰¹²³⁴-⁹]\s*(?:\*\*|\^)|[⁰¹²³⁴-⁹]{3}")
@@ -103,8 +103,8 @@ class _Quantity:
             raise self._error(value, f"which is not {self.name}")
         if not math.isfinite(number):
             raise self._error(value, "which is not finite")
-        if abs(number) > _LARGEST:
-            raise self._error(value, f"which is more than {_LARGEST:g}")
+        if abs(number) > LARGEST:
+            raise self._error(value, f"which is more than {LARGEST:g}")
         return self.as_read(number)
 
     def as_read(self, number: float) -> float:

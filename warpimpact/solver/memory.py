@@ -4,6 +4,7 @@ computed at a time, and what the kernels fill."""
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
@@ -115,6 +116,13 @@ class Memory:
         for name, variable in self.stage.Shots.vars.items():
             setattr(shots, name, self.put(prepared.conditions[name], variable.type.dtype))
         return shots
+
+    def build(self) -> float:
+        """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
+        begin = time.perf_counter()
+        for kernel in (self.stage.kernel, free_flight.build(self.variant).kernel):
+            load(kernel, self.device)
+        return time.perf_counter() - begin
 
     def give_up_after(self, way: float) -> None:
         """Give up the last shot after this distance [m] at impact velocity."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import exclusions
 from warpimpact.solver.grid import Grid, block_window, first_window, grids_of
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, resolve
@@ -79,16 +79,16 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     conditions = conditions_of(core, target, shots, materials, resolution)
     deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
-    asked.check_together(
+    exclusions.check_together(
         {
-            asked.NODAL: resolution.nodal,
-            asked.BLOCK: resolution.block,
-            asked.DOUBLE: resolution.double,
-            asked.BENDING: record.bending,
-            asked.LAYERS: len(plates) > 1,
-            asked.BY_PATH: any(one.by_path for one in materials),
-            asked.BURST: burst,
-            asked.DEEP: deep,
+            exclusions.NODAL: resolution.nodal,
+            exclusions.BLOCK: resolution.block,
+            exclusions.DOUBLE: resolution.double,
+            exclusions.BENDING: record.bending,
+            exclusions.LAYERS: len(plates) > 1,
+            exclusions.BY_PATH: any(one.by_path for one in materials),
+            exclusions.BURST: burst,
+            exclusions.DEEP: deep,
         }
     )
     # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.kernels import free_flight, march
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.device import find_device, load
+from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import HitErrors, pilot_hits, pilot_size
@@ -62,7 +61,11 @@ def simulate(
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
     """Compute what was prepared; see `simulate`."""
-    memory = Memory(prepared, find_device(worker.device))
+    return marched(Memory(prepared, find_device(worker.device)), worker, progress)
+
+
+def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
+    """Compute what is in the memory of a device; see `simulate`."""
     march = March(memory, worker.threads)
     contact = march.march(progress, worker.cancel)
     return outcomes_of(march.memory, contact)
@@ -98,12 +101,6 @@ def spread_places(places: int, count: int) -> NDArray[np.int64]:
     digits = max(1, (count - 1).bit_length())
     order = np.array([int(f"{k:0{digits}b}"[::-1], 2) for k in range(2**digits)])
     return np.asarray(np.linspace(0, places, count, endpoint=False).astype(np.int64)[order[order < count]])
-
-
-def build(prepared: Prepared, device: str = "auto") -> None:
-    """Compile the kernels that `computed` needs, once per version and machine."""
-    for stage in (march, free_flight):
-        load(stage.build(prepared.variant).kernel, find_device(device))
 
 
 def outcomes_of(memory: Memory, contact: Any) -> Outcomes:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 
-from warpimpact.statistics.intervals import Array, Estimate, estimate_of
+from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 
 
 def cluster_numbers(values: Array) -> Array:
@@ -27,7 +27,7 @@ def cluster_numbers(values: Array) -> Array:
     return np.asarray(mean + apart * (len(values) / known.sum()))
 
 
-def cluster_estimate(values: Array, *, binary: bool = False, **dealt: Any) -> Estimate:
+def cluster_estimate(values: Array, *, binary: bool = False, **dealt: Unpack[Estimating]) -> Estimate:
     """Mean of all values with its interval; `count` is the number of values.
 
     Args:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from warpimpact.statistics.intervals import Array, Estimate, estimate_of
+from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 
 
 def difference_of_independent(one: Estimate, other: Estimate) -> tuple[float, float]:
@@ -68,7 +68,7 @@ class Ratio(NamedTuple):
     high: float = math.nan
 
     @classmethod
-    def of(cls, estimate: Estimate, numbers: Array, reference: Array | None, dealt: dict[str, Any]) -> Ratio:
+    def of(cls, estimate: Estimate, numbers: Array, reference: Array | None, dealt: Estimating) -> Ratio:
         """Ratio to the mean of other numbers.
 
         Args:
@@ -88,7 +88,7 @@ class Ratio(NamedTuple):
         return cls(mean, ratio, low, high)
 
 
-def _of_both(numbers: Array, reference: Array, ratio: float, dealt: dict[str, Any]) -> tuple[float, float]:
+def _of_both(numbers: Array, reference: Array, ratio: float, dealt: Estimating) -> tuple[float, float]:
     """Interval of the ratio r of two means of numbers that are not negative: all r for which the interval of the mean
     of one less r times the other contains 0. It has no upper end (NaN) where the interval of the other contains 0.
 

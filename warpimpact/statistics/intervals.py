@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import Any, Self
+from typing import Self, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,10 +59,23 @@ class Estimate:
         return replace(self, low=low, high=high, parameters=(more[0], more[1]) if more else None)
 
 
-def estimate_of(kind: str, values: Array, **dealt: Any) -> Estimate:
+class Dealing(TypedDict, total=False):
+    """How shots are dealt out, by the arguments of `Dealt`."""
+
+    replicates: int
+    images: int
+
+
+class Estimating(Dealing, total=False):
+    """How shots are dealt out, and the confidence of an interval."""
+
+    confidence: float
+
+
+def estimate_of(kind: str, values: Array, *, share: float = 0.5, **dealt: Unpack[Estimating]) -> Estimate:
     """The estimate from the numbers of all shots; NaN marks a shot that does not count. The arguments are those of
     `Dealt`."""
-    gathered = Dealt(kind, **dealt)
+    gathered = Dealt(kind, share=share, **dealt)
     gathered.add(values)
     return gathered.estimate()
 

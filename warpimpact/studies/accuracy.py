@@ -13,7 +13,6 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -156,7 +155,7 @@ def study(
         values,
         {
             attr.TITLE: campaign.title,
-            attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact study",
+            attr.HISTORY: attr.history_line("study"),
             attr.CAMPAIGN: campaign.text,
             **attr.versions(),
             attr.DEVICE: f"{bench.device.alias} ({bench.device.name})",

@@ -14,20 +14,18 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.posterior import Posterior
+from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
-from warpimpact.results.limits import with_solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, pilot_shots
+from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, part_of, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
-from warpimpact.scene import Numerics, Scene, Shots, Target
-from warpimpact.scene import exclusions as asked
+from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -44,7 +42,6 @@ from warpimpact.solver.limit import (
 )
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import LimitErrors, limits_pilot_size
-from warpimpact.solver.prepare import prepare
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
@@ -55,6 +52,9 @@ if TYPE_CHECKING:
 _UNITS_OF = {quantity: names.value.units for quantity, names in v.LIMITS.items()}
 QUANTILES = {"V50": 0.5, "V05": 0.05}
 """Names of the velocities at which half and a twentieth of the hits perforate."""
+
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ class LimitMap:
             CampaignError: the campaign has no limits, or this search cannot find them.
         """
         try:
-            given = {asked.STOP: campaign.stop is not None, asked.BURST: campaign.burst is not None}
-            asked.check_together({asked.LIMIT: True} | given)
+            given = {exclusions.STOP: campaign.stop is not None, exclusions.BURST: campaign.burst is not None}
+            exclusions.check_together({exclusions.LIMIT: True} | given)
             check_arrests(campaign.scene, campaign.sampler().shots(0, 1))
         except ValueError as error:
             raise CampaignError(str(error)) from None
@@ -104,47 +104,46 @@ class LimitMap:
         Args:
             progress: as in `simulate`.
         """
-        scene, sought, images, found = campaign.scene, self.sought, len(campaign.symmetries), task.found
-        numerics = numerics_of(campaign, found)
+        sought, images, found = self.sought, len(campaign.symmetries), task.found
+        numerics, drawn = numerics_of(campaign, found), campaign.drawn
+        progress, shots = of_images(progress, images), task.shots[::images]
         begin = time.perf_counter()
-        searched = _searched(
-            campaign.drawn, scene, task.shots[::images], sought, numerics, worker, of_images(progress, images)
-        )
+        searched = _searched(drawn, campaign.scene, shots, sought, numerics, worker, progress)
         elapsed = time.perf_counter() - begin
         attributes = {
-            **computed_by(campaign, worker.device, len(task.shots) // images, elapsed),
+            **computed_by(campaign, worker.device, len(shots), elapsed),
             **found_attributes(campaign, found),
             **({attr.LIMIT_ERROR: found.error} if isinstance(found, LimitErrors) else {}),
+            attr.HISTORY: attr.history_line(f"limit --quantity {sought.quantity}"),
             attr.LIMIT: sought.quantity,
             attr.LIMIT_LAYER: sought.layer,
             **self.weights(campaign.target),
             attr.LIMIT_TOLERANCE: sought.tolerance,
             attr.LIMIT_HIGHEST: sought.highest,
         }
+        solid: dict[str, Array] = {}
+        if task.solid is not None:
+            solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
+            attributes |= of_solid
         put = self._put(campaign, task.shots, searched, images)
-        resolution = prepare(scene, put[:1], short_steps(numerics)).resolution
         found_limits = {name: getattr(searched, name.field) for name in v.LIMITS[sought.quantity]}
-        table = described(campaign, put, searched.outcomes.assign(**found_limits), resolution, attributes)
-        begun, *_ = table.attrs[attr.HISTORY].split()
-        table.attrs[attr.HISTORY] = f"{begun} warpimpact limit --quantity {sought.quantity}"
-        return table if task.solid is None else self._beside_solid(campaign, table, task.solid, numerics, worker)
+        outcomes = searched.outcomes.assign(**found_limits)
+        return described(campaign, put, outcomes, short_steps(numerics), attributes, solid)
 
-    def _beside_solid(
-        self, campaign: Campaign, table: Table, solid: Shots, numerics: Numerics, worker: Worker
-    ) -> Table:
-        """The columns with the limits of some shots at the solid plate that is as heavy as the whole target."""
-        plate, sought = campaign.target.solid, replace(self.sought, layer=0)
-        scene = campaign.scene.model_copy(update={"target": plate})
+    def _at_solid(
+        self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker
+    ) -> tuple[dict[str, Array], dict[str, float]]:
+        """Column and attributes of the limits of some shots at the solid plate that is as heavy as the whole target."""
+        (scene, shots), sought = at_solid(campaign, shots), replace(self.sought, layer=0)
         if sought.quantity == "thickness":
             sought = replace(sought, highest=thickest(scene, 0))
         begin = time.perf_counter()
-        searched = _searched(campaign.drawn, scene, at_solid(campaign, solid), sought, numerics, worker)
-        attributes = {
+        searched = _searched(campaign.drawn, scene, shots, sought, numerics, worker)
+        return {v.SOLID_LIMITS[sought.quantity]: searched.value}, {
             attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
-            attr.SOLID_LIMIT_DENSITY: plate.density,
+            attr.SOLID_LIMIT_DENSITY: scene.target.layers[0].density,
             attr.SOLID_LIMIT_HIGHEST: sought.highest,
         }
-        return with_solid_limits(table, sought.quantity, searched).assign_attrs(attr.with_units(attributes))
 
     def pilot(
         self, campaign: Campaign, worker: Worker, trying: Callable[[int], object] = lambda level: None
@@ -189,14 +188,11 @@ def _searched(
     progress: Progress | None = None,
 ) -> Limits:
     """Limits of shots. Draws of a posterior may need scenes of their own."""
-    if drawn is None or not drawn.of_scene:
-        return limits(scene, shots, sought, numerics, worker, progress)
-    places, parts = list[NDArray[np.int64]](), list[Limits]()
-    for which, own in drawn.scenes(scene, shots):
-        parts.append(limits(own, shots[which], sought, numerics, worker))
+    places, parts, done = list[NDArray[np.int64]](), list[Limits](), 0
+    for which, own in scenes_of(drawn, scene, shots):
+        parts.append(limits(own, shots[which], sought, numerics, worker, part_of(progress, done, len(shots))))
         places.append(which)
-        if progress is not None:
-            progress(sum(map(len, places)), len(shots))
+        done += len(which)
     order = np.argsort(np.concatenate(places), kind="stable")
     numbers = ("value", "lower", "upper", "runs", "converged")
     return Limits(

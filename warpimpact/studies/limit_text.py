@@ -18,6 +18,7 @@ from warpimpact.scene.units import quantity as reader_of
 from warpimpact.solver.limit_search import MOST_RUNS
 from warpimpact.solver.pilot import hits_text, limit_error_text
 from warpimpact.studies.limit import QUANTILES, quantiles
+from warpimpact.studies.published import published_lines
 
 _MOST_LISTED = 12
 
@@ -58,7 +59,7 @@ def limits_text(dataset: xarray.Dataset) -> str:
         rows.append(
             f"{open_} hits were not found to {factor * attributes[attr.LIMIT_TOLERANCE]:g} {unit} in {MOST_RUNS} runs"
         )
-    rows += _solid_lines(dataset)
+    rows += [*_solid_lines(dataset), *published_lines(dataset)]
     rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
     rows.append(promise_line(dataset))
     rows += filter(None, [draws_note(dataset)])

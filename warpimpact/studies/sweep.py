@@ -9,7 +9,6 @@ import re
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -314,7 +313,7 @@ def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any
     }
     return shared | {
         attr.TITLE: sweep.title,
-        attr.HISTORY: f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ} warpimpact sweep",
+        attr.HISTORY: attr.history_line("sweep"),
         attr.CAMPAIGN: sweep.text,
         attr.SWEEP: json.dumps({one.name: list(one.labels) for one in sweep.inputs}),
     }

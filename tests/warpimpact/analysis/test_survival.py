@@ -110,4 +110,4 @@ def test_differences_and_ratios_have_an_interval_by_the_parameters(make_plate_re
     line = sentence(comparison)
     assert line.startswith("b better than a by 0.1")
     assert "by hits 0.09" in line
-    assert "by parameters 0.05" in line
+    assert "by parameters 0.0" in line

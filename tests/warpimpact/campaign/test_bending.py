@@ -8,7 +8,7 @@ from warpimpact import Campaign
 from warpimpact.analysis.hit import hit_text
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.cli import main
-from warpimpact.plotting.maps import hit_map
+from warpimpact.plotting.maps import variable_map
 from warpimpact.results import files
 from warpimpact.results.variables import BENDING_VARIABLES, HIT_NUMBERS
 from warpimpact.runs.replay import replay
@@ -53,7 +53,7 @@ def test_from_a_campaign_to_its_result(tmp_path: Path, capsys: pytest.CaptureFix
     row = next(line for line in rows if line[:4] == ["bending", "stress,", "GPa", "mean"])
     assert row[4] == f"{1e-9 * stress.mean():.2f}"
     assert "bending_stress" in HIT_NUMBERS
-    (axes, bar) = hit_map(dataset, "bending_stress").axes
+    (axes, bar) = variable_map(dataset, "bending_stress").axes
     assert "GPa" in bar.get_ylabel() + bar.get_xlabel() + axes.get_title()
 
 

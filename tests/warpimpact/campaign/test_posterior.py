@@ -16,8 +16,8 @@ from warpimpact.campaign import posterior as drawing
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.plotting import hit_map, overview
-from warpimpact.results import posterior as files
+from warpimpact.plotting import overview, variable_map
+from warpimpact.results import posterior_file
 from warpimpact.results.files import read
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
@@ -77,10 +77,10 @@ def posterior(folder: Path, interval: str = "degradation_interval", **of_scene: 
         "interaction": Interaction().model_dump(),
         "discrepancy": {"m s-1": 7.0, "degree": 3.0},
     }
-    told = {files.FIT: "", files.MATERIAL: json.dumps(material), "warpimpact_version": "0"}
-    groups = {name: xarray.Dataset({"a": 1}) for name in files.GROUPS} | {"posterior": draws}
+    told = {posterior_file.FIT: "", posterior_file.MATERIAL: json.dumps(material), "warpimpact_version": "0"}
+    groups = {name: xarray.Dataset({"a": 1}) for name in posterior_file.GROUPS} | {"posterior": draws}
     path = folder / "posterior.nc"
-    files.write(xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=told), **groups}), path)
+    posterior_file.write(xarray.DataTree.from_dict({"/": xarray.Dataset(attrs=told), **groups}), path)
     return path
 
 
@@ -137,7 +137,7 @@ def test_a_mean_has_an_interval_by_hits_and_one_by_parameters(tmp_path: Path) ->
     assert wider[1] - wider[0] > high - low + 1.0
     shown = overview(result).axes[0].get_title()
     assert shown.endswith("mean of hits nearby")
-    assert hit_map(result, "residual_velocity").axes[3].get_ylabel() == "spread over draws and conditions [m/s]"
+    assert variable_map(result, "residual_velocity").axes[3].get_ylabel() == "spread over draws and conditions [m/s]"
 
 
 def test_limits_have_both_intervals_too(tmp_path: Path, monkeypatch, capsys) -> None:
@@ -168,7 +168,7 @@ def test_images_share_their_draw(tmp_path: Path) -> None:
 
 def test_a_result_holds_its_draws_and_replays(tmp_path: Path) -> None:
     result = run(campaign(posterior(tmp_path)), device="cpu")
-    draws = files.read(tmp_path / "posterior.nc", draws_alone=True)["posterior"]
+    draws = posterior_file.read(tmp_path / "posterior.nc", draws_alone=True)["posterior"]
     which = result["posterior_draw"].values.astype(int)
     assert (result["resistance"].values == draws["resistance"].values[0][which]).all()
     assert replay(result, 17, folder=tmp_path).attrs["agreement"] == "bit-identical"

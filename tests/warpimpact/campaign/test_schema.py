@@ -9,9 +9,11 @@ from jsonschema import Draft202012Validator
 from jsonschema.exceptions import best_match
 
 from warpimpact.campaign.schema import campaign_schema
+from warpimpact.firing.schema import firing_schema
 from warpimpact.identification.schema import fit_schema
 
 CAMPAIGNS = sorted((Path(__file__).parents[3] / "campaigns").glob("*.toml"))
+FIRING = [CAMPAIGNS[0].parent / "firing" / "v50_test.toml"]
 FITS = sorted((CAMPAIGNS[0].parent / "fits").glob("*.toml"))
 
 
@@ -132,6 +134,14 @@ def test_a_slip_is_marked_where_it_is(
 ) -> None:
     found = best_match(Draft202012Validator(schema).iter_errors(campaign | {table: campaign[table] | change}))
     assert (found.json_path, named in found.message) == (place, True), found.message
+
+
+@pytest.mark.parametrize("path", FIRING, ids=lambda path: path.stem)
+def test_firing_tests_have_a_schema(path: Path) -> None:
+    test = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert complaints(firing_schema(), test) == []
+    assert complaints(firing_schema(), test | {"tests": 0, "gum": {}}) == ["$", "$.tests"]
+    assert complaints(firing_schema(), test | {"procedure": {"name": "langlie", "lowest": 1}}) == ["$.procedure"]
 
 
 @pytest.mark.parametrize("path", FITS, ids=lambda path: path.stem)

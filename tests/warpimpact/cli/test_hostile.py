@@ -1,6 +1,7 @@
 """Hostile input: one sentence and exit code 2, whatever is in a file; no traceback, no hang, nothing unbounded."""
 
 import io
+import math
 import os
 import random
 import re
@@ -262,7 +263,7 @@ def test_a_result_shows_no_control_characters(
 @pytest.mark.usefixtures("unrendered")
 def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_path: Path) -> None:
     path = tmp_path / "a.nc"
-    files.write(make_result(100).assign_attrs(title=r"costs 5 $ or $\notacommand{"), path)
+    files.write(make_result(100).assign_attrs(title=r"costs 5 $ or \frac{1}{ $"), path)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 0
 
 
@@ -278,10 +279,19 @@ def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) ->
     [
         lambda d: d.assign_attrs(core="[1"),
         lambda d: d.assign_attrs(plate_period="wide"),
+        lambda d: d.assign_attrs(plate_period=[1.0, math.nan]),
+        lambda d: d.assign_attrs(core='{"a": 1}'),
+        lambda d: d.assign_attrs(sweep="{"),
+        lambda d: d.assign_attrs(limit="{"),
+        lambda d: d.assign_attrs(accuracy="{}"),
+        lambda d: d.assign_attrs(resolution='{"fidelity": "draft"}'),
+        lambda d: d.assign_attrs(material='{"density": 1.0}'),
         lambda d: d.assign_attrs(seed="x"),
         lambda d: d.assign_attrs(sampling="sobol"),
         lambda d: d.assign_attrs(title=7),
         lambda d: d.assign(status=d["status"].astype(str)),
+        lambda d: d.assign_coords(hit_z=d["hit_z"] + 1e30),
+        lambda d: d.assign_coords(standoff=d["standoff"] * 1e300),
         lambda d: d.assign(tilt=("standoff", np.zeros(2)), deflection=("standoff", np.zeros(2))),
         lambda d: d.assign(tilt=d["tilt"].assign_attrs(units="furlong")),
     ],

@@ -11,6 +11,7 @@ from jsonschema import Draft202012Validator
 
 from warpimpact import Campaign
 from warpimpact.cli import main
+from warpimpact.firing.plan import read_test
 from warpimpact.identification.reading import read_fit
 from warpimpact.identification.schema import fit_schema
 
@@ -23,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("in_tmp_path")
 def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["examples"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    paths = [*CAMPAIGNS.glob("*.toml"), *CAMPAIGNS.glob("fits/*.toml")]
+    paths = [*CAMPAIGNS.glob("*.toml"), *CAMPAIGNS.glob("fits/*.toml"), *CAMPAIGNS.glob("firing/*.toml")]
     assert [line.split()[0] for line in lines] == sorted(path.stem for path in paths)
     assert all("?" in line for line in lines)
 
@@ -47,6 +48,12 @@ def test_a_new_fit_can_be_read() -> None:
     assert main(["new", "paper_fit"]) == 0
     assert read_fit("paper_fit.toml").observed == 10
     assert [path.name for path in Path().glob("*.json")] == ["warpimpact.fit.schema.json"]
+
+
+def test_a_new_firing_test_can_be_read_with_its_target() -> None:
+    assert main(["new", "v50_test"]) == 0
+    assert read_test("v50_test.toml").target.campaign == Path("plate_and_base.toml").absolute()
+    assert [path.name for path in Path().glob("*.json")] == ["warpimpact.test.schema.json"]
 
 
 def test_new_overwrites_nothing_unasked(capsys: pytest.CaptureFixture[str]) -> None:

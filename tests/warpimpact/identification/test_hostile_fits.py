@@ -1,6 +1,7 @@
 """Hostile fits: one sentence, whatever a fit file or its posterior holds; no traceback, no hang."""
 
 import json
+import math
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +14,7 @@ from warpimpact.cli import main
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.reading import fit_from
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.results.files import ResultError
 
 TEXT = (Path(__file__).parents[2] / "validation" / "calibration.toml").read_text(encoding="utf-8")
@@ -83,7 +84,12 @@ ALTERATIONS: dict[str, tuple[str, Callable[[xarray.Dataset], xarray.Dataset]]] =
     "words for numbers": ("posterior_predictive", lambda d: d.assign(fitted=d["fitted"].astype(str))),
     "unnamed observations": ("observed_data", lambda d: d.drop_vars("observation")),
     "a size in words": ("/", lambda d: d.assign_attrs(effective_sample_size="large")),
+    "no title": ("/", lambda d: d.drop_attrs().assign_attrs({k: a for k, a in d.attrs.items() if k != "title"})),
+    "an infinite number of draws": ("/", lambda d: d.assign_attrs(wanted_sample_size=math.inf)),
     "a material without tables": ("/", lambda d: d.assign_attrs(material="[1, 2]")),
+    "an infinite draw": ("prior", lambda d: d.assign(resistance=d["resistance"] * math.inf)),
+    "a draw that is none": ("posterior", lambda d: d.assign(resistance=d["resistance"] * math.nan)),
+    "a huge hit": ("posterior", lambda d: d.assign(hit_y=d["hit_y"] + 1e300)),
     "no rows": ("/", lambda d: d.assign_attrs(row_probability='{"a": "b"}')),
 }
 
@@ -93,12 +99,12 @@ def test_an_altered_posterior_is_refused_in_a_sentence(
     case: str, posterior: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     group, change = ALTERATIONS[case]
-    tree = files.read(posterior)
+    tree = posterior_file.read(posterior)
     groups = {name: tree[name].to_dataset() for name in ("/", *tree.children)}
     groups[group] = change(groups[group])
     path = tmp_path / "altered.nc"
-    files.write(xarray.DataTree.from_dict(groups), path)
-    with pytest.raises(ResultError, match="not a posterior of warpimpact identify, or damaged"):
-        files.read(path)
+    posterior_file.write(xarray.DataTree.from_dict(groups), path)
+    with pytest.raises(ResultError, match="not a posterior of warpimpact identify"):
+        posterior_file.read(path)
     assert main(["report", str(path), "-o", str(tmp_path / "a.html")]) == 2
     assert capsys.readouterr().err.count("\n") == 1

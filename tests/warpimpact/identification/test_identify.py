@@ -12,9 +12,10 @@ from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
 from warpimpact.identification.posterior import learnt, parameters_of
+from warpimpact.identification.store import Store
 from warpimpact.identification.text import posterior_text
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
-from warpimpact.results import posterior as files
+from warpimpact.results import posterior_file
 from warpimpact.results.files import OutputError, ResultError
 from warpimpact.runs.run import Interrupted
 
@@ -23,7 +24,7 @@ FitMaker = Callable[..., Fit]
 
 def test_the_file_has_the_groups_that_arviz_reads(posterior: Path) -> None:
     tree = xarray.open_datatree(posterior)
-    assert set(files.GROUPS) == set(tree.children)
+    assert set(posterior_file.GROUPS) == set(tree.children)
     for group in ("posterior", "prior", "sample_stats", "log_likelihood", "posterior_predictive"):
         assert {"chain", "draw"} <= set(tree[group].sizes)
     assert tree["posterior"].sizes == {"chain": 1, "draw": 100, "shot": 2}
@@ -42,7 +43,7 @@ def test_arviz_reads_it(posterior: Path) -> None:
 
 def test_draws_hold_together(posterior: Path) -> None:
     """A draw has the numbers of the set that it is."""
-    tree = files.read(posterior)
+    tree = posterior_file.read(posterior)
     which = tree["sample_stats"]["set"].values[0]
     for name in parameters_of(tree):
         assert tree["posterior"][name].values[0] == pytest.approx(tree["sets"][name].values[which])
@@ -54,17 +55,17 @@ def test_draws_hold_together(posterior: Path) -> None:
 
 
 def test_the_resistance_is_learnt_and_told(posterior: Path) -> None:
-    tree = files.read(posterior)
+    tree = posterior_file.read(posterior)
     resistance = learnt(tree)["resistance"]
     assert resistance.quantiles[2] - resistance.quantiles[0] < 0.8 * (resistance.prior[2] - resistance.prior[0])
     text = posterior_text(tree)
     assert "resistance [GPa]" in text
     assert "effective sample size" in text
-    assert ("NOT CONVERGED" in text) == (not tree.attrs[files.CONVERGED])
+    assert ("NOT CONVERGED" in text) == (not tree.attrs[posterior_file.CONVERGED])
 
 
 def test_figures_are_drawn(posterior: Path) -> None:
-    tree = files.read(posterior)
+    tree = posterior_file.read(posterior)
     assert len(pairs_figure(tree).axes) == 10
     assert len(measured_figure(tree).axes) == 2
     assert len(hits_figure(tree).axes) == 2
@@ -88,10 +89,24 @@ def test_a_resumed_fit_equals_an_undisturbed_one(
     standings: list[FitProgress] = []
     identify_to_file(fit, path, device="cpu", resume=True, progress=standings.append)
     assert standings[-1].resumed >= 64
-    one, other = files.read(posterior), files.read(path)
-    for group in files.GROUPS:
+    one, other = posterior_file.read(posterior), posterior_file.read(path)
+    for group in posterior_file.GROUPS:
         assert one[group].to_dataset().equals(other[group].to_dataset()), group
     assert not path.with_name("posterior.nc.parts").exists()
+
+
+def test_a_batch_with_a_flipped_bit_is_whole_or_none(tmp_path: Path) -> None:
+    store, arrays = Store(tmp_path / "a.nc", {"fit": "a"}), {"points": np.arange(3.0), "misfit_0": np.ones(2)}
+    store.folder.mkdir()
+    store.save(0, arrays)
+    path = store.folder / "batch_000000.npz"
+    whole = path.read_bytes()
+    for place in range(whole.index(b"PK\x01\x02"), len(whole)):  # the directory of the archive
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 8]) + whole[place + 1 :])
+        loaded = store.load(0)
+        assert loaded is None or loaded.keys() == arrays.keys()
+    path.write_bytes(whole)
+    np.testing.assert_equal(store.load(0), arrays)
 
 
 def test_rounds_are_whole_blocks(make_fit: FitMaker, small: tuple[str, str]) -> None:
@@ -104,8 +119,8 @@ def test_another_file_is_no_posterior(tmp_path: Path) -> None:
     path = tmp_path / "other.nc"
     xarray.Dataset({"a": 1}).to_netcdf(path)
     with pytest.raises(ResultError, match="not a posterior of warpimpact identify"):
-        files.read(path)
-    assert not files.is_posterior(path)
+        posterior_file.read(path)
+    assert not posterior_file.is_posterior(path)
 
 
 @pytest.mark.usefixtures("in_tmp_path")

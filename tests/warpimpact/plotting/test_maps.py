@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 
 from warpimpact.kernels.status import Status
-from warpimpact.plotting import cell, hit_map, hit_maps, overview, save_beside, save_maps, status_map
+from warpimpact.plotting import cell, overview, save_beside, save_maps, status_map, variable_map, variable_maps
 from warpimpact.results.outlines import outlines
 from warpimpact.scene import NoPattern
 
@@ -64,7 +64,7 @@ def clear_points(dataset, count):
 
 
 def test_every_pixel_has_the_value_of_the_nearest_hit_across_the_edges(perforated):
-    image = hit_map(perforated, "energy_loss").axes[0].images[0].get_array()
+    image = variable_map(perforated, "energy_loss").axes[0].images[0].get_array()
     assert image.shape == (200, 400)
     columns, rows = np.meshgrid([0, 1, 57, 200, 398, 399], [0, 3, 100, 199])
     for column, row in zip(columns.flat, rows.flat, strict=True):
@@ -73,7 +73,7 @@ def test_every_pixel_has_the_value_of_the_nearest_hit_across_the_edges(perforate
 
 
 def test_rendered_colours_are_those_of_the_colour_bar(perforated):
-    figure = hit_map(perforated, "energy_loss")
+    figure = variable_map(perforated, "energy_loss")
     picture, norm = Picture(figure), figure.axes[0].images[0].norm
     points = clear_points(perforated, 40)
     matches = 0
@@ -87,7 +87,7 @@ def test_rendered_colours_are_those_of_the_colour_bar(perforated):
 
 @pytest.mark.parametrize("variable", ["residual_velocity", "deflection", "tilt"])
 def test_hits_that_did_not_pass_the_plate_are_grey(covered, variable):
-    figure = hit_map(covered, variable)
+    figure = variable_map(covered, variable)
     picture = Picture(figure)
     points = clear_points(covered, 60)
     status = covered["status"].values[[nearest_hit(covered, y, z) for y, z in points]]
@@ -98,11 +98,11 @@ def test_hits_that_did_not_pass_the_plate_are_grey(covered, variable):
 
 
 def test_no_grey_entry_when_every_hit_has_a_value(perforated):
-    assert legend_texts(hit_map(perforated, "tilt").axes[0]) == ["edge of hole"]
+    assert legend_texts(variable_map(perforated, "tilt").axes[0]) == ["edge of hole"]
 
 
 def test_map_is_to_scale_in_millimetres(perforated):
-    figure = hit_map(perforated, "residual_velocity")
+    figure = variable_map(perforated, "residual_velocity")
     axes, _ = figure.axes
     figure.draw_without_rendering()
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("hit y [mm]", "hit z [mm]")
@@ -123,37 +123,37 @@ def test_map_is_to_scale_in_millimetres(perforated):
     ],
 )
 def test_colour_bar_states_quantity_and_unit(perforated, variable, label):
-    assert hit_map(perforated, variable).axes[1].get_ylabel() == label
+    assert variable_map(perforated, variable).axes[1].get_ylabel() == label
 
 
 def test_contact_duration_is_drawn_in_microseconds(perforated):
-    norm = hit_map(perforated, "contact_duration").axes[0].images[0].norm
+    norm = variable_map(perforated, "contact_duration").axes[0].images[0].norm
     assert (norm.vmin, norm.vmax) == pytest.approx((5.0, 50.0))
 
 
 def test_titles_name_campaign_quantity_and_shots(perforated):
-    figure = hit_map(perforated, "tilt", 0.05)
+    figure = variable_map(perforated, "tilt", 0.05)
     assert figure.get_suptitle() == "a test"
     assert figure.axes[0].get_title() == "tilt, 50 mm behind the plate\nangle between core axis and line of fire"
     assert figure.get_supxlabel() == "512 hits, 825 m/s, obliquity 30°; seen from behind the plate"
 
 
 def test_standoff_is_the_largest_unless_given(perforated):
-    last, first = hit_map(perforated, "tilt"), hit_map(perforated, "tilt", 0.05)
+    last, first = variable_map(perforated, "tilt"), variable_map(perforated, "tilt", 0.05)
     assert last.axes[0].images[0].norm.vmax == pytest.approx(np.degrees(1.5))
     assert first.axes[0].images[0].norm.vmax == pytest.approx(np.degrees(0.5))
 
 
 @pytest.mark.parametrize("variable", ["pitch", "yaw"])
 def test_signed_angles_have_a_neutral_zero(perforated, variable):
-    norm = hit_map(perforated, variable).axes[0].images[0].norm
+    norm = variable_map(perforated, variable).axes[0].images[0].norm
     assert norm.vmax == pytest.approx(np.degrees(1.3))
     assert norm.vmin == -norm.vmax
 
 
 @pytest.mark.parametrize("variable", ["energy_loss", "yaw"])
 def test_hole_outline_is_white_between_black_on_any_colour(perforated, variable):
-    figure = hit_map(perforated, variable)
+    figure = variable_map(perforated, variable)
     (line,) = figure.axes[0].lines
     np.testing.assert_allclose(line.get_xdata(), outlines(perforated)["y"] * 1e3)
     np.testing.assert_allclose(line.get_ydata(), outlines(perforated)["z"] * 1e3)
@@ -167,14 +167,14 @@ def test_hole_outline_is_white_between_black_on_any_colour(perforated, variable)
 
 
 def test_solid_plate_has_no_outline(make_result):
-    axes = hit_map(make_result(512, pattern=NoPattern()), "tilt").axes[0]
+    axes = variable_map(make_result(512, pattern=NoPattern()), "tilt").axes[0]
     assert len(axes.lines) == 0
     assert axes.get_legend() is None
 
 
 def test_few_hits_are_points(make_result):
     dataset = make_result(np.tile(MIXED, 10))
-    figure = hit_map(dataset, "residual_velocity")
+    figure = variable_map(dataset, "residual_velocity")
     axes = figure.axes[0]
     assert len(axes.images) == 0
     (points,) = axes.collections
@@ -189,14 +189,14 @@ def test_few_hits_are_points(make_result):
 
 def test_hits_that_leave_gaps_are_points(make_result):
     line = np.stack([np.linspace(-7e-3, 7e-3, 200), np.zeros(200)], axis=-1)
-    axes = hit_map(make_result(200, hits=line), "tilt").axes[0]
+    axes = variable_map(make_result(200, hits=line), "tilt").axes[0]
     assert len(axes.images) == 0
     assert len(axes.collections[0].get_offsets()) == 200
 
 
 def test_hits_outside_the_cell_stay_in_view(make_result):
     hits = np.random.default_rng(1).uniform(-0.011, 0.012, (500, 2))
-    axes = hit_map(make_result(500, hits=hits), "tilt").axes[0]
+    axes = variable_map(make_result(500, hits=hits), "tilt").axes[0]
     assert len(axes.images) == 0
     np.testing.assert_allclose(axes.get_xlim(), [hits[:, 0].min() * 1e3, hits[:, 0].max() * 1e3])
     np.testing.assert_allclose(axes.get_ylim(), [hits[:, 1].min() * 1e3, hits[:, 1].max() * 1e3])
@@ -272,30 +272,32 @@ def test_uniform_results_draw_without_complaint(make_result, status):
     dataset["tilt"][:] = np.nan
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        picture = Picture(overview(dataset))
-    assert np.allclose(picture.colour(5.0, 3.0), GREY, atol=0.01) == (status != Status.PERFORATED)
+        figure = overview(dataset)
+        figure.savefig("/dev/null", format="png")
+    shown = [axes.get_title().split("\n")[0] for axes in figure.axes if axes.get_title()]
+    assert shown == (["residual velocity", "deflection"] if status == Status.PERFORATED else ["status"])
 
 
 def test_no_colour_bar_without_values(make_result):
-    assert len(hit_map(make_result([Status.ARRESTED] * 100), "tilt").axes) == 1
+    assert len(variable_map(make_result([Status.ARRESTED] * 100), "tilt").axes) == 1
 
 
 def test_rounding_is_not_drawn_as_a_pattern(make_result):
     dataset = make_result(100)
     dataset["residual_velocity"][:] = 764.0 + 1e-10 * np.arange(100)
-    norm = hit_map(dataset, "residual_velocity").axes[0].images[0].norm
+    norm = variable_map(dataset, "residual_velocity").axes[0].images[0].norm
     assert norm.vmin < 760.0 or norm.vmin == norm.vmax
 
 
 @pytest.mark.parametrize("variable", ["status", "angular_velocity", "outline_y", "hit_y", "velocity"])
 def test_what_cannot_be_mapped_is_named(perforated, variable):
     with pytest.raises(ValueError, match=f'"{variable}" cannot be mapped; choose one of .*residual_velocity'):
-        hit_map(perforated, variable)
+        variable_map(perforated, variable)
 
 
 def test_an_absent_standoff_is_named(perforated):
     with pytest.raises(ValueError, match="got 200 mm, but the stand-offs are 50 mm, 130 mm"):
-        hit_map(perforated, "tilt", 0.2)
+        variable_map(perforated, "tilt", 0.2)
 
 
 def test_save_maps_writes_one_png_per_map(covered, tmp_path):
@@ -316,13 +318,26 @@ def test_save_maps_writes_one_png_per_map(covered, tmp_path):
             assert np.asarray(image.convert("L")).std() > 10.0
 
 
+def test_maps_without_values_are_left_out(make_result, tmp_path):
+    paths = save_maps(make_result([Status.ARRESTED] * 100), tmp_path, "plate")
+    assert [path.name for path in paths] == ["plate_overview.png", "plate_status.png"]
+
+
+def test_a_long_note_keeps_to_the_figure(perforated):
+    figure = variable_map(perforated.assign_attrs(promise_kept=0), "deflection")
+    figure.canvas.draw()
+    box = figure._supxlabel.get_window_extent()
+    assert (box.x0 > 0.0, box.x1 < figure.bbox.width) == (True, True)
+    assert "\n" in figure.get_supxlabel()
+
+
 def test_maps_beside_each_other_have_one_scale_of_colour_and_of_length(make_result, tmp_path):
     wide, small = make_result(512), make_result(256)
     small = small.assign(residual_velocity=small["residual_velocity"] - 300.0)
     small.attrs["plate_period"] = wide.attrs["plate_period"] / 2
     for axis in "yz":
         small[f"hit_{axis}"] = small[f"hit_{axis}"] / 2
-    figure = hit_maps({"wide": wide, "small": small}, "residual_velocity")
+    figure = variable_maps({"wide": wide, "small": small}, "residual_velocity")
     maps_, bars = [axes for axes in figure.axes if axes.images], [axes for axes in figure.axes if not axes.images]
     assert [axes.get_title().split("\n")[0] for axes in maps_] == ["wide", "small"]
     norms = [axes.images[0].norm for axes in maps_]
@@ -355,5 +370,5 @@ def test_a_layer_has_its_own_holes(perforated):
 def test_a_constant_map_has_the_colour_of_its_scale(make_result):
     dataset = make_result(512)
     dataset["residual_velocity"][:] = 764.0
-    norm = hit_map(dataset, "residual_velocity").axes[0].images[0].norm
+    norm = variable_map(dataset, "residual_velocity").axes[0].images[0].norm
     assert (norm.vmin, norm.vmax) == pytest.approx((0.0, 764.0))

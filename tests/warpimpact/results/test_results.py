@@ -238,5 +238,5 @@ def test_stand_offs_that_name_no_place_of_their_own_are_refused(make_result, tmp
     result = make_result(5)
     places = result["standoff"].copy(data=[standoff, 130e-3])
     files.write(result.assign_coords(standoff=places), tmp_path / "a.nc")
-    with pytest.raises(files.ResultError, match='"standoff" has values that are not numbers, or one of them twice'):
+    with pytest.raises(files.ResultError, match='"standoff" has values that are no lengths, or one of them twice'):
         files.read(tmp_path / "a.nc")

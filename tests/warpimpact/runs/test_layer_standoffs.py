@@ -14,7 +14,7 @@ from warpimpact.kernels.status import Status
 from warpimpact.plotting import poses, trajectory
 from warpimpact.plotting.cell import GREY, STATUS_COLOURS, shown
 from warpimpact.plotting.maps import layers_figure
-from warpimpact.report.words import told
+from warpimpact.report.words import result_content
 from warpimpact.results import files
 from warpimpact.runs.replay import replay
 
@@ -125,7 +125,7 @@ def test_the_legend_of_layers_names_each_colour_once(result: xarray.Dataset) -> 
 
 
 def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:
-    tables = told("a", result)["tables"]
+    tables = result_content("a", result)["tables"]
     assert tables["layer 1"] == {"gap": "60 mm", "thickness": "2 mm", "resistance": "2600 MPa"}
     assert tables["layer 2"]["gap"] == "80 mm"
 
@@ -133,7 +133,7 @@ def test_a_report_tells_every_layer(result: xarray.Dataset) -> None:
 def test_figures_say_what_lies_behind(result: xarray.Dataset) -> None:
     weight = result.attrs["areal_density"]
     assert f"areal density {weight:.1f} kg/m² of the whole target" in inspect_text(result)
-    assert f"the whole target weighs {weight:.3g} kg/m²" in told("a", result)["asked"]
+    assert f"the whole target weighs {weight:.3g} kg/m²" in result_content("a", result)["asked"]
     assert shown(result, "tilt").title.startswith("tilt, 50 mm behind the target")
     assert "on impact and behind the target" in trajectory.flight(replay(result, 3, snapshots=0)).get_suptitle()
 

@@ -16,7 +16,6 @@ from warpimpact.runs.run import run_to_file
 from warpimpact.scene import Numerics
 from warpimpact.solver import device, replay, simulate
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.replay import material_about
 
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -29,9 +28,9 @@ def campaign(tmp_path: Path) -> Campaign:
     return Campaign.from_toml(path)
 
 
-def at_once(prepared: Prepared, *_: object) -> Outcomes:
+def at_once(memory: Memory, *_: object) -> Outcomes:
     """Outcomes without computing: numbers that zlib cannot make smaller."""
-    numbers, n, scene = np.random.default_rng(0), len(prepared.shots), prepared.scene
+    numbers, n, scene = np.random.default_rng(0), len(memory.prepared.shots), memory.prepared.scene
     single = {
         name: numbers.random(n) for name in ("residual_velocity", "deflection", "energy_loss", "contact_duration")
     }
@@ -43,7 +42,7 @@ def at_once(prepared: Prepared, *_: object) -> Outcomes:
 def test_memory_does_not_grow_with_the_count(
     campaign: Campaign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpimpact.runs.compute.computed", at_once)
+    monkeypatch.setattr("warpimpact.runs.compute.marched", at_once)
     run_to_file(campaign, tmp_path / "first.nc", device="cpu")  # imports what is needed
     monkeypatch.setattr("warpimpact.runs.shards.SHARDS", 48)  # 32 shards of 16384, which is quicker than 128
     count = 2**19

@@ -62,6 +62,25 @@ def undisturbed(campaign: Campaign, tmp_path_factory: pytest.TempPathFactory) ->
     return path
 
 
+@pytest.fixture
+def finished(campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits) -> Callable[..., None]:
+    """A function that resumes a run in a file to its end, which has the bits of an undisturbed run."""
+
+    def finished(output: Path, **how: object) -> None:
+        run_to_file(campaign, output, device="cpu", **({"resume": True} | how))
+        assert_same_bits(output, undisturbed)
+
+    return finished
+
+
+def wait_for_a_shard(process: subprocess.Popen, output: Path) -> None:
+    limit = time.monotonic() + PATIENCE
+    while not _shards(output):
+        assert process.poll() is None
+        assert time.monotonic() < limit
+        time.sleep(0.05)
+
+
 def test_runs_killed_at_any_moment_end_with_the_same_bits(
     campaign_file: Path,
     undisturbed: Path,
@@ -115,11 +134,7 @@ def test_a_second_run_on_the_same_result_is_refused(tmp_path: Path, capsys: pyte
         [*WARPIMPACT, *command], env=os.environ | {"PYTHONPATH": str(HERE)}, stderr=subprocess.DEVNULL
     ) as first:
         try:
-            limit = time.monotonic() + PATIENCE
-            while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
-                assert first.poll() is None
-                assert time.monotonic() < limit
-                time.sleep(0.05)
+            wait_for_a_shard(first, output)
             for manner in ("--resume", "--overwrite"):
                 assert main([*command, manner]) == 2
                 sentence = f"warpimpact: error: {output}: another run is writing it; wait for its end or name"
@@ -203,39 +218,34 @@ def broken_off(campaign: Campaign, tmp_path: Path) -> Path:
 
 
 def test_an_interrupted_run_is_neither_lost_nor_overwritten_by_accident(
-    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
+    broken_off: Path, campaign: Campaign, finished: Callable[..., None]
 ) -> None:
     with pytest.raises(OutputError, match=r"contains an unfinished run .* --resume or begin anew with --overwrite"):
         run_to_file(campaign, broken_off, device="cpu")
     standings: list[RunProgress] = []
-    run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
+    finished(broken_off, progress=standings.append)
     assert standings[0].resumed >= 256
     assert standings[-1].done == standings[-1].total == COUNT
-    assert_same_bits(broken_off, undisturbed)
     before = broken_off.stat()
     run_to_file(campaign, broken_off, device="cpu", resume=True)  # a batch system that restarts what is complete
     assert broken_off.stat() == before
 
 
-def test_overwriting_begins_anew(
-    broken_off: Path, campaign: Campaign, undisturbed: Path, assert_same_bits: SameBits
-) -> None:
+def test_overwriting_begins_anew(broken_off: Path, finished: Callable[..., None]) -> None:
     standings: list[RunProgress] = []
-    run_to_file(campaign, broken_off, device="cpu", overwrite=True, progress=standings.append)
+    finished(broken_off, resume=False, overwrite=True, progress=standings.append)
     assert standings[0].resumed == 0
-    assert_same_bits(broken_off, undisturbed)
 
 
 def test_an_old_result_stays_until_the_new_one_is_complete(
-    campaign: Campaign, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
-):
+    campaign: Campaign, tmp_path: Path, finished: Callable[..., None]
+) -> None:
     output = tmp_path / "a.nc"
     output.write_text("old")
     with pytest.raises(Interrupted):
         run_to_file(campaign, output, device="cpu", overwrite=True, progress=stopped_after(1, KeyboardInterrupt()))
     assert output.read_text() == "old"
-    run_to_file(campaign, output, device="cpu", resume=True)  # may replace it: the run that began was allowed to
-    assert_same_bits(output, undisturbed)
+    finished(output)  # may replace it: the run that began was allowed to
 
 
 @pytest.mark.parametrize(
@@ -313,23 +323,18 @@ def _no_number(shards: list[Path]) -> None:
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("harm", [_swap_two, _swap_names, _flip_bits, _cut, _folder_instead, _no_number])
 def test_a_shard_that_lies_is_computed_again_and_told(
-    harm: Callable[[list[Path]], None],
-    broken_off: Path,
-    campaign: Campaign,
-    undisturbed: Path,
-    assert_same_bits: SameBits,
+    harm: Callable[[list[Path]], None], broken_off: Path, finished: Callable[..., None]
 ) -> None:
     harm(_shards(broken_off))
     told: list[str] = []
-    run_to_file(campaign, broken_off, device="cpu", resume=True, tell=told.append)
+    finished(broken_off, tell=told.append)
     assert len(told) == 1
     assert "damaged, or not of this place or campaign; computed again" in told[0]
-    assert_same_bits(broken_off, undisturbed)
     assert not folder_of(broken_off).exists()
 
 
 def test_a_shard_of_another_campaign_is_computed_again(
-    broken_off: Path, campaign: Campaign, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+    broken_off: Path, campaign: Campaign, tmp_path: Path, finished: Callable[..., None]
 ) -> None:
     slower = campaign.model_copy(update={"impact": campaign.impact.model_copy(update={"velocity": 500.0})})
     other = tmp_path / "other.nc"
@@ -339,8 +344,7 @@ def test_a_shard_of_another_campaign_is_computed_again(
     mine.unlink()
     shutil.copy(foreign, mine.with_name(foreign.name))
     with pytest.warns(UserWarning, match="computed again"):
-        run_to_file(campaign, broken_off, device="cpu", resume=True)
-    assert_same_bits(broken_off, undisturbed)
+        finished(broken_off)
 
 
 def _folder_as_manifest(manifest: Path) -> None:
@@ -368,24 +372,19 @@ def _flipped_manifest(manifest: Path) -> None:
     ids=["list", "empty", "number", "deep", "junk", "folder", "flipped"],
 )
 def test_a_damaged_manifest_is_written_again_and_told(
-    harm: Callable[[Path], object],
-    broken_off: Path,
-    campaign: Campaign,
-    undisturbed: Path,
-    assert_same_bits: SameBits,
+    harm: Callable[[Path], object], broken_off: Path, campaign: Campaign, finished: Callable[..., None]
 ) -> None:
     harm(folder_of(broken_off) / "manifest.json")
     with pytest.raises(OutputError, match="contains an unfinished run"):
         run_to_file(campaign, broken_off, device="cpu")
     standings: list[RunProgress] = []
     with pytest.warns(UserWarning, match=r"manifest.json: is damaged; it is written again"):
-        run_to_file(campaign, broken_off, device="cpu", resume=True, progress=standings.append)
+        finished(broken_off, progress=standings.append)
     assert standings[0].resumed >= 256  # a shard tells itself which campaign it is of
-    assert_same_bits(broken_off, undisturbed)
 
 
 def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
-    campaign: Campaign, undisturbed: Path, tmp_path: Path, assert_same_bits: SameBits
+    campaign: Campaign, tmp_path: Path, finished: Callable[..., None]
 ) -> None:
     output = tmp_path / "a.nc"
 
@@ -396,8 +395,7 @@ def test_a_shard_that_is_damaged_during_the_run_ends_it_in_a_sentence(
     with pytest.raises(OutputError, match=r"this shard is missing or damaged; 16 of 16 shards .* with --resume"):
         run_to_file(campaign, output, device="cpu", progress=harm)
     with pytest.warns(UserWarning, match="computed again"):
-        run_to_file(campaign, output, device="cpu", resume=True)
-    assert_same_bits(output, undisturbed)
+        finished(output)
 
 
 def test_shards_are_results_that_xarray_opens_together(broken_off: Path, undisturbed: Path) -> None:
@@ -474,11 +472,7 @@ def test_ctrl_c_stops_cleanly_and_says_how_to_resume(by: signal.Signals, where: 
         text=True,
         start_new_session=True,
     ) as process:
-        limit = time.monotonic() + PATIENCE
-        while not list(tmp_path.glob("a.nc.parts/hits_*.nc")):
-            assert process.poll() is None
-            assert time.monotonic() < limit
-            time.sleep(0.05)
+        wait_for_a_shard(process, output)
         if by == signal.SIGINT:
             os.killpg(process.pid, by)
         else:

@@ -26,7 +26,7 @@ from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_us
 from warpimpact.solver import replay as replaying
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.history import History
-from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.unfold import image_of
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
@@ -61,11 +61,11 @@ def computed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many shots each computation had."""
     counts: list[int] = []
 
-    def counting(prepared: Prepared, *how: Any) -> Outcomes:
-        counts.append(len(prepared.shots))
-        return simulation.computed(prepared, *how)
+    def counting(memory: Memory, *how: Any) -> Outcomes:
+        counts.append(len(memory.prepared.shots))
+        return simulation.marched(memory, *how)
 
-    monkeypatch.setattr(computing, "computed", counting)
+    monkeypatch.setattr(computing, "marched", counting)
     return counts
 
 

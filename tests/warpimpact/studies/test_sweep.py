@@ -61,6 +61,18 @@ def test_a_layer_is_swept_by_its_number(tmp_path: Path) -> None:
         read_sweep(tmp_path / "a.toml")
 
 
+@pytest.mark.parametrize("standoffs", [[["50 mm"], ["50 mm", "130 mm"]], [["50 mm"], ["60 mm"]], [[], ["50 mm"]]])
+def test_points_with_other_standoffs_are_joined(standoffs: list[list[str]], tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(f'{TEXT}\n[sweep]\n"output.standoffs" = {standoffs}\n', encoding="utf-8")
+    sweep = read_sweep(tmp_path / "a.toml", count=8)
+    points = [run(one, device="cpu") for one in sweep.campaigns.values()]
+    found = joined(sweep, points)
+    for number, point in enumerate(points):
+        one, own = found["tilt"].isel(standoffs=number), point["standoff"]
+        np.testing.assert_array_equal(one.sel(standoff=own), point["tilt"])
+        assert one.drop_sel(standoff=own).isnull().all()
+
+
 def test_plates_of_some_weights_are_swept(tmp_path: Path) -> None:
     text = TEXT.replace('thickness = "4 mm"', "") + '[sweep]\nareal_density = ["20 kg/m^2", 25]\n'
     (tmp_path / "a.toml").write_text(text.replace("count = 24", "count = 2"), encoding="utf-8")

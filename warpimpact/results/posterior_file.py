@@ -11,6 +11,7 @@ best                      the set of smallest misfit
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.checks import parsed_json
 from warpimpact.results.files import ResultError, aside
 from warpimpact.results.interrupts import uninterrupted
+from warpimpact.scene.units import LARGEST
 
 if TYPE_CHECKING:
     import xarray
@@ -65,7 +67,10 @@ _OF_A_POSTERIOR: Mapping[str, Mapping[str, tuple[str, ...]]] = {
     "posterior_predictive": {MEASURED: _DRAWS + _OBSERVED, FITTED: _DRAWS + _OBSERVED},
 }
 """Numbers of a posterior beside its parameters, by group, and what they are along."""
+_MAY_LACK = (("best", "misfit"), ("posterior_predictive", MEASURED), ("posterior_predictive", FITTED))
+"""NaN where a core does not come through."""
 _OF_A_PARAMETER = {"prior": _DRAWS, "posterior": _DRAWS, "sets": ("set",), "best": ()}
+_OF_A_REPORT = (attr.TITLE, attr.HISTORY, attr.DEVICE)
 _NUMBERS = (EFFECTIVE, PARETO_K, HIT_NOISE, CONVERGED, WANTED, SETS)
 
 
@@ -96,7 +101,8 @@ def read(path: Path, *, draws_alone: bool = False) -> xarray.DataTree:
     except Exception as error:  # a file that was altered leads xarray into errors of any class
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
     missing = [name for name in GROUPS if name not in loaded.children]
-    untold = [name for name in (attr.WARPIMPACT_VERSION, FIT, MATERIAL) if name not in loaded.attrs]
+    wanted = [attr.WARPIMPACT_VERSION, FIT, MATERIAL, *([] if draws_alone else _OF_A_REPORT)]
+    untold = [name for name in wanted if name not in loaded.attrs]
     if missing or untold:
         what = f'group "{missing[0]}"' if missing else f'attribute "{untold[0]}"'
         raise ResultError(f"{path}: not a posterior of warpimpact identify, it has no {what}")
@@ -125,11 +131,15 @@ def _fault(groups: Mapping[str, xarray.Dataset], attributes: Mapping[Any, Any]) 
         array = groups[group].variables.get(name)
         if array is None or array.dims != dims or array.dtype.kind not in "iuf" or not array.size:
             return f'its group "{group}" has no numbers "{name}" along {dims}'
+        if (group, name) not in _MAY_LACK and not (np.abs(array.values) <= LARGEST).all():
+            return f'its group "{group}" has a number "{name}" that is not finite, or is more than {LARGEST:g}'
         if set(dims) & {*_SHOTS, *_OBSERVED} - groups[group].coords.keys():
             return f'its group "{group}" does not name what "{name}" is along'
     for name in _NUMBERS:
         if not isinstance(attributes.get(name), int | float | np.number):
             return f'its attribute "{name}" is no number'
+    if not math.isfinite(attributes[WANTED]):
+        return f'its attribute "{WANTED}" is not finite'
     shares = parsed_json(attributes.get(ROW_PROBABILITY))
     if not isinstance(shares, dict) or not all(isinstance(one, int | float) for one in shares.values()):
         return f'its attribute "{ROW_PROBABILITY}" is not what it should be'

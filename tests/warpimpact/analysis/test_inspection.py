@@ -1,0 +1,74 @@
+"""What a notebook shows of models and results: drawings that are XML, units, a verdict; and the bar of a run."""
+
+import re
+import sys
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign, ConeCore, Hits, Impact, Layer, Numerics, Plate, SquarePattern, inspect, run
+from warpimpact.analysis.comparison import compare
+from warpimpact.scene import Target
+
+HOLES = SquarePattern(side="4 mm", spacing="8 mm")
+PLATE = Plate(areal_density="30 kg/m^2", resistance="2.6 GPa", pattern=HOLES)
+CAMPAIGN = Campaign(
+    title="a & b",
+    core=ConeCore(diameter="6 mm", length="20 mm", mass="4 g"),
+    plate=PLATE,
+    layer=(Layer(thickness="5 mm", resistance="1 GPa", gap="20 mm"),),
+    impact=Impact(velocity="800 m/s", obliquity=20),
+    hits=Hits(count=16),
+    numerics=Numerics(level=0),
+)
+
+
+def drawings(text: str) -> list[str]:
+    """Names of the drawings of a page, which is read as XML."""
+    root = ElementTree.fromstring(text.replace("<br>", "<br/>"))
+    return [one.attrib["aria-label"] for one in root.iter("svg")]
+
+
+@pytest.mark.parametrize(
+    ("model", "drawn", "told"),
+    [
+        (
+            CAMPAIGN,
+            ["core", "plate", "layers"],
+            {"core.mass": "4 g", "layer[0].gap": "20 mm", "impact.obliquity": "20°"},
+        ),
+        (PLATE, ["plate"], {"thickness": "5.09554 mm", "pattern.spacing": "8 mm, 8 mm", "resistance": "2.6 GPa"}),
+        (PLATE.model_copy(update={"size": ("60 mm", "50 mm")}), ["plate"], {"size": "60 mm, 50 mm"}),
+        (Target(layers=(PLATE,)), ["plate"], {"layers[0].resistance": "2.6 GPa"}),
+        (Hits(count=4), [], {"count": "4"}),
+    ],
+)
+def test_a_notebook_draws_a_model_and_gives_its_units(model, drawn: list[str], told: dict[str, str]) -> None:
+    text = model._repr_html_()
+    assert drawings(text) == drawn
+    cells = re.findall(r"<th[^>]*>([^<]*)</th><td[^>]*>([^<]*)</td>", text)
+    assert told.items() <= dict(cells).items()
+
+
+def test_a_notebook_shows_a_result_with_its_verdict(make_result, make_plate_result) -> None:
+    shown = inspect(make_result([0] * 30 + [1] * 10).assign_attrs(title="a < b"))
+    assert shown.verdict.startswith("30 of 40 cores pass. residual energy fraction, mean ")
+    assert str(shown).startswith("a < b\n")
+    assert drawings(shown._repr_html_()) == ["map of the hits"]
+    assert shown.drawing.count(" Z") == 1 + 40  # a hole, and a mark for every hit
+    plates = [make_plate_result(np.full(64, velocity)) for velocity in (700.0, 800.0)]
+    text = compare(plates, ["a", "b"])._repr_html_()
+    assert dict(re.findall(r"<th[^>]*>([^<]*)</th><td[^>]*>([^<]*)</td>", text))["residual energy fraction, mean"] == "a"
+
+
+@pytest.mark.parametrize(("shell", "shown"), [("ZMQInteractiveShell", True), ("TerminalInteractiveShell", False)])
+def test_a_run_has_a_bar_in_a_notebook(
+    shell: str, shown: bool, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    notebook = SimpleNamespace(get_ipython=type(shell, (), {}))
+    monkeypatch.setitem(sys.modules, "IPython", notebook)
+    monkeypatch.setattr("warpimpact.runs.progress.find_spec", lambda name: None)
+    run(CAMPAIGN, device="cpu")
+    assert ("16/16" in capsys.readouterr().err) == shown

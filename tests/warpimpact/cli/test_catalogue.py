@@ -1,0 +1,66 @@
+"""Names of the catalogue, from the command to what a run prints, stores and draws."""
+
+from pathlib import Path
+
+import pytest
+
+from warpimpact.cli import main
+from warpimpact.plotting import variable_map
+from warpimpact.results import attributes as attr
+from warpimpact.results import files
+
+CAMPAIGN = """
+title = "named"
+catalogue = "own.toml"
+core = { threat = "7.62x51 P80 AP" }
+plate = { material = "own steel", thickness = "20 mm" }
+hits = { sampling = "grid", count = 4 }
+numerics = { level = 0 }
+output = { solid_reference = false }
+"""
+OWN = """
+[[material]]
+name = "own steel"
+density = 7850
+resistance = "1 GPa"
+rows = { "7.62x51 P80 AP" = 3 }
+thickness_high = "10 mm"
+"""
+LINES = (
+    "core: 7.62x51 P80 AP (assumed, as second-hand: bullet mass, velocity)",
+    "plate: own steel, Y 1 GPa (3 limit velocities; nothing assumed)",
+    "not tested: plate is 20 mm thick, but the limit velocities of own steel are of 0 to 10 mm",
+)
+
+
+def test_names_are_carried_along(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("own.toml").write_text(OWN, encoding="utf-8")
+    Path("named.toml").write_text(CAMPAIGN, encoding="utf-8")
+    for command in (["run", "named.toml", "--device", "cpu"], ["inspect", "named.nc"]):
+        assert main(command) == 0
+        told = capsys.readouterr().out.splitlines()
+        assert [line for line in LINES if line not in told] == []
+    dataset = files.read(Path("named.nc"))
+    assert dataset.attrs[attr.EVIDENCE].splitlines() == list(LINES)
+    over = variable_map(dataset, "residual_velocity").get_suptitle().splitlines()
+    assert over[:2] == ["named", "core: 7.62x51 P80 AP (assumed, as second-hand: bullet mass,"]
+    assert main(["report", "named.nc", "-o", "named.html"]) == 0
+    page = Path("named.html").read_text(encoding="utf-8")
+    assert all(line in page for line in LINES)
+
+
+def test_the_command_lists_shows_and_draws(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text(OWN, encoding="utf-8")
+    assert main(["catalogue", "--file", str(own)]) == 0
+    listed = capsys.readouterr().out
+    assert "14.5 mm BS41" in listed
+    assert "own steel" in listed
+    assert main(["catalogue", "14.5 mm B32", "-o", str(tmp_path / "core.png")]) == 0
+    assert "STANAG 4569 level 4" in capsys.readouterr().out
+    assert (tmp_path / "core.png").stat().st_size > 10_000
+    assert main(["catalogue", "7.62x39 API BZ", "-o", str(tmp_path / "no.png")]) == 2
+    assert main(["catalogue", "P80"]) == 2

@@ -1,0 +1,82 @@
+"""What a notebook shows of a result: a map, what comes through, and all its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+import xarray
+
+from warpimpact.analysis.effectiveness import SHOWN_UNITS, effectiveness
+from warpimpact.analysis.hit_map import hit_points
+from warpimpact.analysis.inspect import inspect_text
+from warpimpact.analysis.numbers import intervals_text, number_text
+from warpimpact.analysis.summary import promise_text
+from warpimpact.kernels.status import Status
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import passed
+from warpimpact.results.outlines import outlines
+from warpimpact.scene.drawing import path, picture
+
+_MOST = 2000
+"""Hits that a drawing has."""
+_PASSED, _STOPPED, _FAILED, _EDGE = "#D55E00", "#56B4E9", "#000000", "#d8d8d8"
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """All that a person may ask of a result, as text, and in a notebook with a map.
+
+    Attributes:
+        text: what `warpimpact inspect` prints.
+        verdict: how many cores pass, and the first measure of protection beside that of the solid plate.
+        drawing: an SVG map of how the hits ended, over the holes.
+    """
+
+    text: str
+    verdict: str
+    drawing: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return f"<div><p><b>{escape(self.verdict)}</b></p>{self.drawing}<pre>{escape(self.text)}</pre></div>"
+
+
+def inspect(dataset: xarray.Dataset) -> Inspection:
+    """A result as text, with a verdict and a map; of an open file only a part is in memory at a time."""
+    return Inspection(inspect_text(dataset), verdict(dataset), _drawing(dataset))
+
+
+def verdict(dataset: xarray.Dataset) -> str:
+    """How many cores pass, the first measure of protection, and how exact the numerics are."""
+    hits, first = dataset.sizes["hit"], effectiveness(dataset)[0]
+    interval = intervals_text(first.low, first.high, first.parameters)
+    told = f"{int(passed(dataset).sum())} of {hits} cores pass. {first.label}{SHOWN_UNITS[first.units]} "
+    told += number_text(first.value) + ("" if interval == "-" else f" ({interval})")
+    told += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's"
+    numerics = promise_text(dataset)
+    return f"{told}. Numerics: {numerics}." if numerics else f"{told}."
+
+
+def _drawing(dataset: xarray.Dataset) -> str:
+    """The hits, orange where a core passed, blue where it stopped and black where the computation failed."""
+    if attr.PLATE_PERIOD not in dataset.attrs:
+        return ""
+    needed = [name for name in (v.STATUS, v.BURST_ORDER) if name in dataset]
+    some = dataset[needed].isel(hit=slice(_MOST)).load()
+    hits, status, came = hit_points(some), some[v.STATUS].values, passed(some)
+    half = np.maximum(0.5 * np.asarray(dataset.attrs[attr.PLATE_PERIOD]), np.abs(hits).max(axis=0))
+    holes = np.column_stack([outlines(dataset)[axis] for axis in ("y", "z")])
+    gaps = np.flatnonzero(np.isnan(holes[:, 0]))
+    rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(holes, gaps)] if len(holes) else []
+    mark = 0.006 * half.max() * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    broken = np.isin(status, [one for one in Status if one.failed])
+    kinds = ((came, _PASSED), (~came & ~broken, _STOPPED), (broken, _FAILED))
+    marks = [(path([hit + mark for hit in hits[which]]), colour) for which, colour in kinds]
+    legend = "orange: the core passes; blue: it is stopped; black: not computed; grey: holes"
+    return f"{picture([(path(rings), _EDGE), *marks], -half, half, 'map of the hits')}<br><small>{legend}</small>"

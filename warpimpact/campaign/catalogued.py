@@ -1,0 +1,199 @@
+"""Names of the catalogue in a campaign, replaced by what they stand for; a key beside a name overrides it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from ..catalogue.catalogue import Catalogue
+from ..catalogue.entries import Material, Threat, Velocity
+from ..scene import AnyCore, Core, Layer, Plate
+from ..scene.units import quoted
+from .text import CampaignError
+
+_Table = dict[str, Any]
+_CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
+_OF_ANY_CORE = set(Core.model_fields)
+_LAW = ("linear", "quadratic", "onset")
+"""Keys of [interaction] that belong to a material."""
+
+
+def catalogue_of(data: Mapping[str, Any], name: str, folder: Path) -> Catalogue:
+    """The catalogue of a file: the package's, and the entries of the file that its key `catalogue` names.
+
+    Raises:
+        CampaignError: that file cannot be read; `name` is what errors call the campaign.
+    """
+    given = data.get("catalogue")
+    if not isinstance(given, str) or not (folder / given).is_file():
+        return Catalogue()  # a wrong name is refused where the campaign is validated
+    try:
+        return Catalogue.of(folder / given)
+    except ValueError as error:
+        raise CampaignError(f"{name}: catalogue: {error}") from None
+
+
+def with_threat(data: _Table, catalogue: Catalogue, name: str) -> _Table:
+    """With the core of its threat and, unless the campaign has a velocity, with that of the threat.
+
+    Raises:
+        CampaignError: the catalogue has no such threat, or not what is needed of it.
+    """
+    core = data.get("core")
+    threat = _threat(core, catalogue, f"{name}: core")
+    if threat is None:
+        return data
+    assert isinstance(core, dict)  # it names a threat
+    resolved = data | {"core": core_of(threat, core, f"{name}: core")}
+    impact = data.get("impact", {})
+    if not isinstance(impact, dict) or "velocity" in impact:
+        return resolved
+    velocity = _velocity(threat, core.get("standard"), f"{name}: core.standard")
+    return resolved | {"impact": {"velocity": _shot(velocity, core, f"{name}: core.velocity_tolerance")} | impact}
+
+
+def with_cores(data: _Table, catalogue: Catalogue, name: str) -> _Table:
+    """With the cores of the threats that a fit and its shots name; the velocities of shots are measured.
+
+    Raises:
+        CampaignError: as `with_threat`.
+    """
+    resolved, core, shots = dict(data), data.get("core"), data.get("shot")
+    if (threat := _threat(core, catalogue, f"{name}: core")) is not None:
+        resolved["core"] = core_of(threat, core, f"{name}: core")
+    if isinstance(shots, list):
+        named = (f"{name}: shot[{place}]" for place in range(len(shots)))
+        resolved["shot"] = [
+            with_cores(shot, catalogue, place) if isinstance(shot, dict) else shot
+            for shot, place in zip(shots, named, strict=True)
+        ]
+    return resolved
+
+
+def _threat(core: Any, catalogue: Catalogue, place: str) -> Threat | None:
+    """The threat that a table [core] names, if it does."""
+    if not isinstance(core, dict) or not isinstance(core.get("threat"), str):
+        return None
+    try:
+        return catalogue.threat(core["threat"])
+    except ValueError as error:
+        raise CampaignError(f"{place}.threat: {error}") from None
+
+
+def core_of(threat: Threat, given: Any, place: str) -> _Table:
+    """The table [core] of a threat, under the keys that are given.
+
+    Raises:
+        CampaignError: its core is not known, and no shape is given.
+    """
+    own, base = dict(given), dict(threat.core or {})
+    if threat.core is None and "shape" not in own:
+        raise CampaignError(
+            f'{place}.threat: the catalogue does not know the core of "{threat.name}", only its velocities; give shape '
+            "and what belongs to it"
+        )
+    if own.get("shape", base.get("shape")) != base.get("shape"):
+        base = {key: value for key, value in base.items() if key in _OF_ANY_CORE}
+    if any(own.get(key) is not None for key in ("mass", "density")):
+        base = {key: value for key, value in base.items() if key not in ("mass", "density")}
+    return base | own
+
+
+def _velocity(threat: Threat, standard: Any, place: str) -> Velocity:
+    known = {one.standard: one for one in threat.velocities}
+    if not known:
+        raise CampaignError(f'{place}: the catalogue has no velocity of "{threat.name}"; give impact.velocity')
+    if standard is None:
+        return threat.velocities[0]
+    if standard not in known:
+        raise CampaignError(f"{place}: got {quoted(standard)}, but it must be one of {', '.join(known)}")
+    return known[standard]
+
+
+def _shot(velocity: Velocity, core: Mapping[str, Any], place: str) -> Any:
+    """An impact velocity, or its distribution."""
+    if core.get("velocity_tolerance") is not True:
+        return velocity.value
+    if velocity.tolerance is None:
+        raise CampaignError(f"{place}: the catalogue has no tolerance of {velocity.standard}; give impact.velocity")
+    low, high = velocity.value - velocity.tolerance, velocity.value + velocity.tolerance
+    return {"distribution": "uniform", "low": low, "high": high}
+
+
+def with_materials(data: _Table, catalogue: Catalogue, name: str) -> _Table:
+    """With what the materials of plate and layers are known for, and with their law; no value is a distribution.
+
+    Raises:
+        CampaignError: the catalogue has no such material, or the laws of two materials differ.
+    """
+    found, resolved = dict[str, Material](), dict(data)
+    for place, key, number, table in _plates(data):
+        try:
+            material = catalogue.material(table["material"])
+        except ValueError as error:
+            raise CampaignError(f"{name}: {place}.material: {error}") from None
+        found[place] = material
+        own = plate_of(material, table, calibres(data, {"density": material.density} | table))
+        if number is None:
+            resolved[key] = own
+        else:
+            resolved[key] = [own if k == number else one for k, one in enumerate(resolved[key])]
+    interaction = data.get("interaction", {})
+    if not found or not isinstance(interaction, dict):
+        return resolved
+    return resolved | {"interaction": _law(found, interaction, name) | interaction}
+
+
+def _plates(data: Mapping[str, Any]) -> Iterator[tuple[str, str, int | None, _Table]]:
+    """Place, key, number in a list, and table of every plate that names a material."""
+    plate, layers = data.get("plate"), data.get("layer")
+    if isinstance(plate, dict) and isinstance(plate.get("material"), str):
+        yield "plate", "plate", None, plate
+    for k, layer in enumerate(layers if isinstance(layers, list) else []):
+        if isinstance(layer, dict) and isinstance(layer.get("material"), str):
+            yield f"layer[{k}]", "layer", k, layer
+
+
+def plate_of(material: Material, given: Mapping[str, Any], thickness: float | None) -> _Table:
+    """The table of a plate of a material, under the keys that are given.
+
+    Args:
+        thickness: of the plate in diameters of the core; None where it is not known.
+    """
+    base = {
+        "resistance": material.resistance_at(1.0 if thickness is None else thickness),
+        "shear_coefficient": material.shear_coefficient,
+        "density": material.density,
+    }
+    return base | dict(given)
+
+
+def calibres(data: Mapping[str, Any], plate: Mapping[str, Any]) -> float | None:
+    """Thickness of a plate in diameters of the core; None if something of either is not valid."""
+    solid = {key: value for key, value in plate.items() if key != "pattern" or "areal_density" in plate}
+    try:
+        core = _CORE.validate_python(data.get("core"))
+        model = Layer if {"gap", "offset"} & set(plate) else Plate
+        return calibres_of(core, model.model_validate({"resistance": 1.0} | solid))
+    except ValidationError:
+        return None  # which the validation of the whole campaign says better
+
+
+def calibres_of(core: Core, plate: Plate) -> float:
+    """Thickness of a plate in diameters of the core."""
+    return plate.thickness / (2.0 * core.max_radius)
+
+
+def _law(found: Mapping[str, Material], given: Mapping[str, Any], name: str) -> dict[str, float]:
+    """What the materials say of the law of resistance, which is one for the whole target."""
+    law: dict[str, float] = {}
+    for key in _LAW:
+        values = {getattr(material, key): place for place, material in found.items()}
+        if len(values) > 1 and key not in given:
+            told = " and ".join(f"{value:g} ({place})" for value, place in values.items())
+            raise CampaignError(f"{name}: interaction.{key}: the materials were found with {told}; give one value")
+        law[key] = next(iter(values))
+    return law

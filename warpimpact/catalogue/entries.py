@@ -1,0 +1,173 @@
+"""What an entry of the catalogue holds."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Annotated, Any, Self
+
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
+
+from warpimpact.scene import AnyCore, Core
+from warpimpact.scene.model import Model
+from warpimpact.scene.units import (
+    Length,
+    NonNegativeNumber,
+    Number,
+    Obliquity,
+    PositiveDensity,
+    PositiveLength,
+    PositiveMass,
+    PositiveSpeed,
+    PositiveStress,
+    Speed,
+    Title,
+    quoted,
+)
+
+_CORE: TypeAdapter[Core] = TypeAdapter(AnyCore)
+Name = Annotated[Title, Field(min_length=1, max_length=80)]
+Share = Annotated[Number, Field(ge=0, le=1)]
+
+
+class Velocity(Model):
+    """A velocity that a standard asks for.
+
+    Attributes:
+        standard: its name and level.
+        value: impact velocity [m/s].
+        tolerance: largest deviation from it [m/s]; None where it is not known.
+        range: distance of the muzzle [m]; None where it is not known.
+    """
+
+    standard: Name
+    value: PositiveSpeed
+    tolerance: Speed | None = None
+    range: PositiveLength | None = None
+
+
+class Threat(Model):
+    """A bullet by the name under which it is known, and its core.
+
+    Attributes:
+        name: as `[core] threat` gives it.
+        core: the table `[core]` that it stands for; None where the core is not known.
+        core_density: of the material of the core [kg/m³]; the mass that it gives is shown beside the published one.
+        core_mass: published [kg].
+        core_material, core_hardness: in words.
+        bullet_mass: of the whole bullet [kg], which is not computed.
+        velocities: what standards ask for; the first one is taken unless the campaign names another.
+        known: what is known from where, by what.
+        assumed: what is not known, and what stands in its place, by what.
+    """
+
+    name: Name
+    core: dict[str, Any] | None = None
+    core_density: PositiveDensity | None = None
+    core_mass: PositiveMass | None = None
+    core_material: Title = ""
+    core_hardness: Title = ""
+    bullet_mass: PositiveMass | None = None
+    velocities: tuple[Velocity, ...] = ()
+    known: dict[str, Title]
+    assumed: dict[str, Title] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _has_a_core(self) -> Self:
+        try:
+            _ = self.shape
+        except ValidationError as error:
+            problem = error.errors(include_url=False)[0]
+            place = ".".join(map(str, ("core", *problem["loc"][1:])))
+            raise ValueError(f"{place}: {reason(problem)}") from None
+        return self
+
+    @cached_property
+    def shape(self) -> Core | None:
+        """The core, if its shape is known or assumed."""
+        return None if self.core is None else _CORE.validate_python(self.core)
+
+    @property
+    def evidence(self) -> str:
+        """State of the evidence, as it stands behind the name."""
+        return ("" if self.core else "core not known; ") + evidence(self.known, self.assumed)
+
+
+class Material(Model):
+    """A material of plates, with the law that its strength was found with.
+
+    The law of resistance is Y·(h / d)^thickness_exponent: h is the thickness, d the largest diameter of the core.
+
+    Attributes:
+        name: as `[plate] material` gives it.
+        density: [kg/m³].
+        resistance: Y of a plate as thick as the core is wide [Pa].
+        resistance_low, resistance_high: ends of its 90 % interval [Pa].
+        thickness_exponent: how Y grows with the thickness.
+        shear_coefficient, linear, quadratic, onset: η, C, B and κ of the law.
+        rows: published limit velocities that it was found from, by projectile.
+        sources: keys of their sources.
+        thickness_low, thickness_high, calibres_low, calibres_high, obliquity_low, obliquity_high: range of these rows;
+            calibres are thickness over the diameter of the core.
+        misfit, misfit_p90: median and 90th percentile of the relative error of limit velocities that were left out.
+        coverage: share of them inside their 90 % interval.
+        hardness: Vickers hardness; None where it is not known.
+        known, assumed: as of a threat.
+    """
+
+    name: Name
+    density: PositiveDensity
+    resistance: PositiveStress
+    resistance_low: PositiveStress | None = None
+    resistance_high: PositiveStress | None = None
+    thickness_exponent: Number = 0.0
+    shear_coefficient: NonNegativeNumber = 0.05
+    linear: NonNegativeNumber = 0.0
+    quadratic: NonNegativeNumber = 0.0
+    onset: NonNegativeNumber = 0.005
+    rows: dict[str, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
+    sources: tuple[Title, ...] = ()
+    thickness_low: Length = 0.0
+    thickness_high: Length | None = None
+    calibres_low: NonNegativeNumber = 0.0
+    calibres_high: NonNegativeNumber | None = None
+    obliquity_low: Obliquity = 0.0
+    obliquity_high: Obliquity | None = None
+    misfit: Share | None = None
+    misfit_p90: NonNegativeNumber | None = None
+    coverage: Share | None = None
+    hardness: NonNegativeNumber | None = None
+    known: dict[str, Title] = Field(default_factory=dict)
+    assumed: dict[str, Title] = Field(default_factory=dict)
+
+    def resistance_at(self, calibres: float) -> float:
+        """Y of a plate so many diameters of the core thick [Pa]."""
+        return float(self.resistance * calibres**self.thickness_exponent)
+
+    @property
+    def count(self) -> int:
+        """Rows of all projectiles."""
+        return sum(self.rows.values())
+
+    @property
+    def evidence(self) -> str:
+        """State of the evidence, as it stands behind the name."""
+        misfit = "" if self.misfit is None else f", error of rows left out {self.misfit:.1%} (median)"
+        rows = f"{self.count} limit velocities{misfit}; " if self.count else ""
+        return rows + evidence(self.known, self.assumed)
+
+
+def reason(problem: Any) -> str:
+    """What is wrong with an entry, of a problem that pydantic found."""
+    if problem["type"] in ("missing", "union_tag_not_found"):
+        return "is missing, but must be given"
+    if problem["type"] == "value_error":
+        return str(problem["ctx"]["error"])
+    return f"got {quoted(problem['input'])}, but {problem['msg'].replace('Input should', 'it must')}"
+
+
+def evidence(known: dict[str, str], assumed: dict[str, str]) -> str:
+    """What of an entry is known and what is assumed."""
+    second_hand = [name for name, source in known.items() if "second-hand" in source]
+    parts = {"assumed": list(assumed), "assumed, as second-hand": second_hand}
+    told = [f"{how}: {', '.join(names).replace('_', ' ')}" for how, names in parts.items() if names]
+    return "; ".join(told) or "nothing assumed"

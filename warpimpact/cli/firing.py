@@ -1,0 +1,83 @@
+"""The command test: what a firing test would report of a target, and how far it is off."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .mistakes import memory_told
+from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite
+from .paths import check_output, check_picture, check_suffix
+from .progress import show_run, warn
+
+if TYPE_CHECKING:
+    from warpimpact.firing.plan import FiringTest
+    from warpimpact.firing.response import Response
+
+
+def add_test(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "test",
+        _test,
+        summary="simulate firing tests: V50, its interval, proof at a confidence",
+        description="Fire a test procedure many times at a target whose limit velocities are known or are searched "
+        "first. Print and draw what the tests report beside the truth: V50, spread, how often the interval holds, how "
+        "many shots a precision takes, and the operating characteristic of n shots with at most k perforations. The "
+        "limits of a campaign go to TEST_limits.nc, which a later call takes with --resume.",
+        example="test campaigns/firing/v50_test.toml -o v50_test.nc",
+    )
+    parser.add_argument("test", type=Path, metavar="TEST.toml", help="test file: target, procedure, gun, questions")
+    add_output(parser, "TEST.nc", "result file (default: the test's name, in this folder); the figure is TEST.png")
+    add_device(parser)
+    add_count(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="keep the limits that are computed, and continue a search of them"
+    )
+    add_overwrite(parser, "an existing result with its figure and its limits")
+
+
+def _test(arguments: argparse.Namespace) -> None:
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.firing.plan import read_test
+    from warpimpact.firing.simulate import simulate_test
+    from warpimpact.firing.text import report_lines
+    from warpimpact.plotting.firing import firing_figure
+    from warpimpact.results import firing as files
+
+    test = read_test(arguments.test)
+    output = arguments.output or Path(arguments.test.stem + ".nc")
+    picture = output.with_suffix(".png")
+    replace = arguments.overwrite or arguments.resume
+    check_suffix(output, "a test", ".nc")
+    check_output(output, overwrite=replace)
+    check_picture(picture, overwrite=replace)
+    response, attributes = _response(test, output, arguments)
+    try:
+        dataset = simulate_test(test, response, attributes)
+    except ValueError as error:
+        raise CampaignError(f"{arguments.test}: {error}") from None
+    files.write(dataset, output)
+    print("\n".join(report_lines(dataset)))
+    firing_figure(dataset).savefig(picture, dpi=150)
+    print(f"written to {output}, figure in {picture}")
+
+
+def _response(test: "FiringTest", output: Path, arguments: argparse.Namespace) -> tuple["Response", dict[str, Any]]:
+    """The response of the target; a search writes its limits beside the output."""
+    from warpimpact.firing.target import known_target, searched_target, target_campaign
+
+    known = known_target(test)
+    if known is not None:
+        return known, {}
+    campaign = target_campaign(test, arguments.count)
+    limits = output.with_name(f"{output.stem}_limits.nc")
+    with memory_told(arguments.test), show_run() as progress:
+        return searched_target(
+            campaign,
+            limits,
+            device=arguments.device,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=progress,
+            tell=warn,
+        )

@@ -1,0 +1,131 @@
+"""Fires a procedure many times at a target, each test with its own places and velocities.
+
+What is drawn for shot k of test t depends on the seed, t and k alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.firing.procedures import Procedure
+from warpimpact.firing.response import Response
+from warpimpact.firing.steps import Estimate, Estimated, Optimal, Shot, Steps
+from warpimpact.scene.sampling import stream
+from warpimpact.statistics.quantal import d_optimal, fit_quantal, information
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+_LEAST = 1.0
+"""Slowest velocity that a gun fires at [m/s]."""
+
+
+@dataclass(frozen=True)
+class Firings:
+    """The shots of all tests, each of shape [tests, shots].
+
+    Attributes:
+        aimed, velocity: velocity that was aimed at, and that of the shot [m/s].
+        perforated: whether it perforated.
+        place: which place of the target it hit.
+        used: whether the test had that shot.
+    """
+
+    aimed: Array
+    velocity: Array
+    perforated: Flags
+    place: NDArray[np.int64]
+    used: Flags
+
+    def first(self, shots: int) -> Firings:
+        """The first shots of every test."""
+        return Firings(
+            self.aimed[:, :shots],
+            self.velocity[:, :shots],
+            self.perforated[:, :shots],
+            self.place[:, :shots],
+            self.used[:, :shots],
+        )
+
+
+def uniform(seed: int, column: int, tests: int, most: int) -> Array:
+    """Independent numbers in [0, 1) of one kind for every shot, shape [tests, most]."""
+    return np.stack([stream(seed, (column, shot), 0, tests) for shot in range(most)], axis=1)
+
+
+def fire(procedure: Procedure, response: Response, places: NDArray[np.int64], errors: Array) -> Firings:
+    """Fire all tests.
+
+    Args:
+        places: which place of the response every shot hits, shape [tests, shots].
+        errors: differences of the velocities from those aimed at, shape [tests, shots], as `Gun.errors` gives them.
+    """
+    tests, most = len(places), procedure.most
+    aimed, velocity = np.zeros((2, tests, most))
+    perforated, used = np.zeros((2, tests, most), dtype=bool)
+    procedures = [procedure.steps() for _ in range(tests)]
+    asked = {test: next(steps) for test, steps in enumerate(procedures)}
+    for shot in range(most):
+        _answer_estimates(procedures, asked, (velocity, perforated, used))
+        if not asked:
+            break
+        going = np.array(list(asked))
+        aims = _aims([asked[test] for test in going], velocity[going], perforated[going], used[going])
+        aimed[going, shot] = np.maximum(aims, _LEAST)
+        velocity[going, shot] = np.maximum(aims + errors[going, shot], _LEAST)
+        perforated[going, shot] = response.perforates(places[going, shot], velocity[going, shot])
+        used[going, shot] = True
+        for test in going:
+            became = Shot(float(velocity[test, shot]), bool(perforated[test, shot]))
+            try:
+                asked[test] = procedures[test].send(became)
+            except StopIteration:
+                del asked[test]
+    return Firings(aimed, velocity, perforated, places[:, :most], used)
+
+
+def _aims(asked: Sequence[float | Optimal | Estimated], velocity: Array, perforated: Flags, used: Flags) -> Array:
+    """The velocities to aim at; those that are D-optimal are computed together."""
+    optimal = np.array([isinstance(one, Optimal) for one in asked])
+    aims = np.array([0.0 if isinstance(one, Optimal | Estimated) else one for one in asked])
+    if optimal.any():
+        guesses = [one for one in asked if isinstance(one, Optimal)]
+        location = np.array([np.nan if one.location is None else one.location for one in guesses])
+        scale = np.array([np.nan if one.scale is None else one.scale for one in guesses])
+        fired, answers, counts = velocity[optimal], perforated[optimal], used[optimal]
+        fitted = np.isnan(location)
+        if fitted.any():
+            found = fit_within(fired[fitted], answers[fitted], counts[fitted])
+            location[fitted], scale[fitted] = found
+        aims[optimal] = d_optimal(fired, counts, location, scale)
+    return aims
+
+
+def fit_within(velocity: Array, perforated: Flags, used: Flags) -> tuple[Array, Array]:
+    """Median and standard deviation of greatest likelihood, kept within the velocities fired and their range, as Neyer
+    and 3pod do; where the odds fall with the velocity, the middle and the whole range."""
+    slowest = np.where(used, velocity, np.inf).min(axis=1)
+    fastest = np.where(used, velocity, -np.inf).max(axis=1)
+    fit = fit_quantal(velocity, perforated, used)
+    location = np.where(np.isnan(fit.location), 0.5 * (slowest + fastest), fit.location)
+    wide = np.where(fit.scale > 0.0, fit.scale, fastest - slowest)
+    return np.clip(location, slowest, fastest), np.minimum(wide, fastest - slowest)
+
+
+def _answer_estimates(
+    procedures: Sequence[Steps], asked: dict[int, float | Optimal | Estimated], fired: tuple[Array, Flags, Flags]
+) -> None:
+    """Send the fit so far to the tests that ask for it."""
+    asking = [test for test, one in asked.items() if isinstance(one, Estimated)]
+    if not asking:
+        return
+    velocity, used = fired[0][asking], fired[2][asking]
+    location, scale = fit_within(velocity, fired[1][asking], used)
+    s0, s1, s2 = information(velocity, used, location, scale)
+    for row, test in enumerate(asking):
+        sums = float(s0[row]), float(s1[row]), float(s2[row])
+        asked[test] = procedures[test].send(Estimate(float(location[row]), float(scale[row]), sums))

@@ -1,0 +1,152 @@
+"""A firing test at a target: fired many times, as one Dataset (`results/firing.py`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from warpimpact.firing.estimators import Reports, reported
+from warpimpact.firing.fire import Firings, fire, uniform
+from warpimpact.firing.plan import FiringTest, Proof
+from warpimpact.firing.procedures import Procedure
+from warpimpact.firing.response import Response
+from warpimpact.firing.rules import drawn_places, fair_places
+from warpimpact.records.variable import Variable
+from warpimpact.results import attributes as attr
+from warpimpact.results import firing as f
+from warpimpact.statistics.acceptance import acceptance, clustered_acceptance, fewest_shots
+
+Array = NDArray[np.float64]
+
+QUANTILES = (0.5, 0.05, 0.01)
+"""Shares of perforations whose velocities are given: V50, V05, V01."""
+_PLACES, _VELOCITIES, _NODES = 1, 2, 64
+"""Kinds of numbers that are drawn; equally probable velocities of a shot in a proof."""
+_GRID = 81
+
+
+def simulate_test(test: FiringTest, response: Response, attributes: dict[str, Any] | None = None) -> xarray.Dataset:
+    """Fire a test at a target whose response is known.
+
+    Args:
+        attributes: more global attributes, such as what the search of limits took.
+
+    Raises:
+        ValueError: the rules of fair hits leave no place.
+    """
+    fair_places(test.fair_hit, response)
+    velocity = _grid(response, test.proof)
+    columns = _response(response, velocity)
+    told: dict[str, Any] = {
+        attr.TITLE: test.title,
+        attr.HISTORY: attr.history_line("test"),
+        f.TEST: test.text,
+        f.SETTINGS: test.model_dump_json(exclude_none=True),
+        attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
+        f.TRUE_V50: response.quantile(0.5),
+        f.TRUE_SPREAD: response.spread,
+        f.UNFAIR_YAW: 1.0 - len(fair_places(test.fair_hit, response)) / len(response),
+        f.UNFAIR_VELOCITY: test.gun.unfair,
+    }
+    if response.cell is not None:
+        told[f.CELL] = np.array(response.cell)
+    if test.procedure is not None:
+        firings = fired(test, test.procedure, response)
+        columns |= _tests(firings, reported(firings, test.procedure, test.estimator))
+        if test.precision is not None:
+            columns |= _sizes(test, test.procedure, response)
+    if test.proof is not None:
+        columns |= _proof(test, test.proof, response, velocity)
+        told |= {f.PROOF_SHOTS: proof_shots(test.proof), f.PROOF_ALLOWED: test.proof.allowed}
+        told |= {f.PROOF_VELOCITY: test.proof.velocity}
+    return f.dataset_of(columns, told | (attributes or {}))
+
+
+def fired(test: FiringTest, procedure: Procedure, response: Response) -> Firings:
+    """The shots of all tests."""
+    tests, most = test.tests, procedure.most
+    places = drawn_places(test.fair_hit, response, uniform(test.seed, _PLACES, tests, most), test.seed)
+    errors = test.gun.errors(uniform(test.seed, _VELOCITIES, tests, most))
+    return fire(procedure, response, places, errors)
+
+
+def proof_shots(proof: Proof) -> int:
+    """Shots of a proof: those given, or the fewest that show what a pass is to show."""
+    return proof.shots or fewest_shots(proof.allowed, proof.stop_probability, proof.confidence)
+
+
+def _grid(response: Response, proof: Proof | None) -> Array:
+    """Velocities of the curves, from where nothing perforates to where all does; that of the proof is among them."""
+    finite = response.changes[np.isfinite(response.changes)]
+    own = [] if proof is None or proof.velocity is None else [proof.velocity]
+    low, high = np.min([*finite, *own]), np.max([*finite, *own])
+    margin = 0.05 * max(high - low, 0.02 * high)
+    return np.unique([*np.linspace(max(1.0, low - margin), high + margin, _GRID), *own])
+
+
+def _response(response: Response, velocity: Array) -> dict[Variable, Any]:
+    shares = [response.estimate(float(one)) for one in velocity]
+    quantiles = [response.quantile_estimate(share) for share in QUANTILES]
+    columns: dict[Variable, Any] = {
+        f.VELOCITY: velocity,
+        f.SHARE: [one.value for one in shares],
+        f.SHARE_LOW: [one.low if response.cell else np.nan for one in shares],
+        f.SHARE_HIGH: [one.high if response.cell else np.nan for one in shares],
+        f.QUANTILE: np.array(QUANTILES),
+        f.QUANTILE_VELOCITY: [one.value for one in quantiles],
+        f.QUANTILE_LOW: [one.low for one in quantiles],
+        f.QUANTILE_HIGH: [one.high for one in quantiles],
+    }
+    if response.cell is not None:
+        columns |= {f.CHANGES: response.changes, f.HIT_Y: response.hit_y, f.HIT_Z: response.hit_z, f.YAW: response.yaw}
+        columns |= {f.OUTLINE_Y: response.outline[0], f.OUTLINE_Z: response.outline[1]}
+    return columns
+
+
+def _tests(firings: Firings, reports: Reports) -> dict[Variable, Any]:
+    used = firings.used
+    return {
+        f.SHOT_VELOCITY: np.where(used, firings.velocity, np.nan),
+        f.SHOT_PERFORATED: np.where(used, firings.perforated, -1).astype(np.int8),
+        f.SHOT_PLACE: np.where(used, firings.place, -1).astype(np.int32),
+        f.V50: reports.v50,
+        f.SPREAD: reports.spread,
+        f.V50_LOW: reports.low,
+        f.V50_HIGH: reports.high,
+        f.SHOTS: reports.shots.astype(np.int32),
+    }
+
+
+def _sizes(test: FiringTest, procedure: Procedure, response: Response) -> dict[Variable, Any]:
+    """How exact tests of other sizes are. A test without a V50 is not exact."""
+    precision, true = test.precision, response.quantile(0.5)
+    assert precision is not None
+    sizes = sorted(precision.sizes)
+    longest = fired(test, procedure.of_size(sizes[-1]), response) if procedure.prefixes else None
+    found = []
+    for size in sizes:
+        own = procedure.of_size(size)
+        firings = fired(test, own, response) if longest is None else longest.first(size)
+        v50 = reported(firings, own, test.estimator.without_interval).v50
+        known = v50[~np.isnan(v50)]
+        mean, deviation = (float(known.mean()), float(known.std())) if len(known) else (np.nan, np.nan)
+        within = float((np.abs(known - true) <= precision.within).sum()) / len(v50)
+        found.append((float(firings.used.sum(axis=1).mean()), within, mean - true, deviation))
+    names = (f.SIZE_SHOTS, f.SIZE_WITHIN, f.SIZE_BIAS, f.SIZE_DEVIATION)
+    return {f.SIZE: np.array(sizes, dtype=np.int32), **dict(zip(names, zip(*found, strict=True), strict=True))}
+
+
+def _proof(test: FiringTest, proof: Proof, response: Response, velocity: Array) -> dict[Variable, Any]:
+    """The operating characteristic of a plan at this target, and that of shots that all hit the same place."""
+    shots, allowed = proof_shots(proof), proof.allowed
+    fair = fair_places(test.fair_hit, response)
+    errors = test.gun.errors((np.arange(_NODES) + 0.5) / _NODES)
+    by_place = response.by_place(velocity, errors)[:, fair]
+    return {
+        f.PROOF_PERFORATION: by_place.mean(axis=1),
+        f.PASS: acceptance(shots, allowed, by_place.mean(axis=1)),
+        f.PASS_SAME_PLACE: clustered_acceptance(shots, allowed, by_place),
+    }

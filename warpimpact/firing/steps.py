@@ -1,0 +1,60 @@
+"""What a procedure and those who fire it exchange.
+
+A procedure is a generator per test. It yields a velocity to aim at [m/s] and is sent the Shot that this became; it ends
+when the test is over. For a D-optimal velocity it yields Optimal: these are computed for all tests at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Annotated, Any, NamedTuple, TypeAlias
+
+from pydantic import Field
+
+
+class Shot(NamedTuple):
+    """What a shot became.
+
+    Attributes:
+        velocity: as it was measured [m/s].
+        perforated: whether it perforated.
+    """
+
+    velocity: float
+    perforated: bool
+
+
+class Optimal(NamedTuple):
+    """Asks for the D-optimal velocity (`statistics.quantal.d_optimal`): at the fit of greatest likelihood, or at a
+    guess of the median and the standard deviation [m/s]."""
+
+    location: float | None = None
+    scale: float | None = None
+
+
+class Estimated(NamedTuple):
+    """Asks for the fit of greatest likelihood so far; what is sent back is an Estimate in the place of a Shot."""
+
+
+class Estimate(NamedTuple):
+    """The fit of greatest likelihood within the levels that were fired [m/s], and the information sums of it."""
+
+    location: float
+    scale: float
+    information: tuple[float, float, float]
+
+
+Steps: TypeAlias = Generator["float | Optimal | Estimated", Any, None]
+Count = Annotated[int, Field(strict=True, ge=2, le=1000)]
+
+
+def ends(fired: list[Shot]) -> tuple[float | None, float | None]:
+    """The fastest stop and the slowest perforation; None where there is none."""
+    stops = [shot.velocity for shot in fired if not shot.perforated]
+    perforations = [shot.velocity for shot in fired if shot.perforated]
+    return max(stops, default=None), min(perforations, default=None)
+
+
+def check_range(lowest: float, highest: float) -> None:
+    if lowest >= highest:
+        raise ValueError(f"got lowest = {lowest:g} m/s and highest = {highest:g} m/s, but lowest must be less")

@@ -1,0 +1,159 @@
+"""A simulated firing test as text: the target, what tests report of it, and what the plan of a proof means."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray
+
+from warpimpact.results import attributes as attr
+from warpimpact.results import firing as f
+from warpimpact.statistics.acceptance import acceptance, shown_stop_probability
+from warpimpact.statistics.intervals import Estimate, estimate_of
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the tests of a file are worth.
+
+    Attributes:
+        known: share of the tests that report a V50.
+        bias, deviation: of the reported V50 from the true one [m/s].
+        spread: median of the reported spread [m/s].
+        coverage: share of the reported intervals that contain the true V50, of the tests that report one; None where
+            none does.
+        open: share of the reported intervals that are open on a side.
+        passed: share of the tests that report the required V50; None where none is required.
+    """
+
+    known: Estimate
+    bias: float
+    deviation: float
+    spread: float
+    coverage: Estimate | None
+    open: float
+    passed: Estimate | None
+
+
+def verdict(dataset: xarray.Dataset, required: float | None = None, by: str = "v50") -> Verdict | None:
+    """What the tests of a file are worth; None where no procedure was fired."""
+    if f.V50 not in dataset:
+        return None
+    v50, spread, low, high = (dataset[name].values for name in (f.V50, f.SPREAD, f.V50_LOW, f.V50_HIGH))
+    true, known = float(dataset.attrs[f.TRUE_V50]), ~np.isnan(v50)
+    bounded = ~np.isnan(low) & ~np.isnan(high)
+    held = (low <= true) & (true <= high)
+    coverage = estimate_of("share", held[bounded].astype(float)) if bounded.any() else None
+    reached = v50 if by == "v50" else low
+    passed = None if required is None else estimate_of("share", (np.nan_to_num(reached, nan=-np.inf) >= required) * 1.0)
+    return Verdict(
+        estimate_of("share", known.astype(float)),
+        float(np.mean(v50[known]) - true) if known.any() else np.nan,
+        float(np.std(v50[known])) if known.any() else np.nan,
+        float(np.median(spread[known])) if known.any() else np.nan,
+        coverage,
+        float((np.isinf(low) | np.isinf(high))[bounded].mean()) if bounded.any() else 0.0,
+        passed,
+    )
+
+
+def share_text(estimate: Estimate) -> str:
+    """A share with its interval."""
+    return f"{100 * estimate.value:.3g} % ({100 * estimate.low:.3g} to {100 * estimate.high:.3g} %)"
+
+
+def report_lines(dataset: xarray.Dataset) -> list[str]:
+    """What a file says, as lines for a person."""
+    test = json.loads(dataset.attrs[f.SETTINGS])
+    lines = [str(dataset.attrs[attr.TITLE]), dataset.attrs[f.DISCLAIMER], *_target_lines(dataset)]
+    required = test.get("required") or {}
+    found = verdict(dataset, required.get("v50"), required.get("by", "v50"))
+    if found is not None:
+        lines += _verdict_lines(dataset, found, test)
+    if f.SIZE in dataset:
+        lines += _size_lines(dataset, test["precision"])
+    if f.PASS in dataset:
+        lines += proof_lines(dataset, test["proof"])
+    return lines
+
+
+def _target_lines(dataset: xarray.Dataset) -> list[str]:
+    lines = []
+    for row, share in enumerate(dataset[f.QUANTILE].values):
+        value, low, high = (
+            float(dataset[name][row]) for name in (f.QUANTILE_VELOCITY, f.QUANTILE_LOW, f.QUANTILE_HIGH)
+        )
+        ends = [f"{end:.5g}" if np.isfinite(end) else "open" for end in (low, high)]
+        interval = f"   95 % interval {ends[0]} to {ends[1]}" if f.CHANGES in dataset else ""
+        lines.append(f"target: V{100 * share:02.0f} = {value:.5g} m/s{interval}")
+    lines.append(f"target: half the distance from V16 to V84 is {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s")
+    if f.CHANGES in dataset:
+        hits = dataset.sizes["place"]
+        runs = dataset.attrs.get(f.SEARCH)
+        cost = "" if runs is None else f", {float(runs):.3g} runs of a hit"
+        several = int((np.isfinite(dataset[f.CHANGES].values).sum(axis=1) > 1).sum())
+        lines.append(f"target: {hits} hits{cost}" + (f"; {several} have several limits" if several else ""))
+    unfair = [(f.UNFAIR_YAW, "yaw"), (f.UNFAIR_VELOCITY, "velocity window")]
+    for name, rule in unfair:
+        if dataset.attrs[name] > 0.0:
+            lines.append(f"fair hits: the {rule} refuses {100 * float(dataset.attrs[name]):.3g} % of the shots")
+    return lines
+
+
+def _verdict_lines(dataset: xarray.Dataset, found: Verdict, test: dict[str, Any]) -> list[str]:
+    tests, shots = dataset.sizes["test"], dataset[f.SHOTS].values
+    taken = f"{shots.min()}" if np.ptp(shots) == 0 else f"{shots.min()} to {shots.max()}, mean {shots.mean():.3g},"
+    lines = [f"{test['procedure']['name']}: {tests} tests of {taken} shots"]
+    if found.known.value < 1.0:
+        lines.append(f"reports a V50 in {share_text(found.known)} of the tests")
+    lines += [
+        f"reported V50: {found.bias:+.3g} m/s off on average, standard deviation {found.deviation:.3g} m/s",
+        f"reported spread: median {found.spread:.3g} m/s, of {float(dataset.attrs[f.TRUE_SPREAD]):.3g} m/s",
+    ]
+    if found.coverage is not None:
+        confidence = 100 * float((test.get("estimator") or {}).get("confidence", 0.95))
+        lines.append(
+            f"reported {confidence:g} % interval of V50: contains the true V50 in {share_text(found.coverage)} of the "
+            f"tests; open in {100 * found.open:.3g} %"
+        )
+    if found.passed is not None:
+        lines.append(
+            f"required V50 of {test['required']['v50']:g} m/s: reported in {share_text(found.passed)} of the tests"
+        )
+    return lines
+
+
+def _size_lines(dataset: xarray.Dataset, precision: dict[str, Any]) -> list[str]:
+    within, share = float(precision["within"]), float(precision["share"])
+    enough = np.flatnonzero(dataset[f.SIZE_WITHIN].values >= share)
+    what = f"V50 within ± {within:g} m/s in {100 * share:g} % of the tests"
+    if not len(enough):
+        best = 100 * float(dataset[f.SIZE_WITHIN].values.max())
+        return [f"{what}: not with {int(dataset[f.SIZE].values.max())} shots ({best:.3g} % at best)"]
+    return [f"{what}: {float(dataset[f.SIZE_SHOTS].values[enough[0]]):.3g} shots"]
+
+
+def proof_lines(dataset: xarray.Dataset, proof: dict[str, Any]) -> list[str]:
+    """What the plan of a proof shows, and what this target does in it."""
+    shots, allowed = int(dataset.attrs[f.PROOF_SHOTS]), int(dataset.attrs[f.PROOF_ALLOWED])
+    velocity = float(dataset.attrs[f.PROOF_VELOCITY])
+    stop, confidence = float(proof["stop_probability"]), float(proof["confidence"])
+    row = int(np.abs(dataset[f.VELOCITY].values - velocity).argmin())
+    perforation = float(dataset[f.PROOF_PERFORATION][row])
+    passed, same = (float(dataset[name][row]) for name in (f.PASS, f.PASS_SAME_PLACE))
+    consumer = float(acceptance(shots, allowed, 1.0 - stop))
+    good = 1.0 - perforation >= stop
+    risk = ("producer's", "rejects", 1.0 - passed) if good else ("consumer's", "accepts", passed)
+    shown = 100 * shown_stop_probability(shots, allowed, confidence)
+    return [
+        f"proof: {shots} shots at {velocity:g} m/s, at most {allowed} perforate",
+        f"a pass shows P(stop) >= {shown:.3g} % at {100 * confidence:g} % confidence, if every shot may hit any place",
+        f"a target of P(stop) = {100 * stop:g} % passes in {100 * consumer:.3g} % of the tests",
+        f"this target: P(stop) = {100 * (1.0 - perforation):.4g} %; the plan {risk[1]} it in {100 * risk[2]:.3g} % of "
+        f"the tests ({risk[0]} risk)",
+        f"if all shots of a test hit the same place, it passes in {100 * same:.3g} % of the tests, in place of "
+        f"{100 * passed:.3g} %",
+    ]

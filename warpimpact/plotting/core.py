@@ -1,0 +1,42 @@
+"""Figure of a core to scale: its profile, its centre of mass, and what is assumed of it."""
+
+from __future__ import annotations
+
+from textwrap import wrap
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Core
+
+_MM, _G = 1e3, 1e3
+_STATIONS = 801
+_WIDTH = 7.5  # of the figure [inch]
+
+
+def core_figure(core: Core, title: str, evidence: str) -> Figure:
+    """Draw a core in its section, nose to the left.
+
+    Args:
+        title: its name.
+        evidence: stands below the title.
+    """
+    lines = wrap(evidence, 85)
+    s = np.linspace(0.0, core.length, _STATIONS)
+    r = core.radius(s)
+    height = 0.95 * _WIDTH * 2.0 * core.max_radius / core.length + 1.1 + 0.2 * len(lines)
+    figure = Figure(figsize=(_WIDTH, height), layout="constrained")
+    axes = figure.subplots()
+    outline_s, outline_r = np.concatenate([s, s[::-1]]), np.concatenate([r, -r[::-1]])
+    axes.fill(outline_s * _MM, outline_r * _MM, facecolor="0.8", edgecolor="black", linewidth=1.0)
+    own = core.mass_properties
+    axes.plot(own.centre_of_mass * _MM, 0.0, "+", color="#D55E00", ms=12, mew=2)
+    axes.annotate(
+        "centre of mass", (own.centre_of_mass * _MM, 0.0), (10.0, 0.0), textcoords="offset points", va="center"
+    )
+    axes.set(aspect="equal", xlabel="behind the nose [mm]", ylabel="radius [mm]")
+    numbers = f"{core.length * _MM:.4g} mm, \u2300 {2 * core.max_radius * _MM:.4g} mm, {own.mass * _G:.4g} g"
+    figure.suptitle("\n".join([f"{title}: {numbers}", *lines]), fontsize="medium")
+    return figure

@@ -1,0 +1,26 @@
+"""What figures share: colours, the sides of a panel, and the bars of an interval."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
+"""Colours of Okabe and Ito: they differ in every kind of colour blindness."""
+GREY = "0.55"
+
+
+def hide_sides(axes: Axes, *sides: str) -> None:
+    """Hide sides of the frame of a panel: "top", "right", "left"."""
+    for side in sides:
+        axes.spines[side].set_visible(False)
+
+
+def bars(value: float, low: float, high: float) -> list[list[float]] | None:
+    """The two bars of an interval about a value, as `errorbar` takes them; None where there is no interval."""
+    if math.isnan(low) or math.isnan(high):
+        return None
+    return [[max(0.0, value - low)], [max(0.0, high - value)]]

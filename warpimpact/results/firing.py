@@ -1,0 +1,140 @@
+"""The file of a simulated firing test: its variables and attributes, written whole or not at all.
+
+response        probability of perforation against velocity, and the places that it comes from
+test            what every simulated test reports
+size            how exact tests of other sizes are
+proof           probability that n shots with at most k perforations pass, against velocity
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpimpact.records.variable import Variable
+from warpimpact.results import attributes as attr
+from warpimpact.results.files import ResultError, aside
+from warpimpact.results.interrupts import uninterrupted
+
+if TYPE_CHECKING:
+    import xarray
+
+_TESTS, _SHOTS, _SIZES, _ENDS = ("test",), ("test", "shot"), ("size",), ("bound",)
+
+VELOCITY = Variable("velocity", ("velocity",), "m s-1", "impact velocity")
+SHARE = Variable("perforation_probability", ("velocity",), "1", "probability that a shot at any place perforates")
+SHARE_LOW = Variable("perforation_probability_low", ("velocity",), "1", "lower end of its 95 % interval")
+SHARE_HIGH = Variable("perforation_probability_high", ("velocity",), "1", "upper end of its 95 % interval")
+QUANTILE = Variable("quantile", ("quantile",), "1", "share of the places that perforate")
+QUANTILE_VELOCITY = Variable(
+    "quantile_velocity", ("quantile",), "m s-1", "velocity at which this share of the places perforates"
+)
+QUANTILE_LOW = Variable("quantile_velocity_low", ("quantile",), "m s-1", "lower end of its 95 % interval")
+QUANTILE_HIGH = Variable("quantile_velocity_high", ("quantile",), "m s-1", "upper end of its 95 % interval")
+CHANGES = Variable(
+    "change_velocity",
+    ("place", "change"),
+    "m s-1",
+    "velocity at which the answer of the place changes; it begins stopped",
+)
+HIT_Y = Variable("hit_y", ("place",), "m", "hit point, y")
+HIT_Z = Variable("hit_z", ("place",), "m", "hit point, z")
+YAW = Variable("yaw", ("place",), "degree", "angle between core axis and line of fire at impact")
+
+OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
+OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
+
+SHOT_VELOCITY = Variable("shot_velocity", _SHOTS, "m s-1", "velocity of the shot; no value where the test had ended")
+SHOT_PERFORATED = Variable("shot_perforated", _SHOTS, "1", "1 perforated, 0 stopped, -1 where the test had ended")
+SHOT_PLACE = Variable("shot_place", _SHOTS, "1", "place that the shot hit; -1 where the test had ended")
+V50 = Variable("reported_v50", _TESTS, "m s-1", "V50 that the test reports")
+SPREAD = Variable("reported_spread", _TESTS, "m s-1", "spread that the test reports")
+V50_LOW = Variable("reported_v50_low", _TESTS, "m s-1", "lower end of the interval that the test reports")
+V50_HIGH = Variable("reported_v50_high", _TESTS, "m s-1", "upper end of the interval that the test reports")
+SHOTS = Variable("shots", _TESTS, "1", "shots of the test")
+
+SIZE = Variable("size", _SIZES, "1", "shots of a test; of mil_std_662f those that V50 is the mean of")
+SIZE_SHOTS = Variable("size_shots", _SIZES, "1", "shots that such a test takes, mean")
+SIZE_WITHIN = Variable("size_within", _SIZES, "1", "share of the tests whose V50 is as exact as asked")
+SIZE_BIAS = Variable("size_bias", _SIZES, "m s-1", "mean of the reported V50 less the true one")
+SIZE_DEVIATION = Variable("size_deviation", _SIZES, "m s-1", "standard deviation of the reported V50")
+
+PROOF_PERFORATION = Variable(
+    "proof_perforation_probability",
+    ("velocity",),
+    "1",
+    "probability that a fair shot perforates, with the gun's scatter",
+)
+PASS = Variable("pass_probability", ("velocity",), "1", "probability that the plan passes, every shot at any place")
+PASS_SAME_PLACE = Variable(
+    "pass_probability_same_place", ("velocity",), "1", "the same if all shots of a test hit the same place"
+)
+
+VARIABLES = (
+    *(VELOCITY, SHARE, SHARE_LOW, SHARE_HIGH, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH),
+    *(CHANGES, HIT_Y, HIT_Z, YAW, OUTLINE_Y, OUTLINE_Z),
+    *(SHOT_VELOCITY, SHOT_PERFORATED, SHOT_PLACE, V50, SPREAD, V50_LOW, V50_HIGH, SHOTS),
+    *(SIZE, SIZE_SHOTS, SIZE_WITHIN, SIZE_BIAS, SIZE_DEVIATION, PROOF_PERFORATION, PASS, PASS_SAME_PLACE),
+)
+COORDINATES = (VELOCITY, QUANTILE, SIZE)
+
+TEST = "firing_test"
+"""Attribute: the text of the test file."""
+SETTINGS = "firing_test_settings"
+"""Attribute: all settings in SI, defaults included, as JSON."""
+DISCLAIMER = "disclaimer"
+SENTENCE = "a computation by a model, not a certificate: no shot was fired"
+TRUE_V50, TRUE_SPREAD = "true_v50", "true_spread"
+"""Of the target [m/s]: the median of its limit velocities, and half the distance from V16 to V84."""
+PROOF_SHOTS, PROOF_ALLOWED, PROOF_VELOCITY = "proof_shots", "proof_allowed", "proof_velocity"
+CELL = "plate_period"
+UNFAIR_YAW, UNFAIR_VELOCITY = "unfair_yaw_share", "unfair_velocity_share"
+"""Shares of the shots that the rules of fair hits refuse."""
+SEARCH = "limit_runs_per_hit"
+"""Runs per hit that the search of limits took."""
+
+
+def dataset_of(columns: dict[Variable, Any], attributes: dict[str, Any]) -> xarray.Dataset:
+    """The Dataset of these columns; a velocity attribute is in m/s."""
+    import xarray
+
+    data = {name: (name.dims, np.asarray(values), name.attributes) for name, values in columns.items()}
+    coordinates = {name: one for name, one in data.items() if name in COORDINATES}
+    fixed = {"Conventions": "CF-1.11", attr.REFERENCES: _REFERENCES, DISCLAIMER: SENTENCE}
+    own = {name: one for name, one in data.items() if name not in coordinates}
+    return xarray.Dataset(own, coordinates, fixed | attributes)
+
+
+_REFERENCES = "docs/firing.md of warpimpact"
+
+
+def write(dataset: xarray.Dataset, path: Path) -> None:
+    """Write a test; an existing file is replaced.
+
+    Raises:
+        OutputError: it cannot be written; what was there before is untouched.
+    """
+    with uninterrupted(), aside(path) as file:
+        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4")
+
+
+def read(path: Path) -> xarray.Dataset:
+    """Read a test into memory.
+
+    Raises:
+        ResultError: the file is missing, is not netCDF, or is no firing test.
+    """
+    import xarray
+
+    if not path.is_file():
+        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
+    try:
+        with uninterrupted(), xarray.open_dataset(path, engine="netcdf4") as file:
+            found = file.load()
+    except Exception as error:  # a file that was altered leads xarray into errors of any class
+        raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
+    if TEST not in found.attrs or SHARE not in found.variables:
+        raise ResultError(f"{path}: is no firing test, as warpimpact test writes")
+    return found

@@ -1,0 +1,122 @@
+"""What a notebook shows of a model: a drawing to scale where it has a shape, and its values with their units.
+
+The models import this file, so it knows cores, plates and targets by what they have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from html import escape
+from typing import Any, get_args, get_origin
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+
+from .units import reader_in, typed
+
+Array = NDArray[np.float64]
+
+_PIXELS = 260
+"""Longer side of a drawing."""
+_CELLS = 3
+"""Of an unbounded plate, along each side."""
+_MOST_HOLES = 2000
+_STEEL, _CORE = "#b8b8b8", "#D55E00"
+
+
+def html_of(model: BaseModel) -> str:
+    """The drawings of a model and of its parts, and a table of the values that were given."""
+    parts = [model, *(getattr(model, name) for name in type(model).model_fields)]
+    if (target := getattr(model, "target", None)) is not None:
+        parts = [target if part is getattr(model, "plate", None) else part for part in parts]
+    drawings = "".join(f'<span style="margin-right: 1em">{drawing}</span>' for drawing in map(_drawn, parts) if drawing)
+    rows = "".join(
+        f'<tr><th style="text-align: left">{escape(name)}</th><td style="text-align: left">{escape(value)}</td></tr>'
+        for name, value in values_of(model)
+    )
+    return f"<div><b>{type(model).__name__}</b><div>{drawings}</div><table>{rows}</table></div>"
+
+
+def values_of(model: BaseModel, place: str = "") -> Iterator[tuple[str, str]]:
+    """Dotted names and texts of the values that were given to a model, with their units."""
+    for name, field in type(model).model_fields.items():
+        value = getattr(model, name)
+        if name not in model.model_fields_set or value is None:
+            continue
+        several = value if isinstance(value, tuple) and value and isinstance(value[0], BaseModel) else None
+        if isinstance(value, BaseModel):
+            yield from values_of(value, f"{place}{name}.")
+        elif several is not None:
+            for number, one in enumerate(several):
+                yield from values_of(one, f"{place}{name}[{number}].")
+        else:
+            yield f"{place}{name}", _text(value, typed(field))
+
+
+def _text(value: Any, kind: Any) -> str:
+    if isinstance(value, tuple):
+        inner = next((one for one in (kind, *get_args(kind)) if get_origin(one) is tuple), tuple[Any, ...])
+        kinds = [one for one in get_args(inner) if one is not Ellipsis] or [Any]
+        return ", ".join(_text(one, kinds[min(place, len(kinds) - 1)]) for place, one in enumerate(value))
+    reader = reader_in(kind)
+    return str(value) if reader is None or not isinstance(value, int | float) else reader.text(value)
+
+
+def _drawn(part: Any) -> str:
+    if hasattr(part, "breaks"):
+        return _core(part)
+    if isinstance(getattr(part, "layers", None), tuple):
+        return _holes(part.layers[0]) + (_section(part) if len(part.layers) > 1 else "")
+    return _holes(part) if hasattr(part, "pattern") else ""
+
+
+def _holes(plate: Any) -> str:
+    """A plate from the front, y to the right and z up."""
+    cell = np.array(plate.sampled_cell)
+    whole = plate.size is not None and np.prod(np.array(plate.size) / cell) <= _MOST_HOLES
+    half = 0.5 * (np.array(plate.size) if whole else _CELLS * cell)
+    outlines = plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))
+    corners = half * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    return picture([(path([corners, *outlines]), _STEEL)], -half, half, "plate")
+
+
+def _core(core: Any) -> str:
+    """A core from the side, its nose to the right."""
+    stations = np.union1d(np.linspace(0.0, core.length, 101), core.breaks)
+    radius = core.radius(stations)
+    along = np.concatenate([-stations, -stations[::-1]])
+    shape = np.column_stack([along, np.concatenate([radius, -radius[::-1]])])
+    return picture([(path([shape]), _CORE)], shape.min(axis=0), shape.max(axis=0), "core")
+
+
+def _section(target: Any) -> str:
+    """The layers of a target from the side, to scale along the line of fire."""
+    depth = target.depth
+    shapes = [
+        np.array([(front, 0.0), (rear, 0.0), (rear, 0.3 * depth), (front, 0.3 * depth)]) for front, rear in target.faces
+    ]
+    return picture([(path(shapes), _STEEL)], np.zeros(2), np.array([depth, 0.3 * depth]), "layers")
+
+
+def path(outlines: Sequence[Array]) -> str:
+    """Closed outlines, each of shape [points, 2] [m], as the data of an SVG path in millimetres, the second axis up."""
+    rings = (" ".join(f"{1e3 * x:.3f},{-1e3 * y:.3f}" for x, y in outline) for outline in outlines)
+    return " ".join(f"M {ring} Z" for ring in rings)
+
+
+def picture(paths: Sequence[tuple[str, str]], low: Array, high: Array, what: str) -> str:
+    """An SVG picture of filled paths, to scale.
+
+    Args:
+        paths: data in millimetres, and colour.
+        low, high: corners of what it shows [m].
+        what: what it shows, for those who do not see it.
+    """
+    (width, height), (left, top) = 1e3 * (high - low), (1e3 * low[0], -1e3 * high[1])
+    scale = _PIXELS / max(width, height)
+    shapes = "".join(f'<path d="{data}" fill="{colour}" fill-rule="evenodd"/>' for data, colour in paths)
+    return (
+        f'<svg role="img" aria-label="{what}" width="{scale * width:.0f}" height="{scale * height:.0f}" '
+        f'viewBox="{left:.4f} {top:.4f} {width:.4f} {height:.4f}">{shapes}</svg>'
+    )

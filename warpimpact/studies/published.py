@@ -1,0 +1,70 @@
+"""Published limit velocities beside those of a search."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import xarray
+from pydantic import ValidationError
+
+from warpimpact.campaign.problems import sentence
+from warpimpact.campaign.published import Published
+from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.studies.limit import quantiles
+
+_SAME_OBLIQUITY = 0.5
+"""Hits whose obliquity is within so many degrees of a published one are beside it [degree]."""
+
+
+class Beside(NamedTuple):
+    """A published limit velocity, and the median limit of the hits at its obliquity [m/s]; NaN where there are none."""
+
+    published: Published
+    computed: float
+
+    @property
+    def label(self) -> str:
+        """What stands in a legend."""
+        return f"published: {self.published.label}".removesuffix(": ")
+
+
+def published_beside(dataset: xarray.Dataset) -> list[Beside]:
+    """The published limits that the campaign of a search of limit velocities names.
+
+    Raises:
+        CampaignError: the campaign of the result was altered.
+    """
+    if dataset.attrs[attr.LIMIT] != "velocity":
+        return []
+    data = parsed(dataset.attrs[attr.CAMPAIGN], attr.CAMPAIGN)
+    given = data.get("published", [])
+    try:
+        rows = [Published.model_validate(one) for one in (given if isinstance(given, list) else [given])]
+    except ValidationError as error:
+        raise CampaignError(f"published: {sentence(error, data)}") from None
+    return [Beside(row, _computed(dataset, math.degrees(row.obliquity))) for row in rows]
+
+
+def _computed(dataset: xarray.Dataset, obliquity: float) -> float:
+    near = np.abs(dataset[v.OBLIQUITY].values - obliquity) <= _SAME_OBLIQUITY
+    return quantiles(dataset.isel(hit=near))["V50"].value if near.any() else math.nan
+
+
+def published_lines(dataset: xarray.Dataset) -> list[str]:
+    """A table of the published limits, and their sources; none of a campaign that names none."""
+    rows = published_beside(dataset)
+    if not rows:
+        return []
+    lines = [f"{'published':>10} {'obliquity':>10} {'computed':>10} {'difference':>11}   of"]
+    sources = list(dict.fromkeys(row.published.source for row in rows))
+    for published, computed in rows:
+        shown = "-" if math.isnan(computed) else f"{computed:.4g}"
+        apart = "-" if math.isnan(computed) else f"{100.0 * (computed / published.velocity - 1.0):+.1f} %"
+        mark = f"{published.label} [{sources.index(published.source) + 1}]".strip()
+        angle = f"{math.degrees(published.obliquity):.4g}°"
+        lines.append(f"{published.velocity:>6.4g} m/s {angle:>10} {shown:>10} {apart:>11}   {mark}")
+    return lines + [f"[{number}] {source}" for number, source in enumerate(sources, start=1)]
