@@ -18,7 +18,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing
 from warpimpact.scene.display import STORED
-from warpimpact.solver.pilot import accuracy_text, errors_text, hits_text
+from warpimpact.solver.pilot_text import accuracy_text, errors_text, hits_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
 

@@ -11,9 +11,8 @@ from __future__ import annotations
 import logging
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, Context
 from typing import TypeVar
 
 import numpy as np
@@ -23,6 +22,7 @@ from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
 from warpimpact.solver.changes import ended_otherwise, limit_changes, upper_errors
+from warpimpact.solver.pilot_text import errors_text, hits_text, limit_error_text
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
 Array = NDArray[np.float64]
@@ -128,49 +128,6 @@ class LimitErrors(Found):
         return limit_error_text(self.error, self.quantity)
 
 
-def hits_text(share: float) -> str:
-    """So many of the hits."""
-    return f"{100.0 * share:.3g} % of the hits"
-
-
-def errors_text(velocity: float, tilt: float, depth: float = math.nan, status: float = math.nan) -> str:
-    """Errors of residual velocity [m/s] and tilt [degree]; of depth [m] and of the status, where there is one."""
-    parts = [f"{upper_digits(velocity)} m/s and {upper_digits(tilt)} deg"]
-    if not math.isnan(depth):
-        parts.append(f"{upper_digits(1e3 * depth)} mm of depth")
-    if status > 0.0:
-        parts.append(f"the status of {100.0 * status:.2g} % of the hits")
-    return " and ".join(parts)
-
-
-def limit_error_text(error: float, quantity: str) -> str:
-    """Error of a limit velocity [m/s] or of a limit thickness [m]."""
-    return f"{upper_digits(error)} m/s" if quantity == "velocity" else f"{upper_digits(1e3 * error)} mm"
-
-
-def upper_digits(error: float) -> str:
-    """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
-    up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count
-    return f"{float(up):g}"
-
-
-def accuracy_text(asked: Mapping[str, float], *, layered: bool) -> str:
-    """What is asked for, by the names of `Accuracy`: SI. What is not there is not asked for."""
-
-    def bound(name: str, unit: str, factor: float = 1.0) -> str:
-        share = asked.get(f"{name}_share", 0.0) if layered else 0.0
-        return f"{factor * asked[name]:g} {unit}" + (f" + {100.0 * share:g} %" if share else "")
-
-    parts = [bound("residual_velocity", "m/s")] if "residual_velocity" in asked else []
-    parts += [bound("tilt", "deg", math.degrees(1.0))] if "tilt" in asked else []
-    if layered and "depth" in asked:
-        parts.append(f"{1e3 * asked['depth']:g} mm of depth")
-    stated = f"{' and '.join(parts)} for {hits_text(asked['share'])}"
-    if layered and asked.get("status_share", 1.0) < 1.0:
-        stated += f", another status for at most {100.0 * asked['status_share']:g} %"
-    return stated
-
-
 def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
     """Shots of a pilot, at most; of a run of so many hits."""
     return max(_first(accuracy), min(MORE, hits // PART))
@@ -261,19 +218,18 @@ def _judged(
         )
     )
     status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
-    excess = _excess(accuracy, counted)
-    kept = excess <= 1.0
-    if layered:
-        kept &= not counted[2] > accuracy.depth and status <= accuracy.status_share
+    excess = _excess(accuracy, counted, layered)
+    kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in told)
     found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status)
-    return found, excess, _excess(accuracy, weighed) <= 1.0
+    return found, excess, _excess(accuracy, weighed, layered) <= 1.0
 
 
-def _excess(accuracy: Accuracy, errors: Array) -> float:
-    """The larger of the errors in residual velocity and tilt, over what is allowed; infinite if no shot has any."""
+def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
+    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers."""
     velocity, tilt = np.nan_to_num(errors[:2], nan=math.inf)
-    return max(float(velocity) / accuracy.residual_velocity, float(tilt) / accuracy.tilt)
+    depth = np.nan_to_num(errors[2], nan=0.0) if layered else 0.0
+    return float(max(velocity / accuracy.residual_velocity, tilt / accuracy.tilt, depth / accuracy.depth))
 
 
 def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:

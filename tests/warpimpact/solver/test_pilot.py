@@ -31,11 +31,10 @@ from warpimpact.solver.changes import RISK, SLOW, changes, ended_otherwise, uppe
 from warpimpact.solver.pilot import (
     MARGIN,
     HitErrors,
-    errors_text,
     pilot_hits,
     pilot_size,
-    upper_digits,
 )
+from warpimpact.solver.pilot_text import errors_text, upper_digits
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
@@ -323,5 +322,5 @@ def test_errors_above_a_bound_never_read_as_if_they_kept_it(bound: float) -> Non
         assert float(upper_digits(error)) > bound
     for error in bound * np.array([1.0, 0.99999, 0.996, 0.5, 0.0]):
         assert error <= float(upper_digits(error)) <= bound
-    assert errors_text(1.04, 0.3, 1.23e-4) == "1.1 m/s and 0.3 deg and 0.13 mm of depth"
+    assert errors_text(1.04, 0.3, 1.23e-4) == "1.1 m/s, 0.3 deg and 0.13 mm of depth"
     assert errors_text(math.inf, 123.0) == "inf m/s and 130 deg"
