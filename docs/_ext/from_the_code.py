@@ -76,13 +76,13 @@ class CampaignReference(FromTheCode):
     def chosen(self, part: dict[str, Any]) -> list[dict[str, Any]]:
         """The models that a part of the schema may be."""
         options = [part, *([part["then"]] if "type" in part and "then" in part else [])]
-        options += [one["then"] for one in part.get("allOf", [])]
+        options += [one["then"] for one in part.get("allOf", []) if "then" in one]
         options += [option["items"] for option in options if "items" in option]
         return [self.definition(option["$ref"]) for option in options if "$ref" in option]
 
     def of_table(self, name: str, part: dict[str, Any], depth: str = "##") -> Iterator[str]:
         """A table of the file, and those within it."""
-        models = [one for one in self.chosen(part) if "properties" in one and "allOf" not in one]
+        models = [one for one in self.chosen(part) if "properties" in one]
         if not models or name == "layer.pattern":  # which is that of the plate
             return
         yield from [f"{depth} `[{name}]`", "", part.get("description", "").capitalize(), ""]

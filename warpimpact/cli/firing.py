@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 from .mistakes import memory_told
 from .options import Commands, add_command, add_count, add_device, add_output, add_overwrite
 from .paths import check_output, check_picture, check_suffix
-from .progress import show_run, warn
+from .progress import Step, show_progress, show_run, warn
 
 if TYPE_CHECKING:
+    from warpimpact.firing.directions import Sector
     from warpimpact.firing.plan import FiringTest
     from warpimpact.firing.response import Response
 
@@ -38,10 +39,10 @@ def add_test(commands: Commands) -> None:
 
 def _test(arguments: argparse.Namespace) -> None:
     from warpimpact.campaign.text import CampaignError
-    from warpimpact.firing.plan import read_test
+    from warpimpact.firing.reading import read_test
     from warpimpact.firing.simulate import simulate_test
     from warpimpact.firing.text import report_lines
-    from warpimpact.plotting.firing import firing_figure
+    from warpimpact.plotting.firing import directions_figure, firing_figure
     from warpimpact.results import firing as files
 
     test = read_test(arguments.test)
@@ -50,16 +51,35 @@ def _test(arguments: argparse.Namespace) -> None:
     replace = arguments.overwrite or arguments.resume
     check_suffix(output, "a test", ".nc")
     check_output(output, overwrite=replace)
-    check_picture(picture, overwrite=replace)
-    response, attributes = _response(test, output, arguments)
+    polar = picture.with_name(f"{picture.stem}_directions.png")
+    for path in (picture, polar):
+        check_picture(path, overwrite=replace)
+    response, attributes = _response(test, output, arguments) if test.needs_limits else (None, {})
+    sector = _sector(test, arguments) if test.directions is not None else None
     try:
-        dataset = simulate_test(test, response, attributes)
+        dataset = simulate_test(test, response, attributes, sector)
     except ValueError as error:
         raise CampaignError(f"{arguments.test}: {error}") from None
     files.write(dataset, output)
     print("\n".join(report_lines(dataset)))
-    firing_figure(dataset).savefig(picture, dpi=150)
-    print(f"written to {output}, figure in {picture}")
+    figures = {picture: firing_figure} if test.needs_limits else {}
+    if sector is not None:
+        figures[polar] = directions_figure
+    for path, draw in figures.items():
+        draw(dataset).savefig(path, dpi=150)
+    print(f"written to {output}, figure in {' and '.join(map(str, figures))}")
+
+
+def _sector(test: "FiringTest", arguments: argparse.Namespace) -> "Sector":
+    """P(perforation) in every direction."""
+    from warpimpact.firing.directions import protect
+    from warpimpact.firing.target import target_campaign
+    from warpimpact.solver.worker import Worker
+
+    assert test.directions is not None
+    with memory_told(arguments.test), show_progress("direction") as show:
+        follow = lambda done, total: show(Step(done, total, 0, ""))  # noqa: E731
+        return protect(target_campaign(test), test.directions, Worker(arguments.device), follow)
 
 
 def _response(test: "FiringTest", output: Path, arguments: argparse.Namespace) -> tuple["Response", dict[str, Any]]:
@@ -75,6 +95,7 @@ def _response(test: "FiringTest", output: Path, arguments: argparse.Namespace) -
         return searched_target(
             campaign,
             limits,
+            tolerance=test.target.tolerance,
             device=arguments.device,
             resume=arguments.resume,
             overwrite=arguments.overwrite,

@@ -1,14 +1,12 @@
-"""A firing test as a TOML file, validated; a mistake becomes one sentence."""
+"""A firing test: the models of its file."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, PrivateAttr, ValidationError, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
-from warpimpact.campaign.problems import sentence
-from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.firing.directions import Directions
 from warpimpact.firing.estimators import Estimator
 from warpimpact.firing.procedures import AnyProcedure
 from warpimpact.firing.rules import FairHit, Gun
@@ -30,6 +28,7 @@ class FiringTarget(Model):
         layer: layer that must hold, 0 is the plate; of a campaign the layers behind it are left out. Not given, it is
             the last one.
         count: limits that are searched of a campaign.
+        tolerance: how far the two ends of a searched limit may lie apart [m/s]; the limit itself is nearer.
         mean, deviation: limit velocities with a normal distribution [m/s].
         velocities: known limit velocities [m/s].
         shares: of the hits that have each of them.
@@ -40,6 +39,7 @@ class FiringTarget(Model):
     sweep: InputFile | None = None
     layer: Annotated[int, Field(strict=True, ge=0)] | None = None
     count: Annotated[int, Field(strict=True, ge=1, le=2**20)] = 256
+    tolerance: PositiveSpeed = 4.0
     mean: PositiveSpeed | None = None
     deviation: PositiveSpeed | None = None
     velocities: Annotated[tuple[PositiveSpeed, ...], Field(min_length=1, max_length=1000)] | None = None
@@ -129,7 +129,11 @@ class FiringTest(Model):
         estimator: what is reported.
         precision: asks how many shots a precision takes.
         required: asks how often a required V50 is reported.
+        requirement: a named requirement, such as "STANAG 4569 L3", which gives core, velocity, proof and directions,
+            unless the file does.
+        threat: of a requirement that has several.
         proof: asks how often n shots with at most k perforations pass.
+        directions: asks for P(perforation) over directions of fire; the target is then a campaign.
     """
 
     title: Title
@@ -142,13 +146,21 @@ class FiringTest(Model):
     estimator: Estimator = Estimator()
     precision: Precision | None = None
     required: Required | None = None
+    requirement: Title | None = None
+    threat: Title | None = None
     proof: Proof | None = None
+    directions: Directions | None = None
     _source: str = PrivateAttr("")
 
     @property
     def text(self) -> str:
         """The TOML file as it was read; of a test made in Python, its values as JSON."""
         return self._source or self.model_dump_json()
+
+    @property
+    def needs_limits(self) -> bool:
+        """Whether the response of the target is asked for."""
+        return self.procedure is not None or self.proof is not None or self.directions is None
 
     @model_validator(mode="after")
     def _goes_together(self) -> FiringTest:
@@ -162,27 +174,10 @@ class FiringTest(Model):
         )
         if self.required is not None and self.required.by == "lower_end" and by_mean:
             raise ValueError('required.by = "lower_end" needs an estimator with an interval: "probit" or "logit"')
-        if self.proof is not None and self.proof.velocity is None:
+        if self.directions is not None and self.target.campaign is None:
+            raise ValueError("directions needs target.campaign")
+        if self.threat is not None and self.requirement is None:
+            raise ValueError("threat needs requirement")
+        if self.proof is not None and self.proof.velocity is None and self.requirement is None:
             raise ValueError("proof.velocity: is missing, but must be given")
         return self
-
-
-def read_test(path: str | Path) -> FiringTest:
-    """Read a test file; file names in it count from its folder.
-
-    Raises:
-        CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
-    """
-    path = Path(path)
-    return firing_test(read_text(path), str(path), path.parent)
-
-
-def firing_test(text: str, name: str, folder: Path) -> FiringTest:
-    """Read a test from its text; `name` is what errors call it."""
-    data: dict[str, Any] = parsed(text, name)
-    try:
-        test = FiringTest.model_validate(data, context={"folder": folder})
-    except ValidationError as error:
-        raise CampaignError(f"{name}: {sentence(error, data)}") from None
-    test._source = text
-    return test

@@ -8,10 +8,12 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 
+from warpimpact.firing.directions import Sector
 from warpimpact.firing.estimators import Reports, reported
 from warpimpact.firing.fire import Firings, fire, uniform
 from warpimpact.firing.plan import FiringTest, Proof
 from warpimpact.firing.procedures import Procedure
+from warpimpact.firing.requirements import requirement_line
 from warpimpact.firing.response import Response
 from warpimpact.firing.rules import drawn_places, fair_places
 from warpimpact.records.variable import Variable
@@ -28,24 +30,63 @@ _PLACES, _VELOCITIES, _NODES = 1, 2, 64
 _GRID = 81
 
 
-def simulate_test(test: FiringTest, response: Response, attributes: dict[str, Any] | None = None) -> xarray.Dataset:
+def simulate_test(
+    test: FiringTest,
+    response: Response | None,
+    attributes: dict[str, Any] | None = None,
+    sector: Sector | None = None,
+) -> xarray.Dataset:
     """Fire a test at a target whose response is known.
 
     Args:
+        response: None where the test asks for directions alone.
+        sector: what was computed of the directions.
         attributes: more global attributes, such as what the search of limits took.
 
     Raises:
         ValueError: the rules of fair hits leave no place.
     """
-    fair_places(test.fair_hit, response)
-    velocity = _grid(response, test.proof)
-    columns = _response(response, velocity)
+    columns: dict[Variable, Any] = {}
     told: dict[str, Any] = {
         attr.TITLE: test.title,
         attr.HISTORY: attr.history_line("test"),
         f.TEST: test.text,
         f.SETTINGS: test.model_dump_json(exclude_none=True),
+        f.REQUIREMENT: requirement_line(test),
         attr.WARPIMPACT_VERSION: attr.versions()[attr.WARPIMPACT_VERSION],
+    }
+    for some, more in (_fired(test, response), _directions(test, sector)):
+        columns, told = columns | some, told | more
+    return f.dataset_of(columns, told | (attributes or {}))
+
+
+def _directions(test: FiringTest, sector: Sector | None) -> tuple[dict[Variable, Any], dict[str, Any]]:
+    directions = test.directions
+    if directions is None or sector is None:
+        return {}, {}
+    columns = {
+        f.AZIMUTH: np.degrees(directions.azimuth),
+        f.ELEVATION: np.degrees(directions.elevation),
+        f.DIRECTION_SHARE: sector.share,
+        f.DIRECTION_LOW: sector.low,
+        f.DIRECTION_HIGH: sector.high,
+        f.DIRECTION_OBLIQUITY: np.degrees(directions.obliquities()),
+        f.DIRECTION_WEIGHT: directions.weights(),
+        f.DIRECTION_HITS: sector.hits.astype(np.int32),
+        f.DIRECTION_FAILED: sector.failed.astype(np.int32),
+    }
+    mean = sector.mean
+    return columns, {f.MEAN: mean.value, f.MEAN_INTERVAL: np.array([mean.low, mean.high])}
+
+
+def _fired(test: FiringTest, response: Response | None) -> tuple[dict[Variable, Any], dict[str, Any]]:
+    """Columns and attributes of the response, the tests and the proof."""
+    if response is None:
+        return {}, {}
+    fair_places(test.fair_hit, response)
+    velocity = _grid(response, test.proof)
+    columns = _response(response, velocity)
+    told: dict[str, Any] = {
         f.TRUE_V50: response.quantile(0.5),
         f.TRUE_SPREAD: response.spread,
         f.UNFAIR_YAW: 1.0 - len(fair_places(test.fair_hit, response)) / len(response),
@@ -62,7 +103,7 @@ def simulate_test(test: FiringTest, response: Response, attributes: dict[str, An
         columns |= _proof(test, test.proof, response, velocity)
         told |= {f.PROOF_SHOTS: proof_shots(test.proof), f.PROOF_ALLOWED: test.proof.allowed}
         told |= {f.PROOF_VELOCITY: test.proof.velocity}
-    return f.dataset_of(columns, told | (attributes or {}))
+    return columns, told
 
 
 def fired(test: FiringTest, procedure: Procedure, response: Response) -> Firings:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.plan import FiringTest
+from warpimpact.firing.requirements import with_threat
 from warpimpact.firing.response import (
     Response,
     known_response,
@@ -67,13 +69,14 @@ def target_campaign(test: FiringTest, count: int | None = None) -> Campaign:
                 f"got target.layer = {target.layer}, but the layers are 0 (the plate) to {len(campaign.layer)}"
             )
         campaign = campaign.model_copy(update={"layer": campaign.layer[: target.layer]})
-    return campaign
+    return with_threat(campaign, test)
 
 
 def searched_target(
     campaign: Campaign,
     output: Path,
     *,
+    tolerance: float,
     device: str = "auto",
     resume: bool = False,
     overwrite: bool = False,
@@ -83,12 +86,13 @@ def searched_target(
     """Search the limits of a campaign into a file, which `warpimpact inspect` and a test's `target.limits` take.
 
     Args:
+        tolerance: how far the ends of a limit may lie apart [m/s].
         output, device, resume, overwrite, progress, tell: as in `run_to_file`.
 
     Returns:
         The response, and attributes that say what the search took.
     """
-    search = LimitMap.of(campaign)
+    search = replace(LimitMap.of(campaign, tolerance=tolerance), near=True)
     team = local_team(campaign, device, search)
     run_to_file(campaign, output, team=team, resume=resume, overwrite=overwrite, progress=progress, tell=tell)
     dataset = files.read(output)

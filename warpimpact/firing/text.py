@@ -68,7 +68,9 @@ def share_text(estimate: Estimate) -> str:
 def report_lines(dataset: xarray.Dataset) -> list[str]:
     """What a file says, as lines for a person."""
     test = json.loads(dataset.attrs[f.SETTINGS])
-    lines = [str(dataset.attrs[attr.TITLE]), dataset.attrs[f.DISCLAIMER], *_target_lines(dataset)]
+    lines = [str(dataset.attrs[attr.TITLE]), dataset.attrs[f.DISCLAIMER]]
+    lines += [dataset.attrs[f.REQUIREMENT]] if dataset.attrs[f.REQUIREMENT] else []
+    lines += _target_lines(dataset) if f.SHARE in dataset else []
     required = test.get("required") or {}
     found = verdict(dataset, required.get("v50"), required.get("by", "v50"))
     if found is not None:
@@ -77,6 +79,26 @@ def report_lines(dataset: xarray.Dataset) -> list[str]:
         lines += _size_lines(dataset, test["precision"])
     if f.PASS in dataset:
         lines += proof_lines(dataset, test["proof"])
+    if f.DIRECTION_SHARE in dataset:
+        lines += _direction_lines(dataset)
+    return lines
+
+
+def _direction_lines(dataset: xarray.Dataset) -> list[str]:
+    """P(perforation) by azimuth and elevation, and its mean."""
+    share, hits = dataset[f.DIRECTION_SHARE], dataset[f.DIRECTION_HITS].values
+    low, high = dataset.attrs[f.MEAN_INTERVAL]
+    weight = json.loads(dataset.attrs[f.SETTINGS])["directions"]["weight"]
+    lines = ["P(perforation) by direction: azimuth along, elevation down"]
+    lines.append("         " + "".join(f"{one:>7.4g}°" for one in share[f.AZIMUTH].values))
+    for elevation in share[f.ELEVATION].values[::-1]:
+        lines.append(f"{elevation:>7.4g}° " + "".join(f"{one:>8.3f}" for one in share.sel(elevation=elevation).values))
+    failed = int(dataset[f.DIRECTION_FAILED].values.sum())
+    lines.append(
+        f"mean, weighted by {weight.replace('_', ' ')}: {float(dataset.attrs[f.MEAN]):.4g}, 95 % interval {low:.4g} to "
+        f"{high:.4g}; {hits.sum()} hits, {hits.min()} to {hits.max()} in a direction"
+        + (f", {failed} failed" if failed else "")
+    )
     return lines
 
 

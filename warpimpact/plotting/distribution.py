@@ -9,6 +9,8 @@ import numpy as np
 import xarray
 from matplotlib.figure import Figure
 
+from warpimpact.analysis.effectiveness import ANGLE
+from warpimpact.analysis.effects import effects
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.local import NEIGHBOURS, plane_fit, share_of
 from warpimpact.plotting.cell import (
@@ -194,23 +196,32 @@ def probability_map(dataset: xarray.Dataset, quantity: str) -> Figure:
 
     Args:
         dataset: a result whose hits cover the cell.
-        quantity: such as ``P(bending_stress > 1.5 GPa)`` or ``P(perforated)``, as in a campaign's ``stop.quantity``.
+        quantity: such as ``P(bending_stress > 1.5 GPa)`` or ``P(perforated)``, as in a campaign's ``stop.quantity``; or
+            a share among the measures of protection, such as ``P(base perforated)``.
 
     Raises:
         ValueError: the quantity is no probability, the result does not have it, or the hits do not cover the cell.
     """
+    values, nearest = _of_every_hit(dataset, quantity), _covered(dataset)
+    if not shots_scatter(dataset):
+        note = "each hit has one outcome, 1 or 0; nearest hit"
+        return _local_maps(dataset, values[nearest][None], [quantity], quantity, note)
+    images = _local(dataset, values, nearest, lambda near: share_of(near[1]))
+    labels = quantity, "half width of its 95 % interval"
+    return _local_maps(dataset, images, labels, quantity, "share of the {} nearest hits, Wilson's interval")
+
+
+def _of_every_hit(dataset: xarray.Dataset, quantity: str) -> Array:
+    """1 or 0 of every hit, shape [hits]; NaN where it does not count."""
+    shares = {one.label: one for one in effects(dataset, angle=ANGLE, standoff=None) if one.kind == "share"}
+    if quantity in shares:
+        return shares[quantity].over(dataset)
     measure = Measure.parse(quantity)
     if not measure.is_binary:
         raise ValueError(f'got "{quantity}", but a map of a probability needs P(…), such as P(perforated)')
     if measure.kind == "probability" and measure.variable not in dataset:
         raise ValueError(f'got "{quantity}", but the result has no {measure.variable}')
-    values, nearest = measure.values(dataset), _covered(dataset)
-    if not shots_scatter(dataset):
-        note = "each hit has one outcome, 1 or 0; nearest hit"
-        return _local_maps(dataset, values[nearest][None], [measure.text], measure.text, note)
-    images = _local(dataset, values, nearest, lambda near: share_of(near[1]))
-    labels = f"{measure.text}", "half width of its 95 % interval"
-    return _local_maps(dataset, images, labels, measure.text, "share of the {} nearest hits, Wilson's interval")
+    return measure.values(dataset)
 
 
 def _covered(dataset: xarray.Dataset) -> NDArray[np.intp]:

@@ -164,3 +164,42 @@ def _draw_proof(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> Non
     )
     title = f"proof: {shots} shots, at most {int(dataset.attrs[f.PROOF_ALLOWED])} perforate"
     _furnish(axes, title=title, xlabel="impact velocity [m/s]", ylabel="probability", ylim=(-0.03, 1.03))
+
+
+def directions_figure(dataset: xarray.Dataset) -> Figure:
+    """P(perforation) over the directions of fire, as a polar map: the angle from the normal of the plate outwards, and
+    the direction to the side and upwards about it.
+
+    Args:
+        dataset: the result of `warpimpact test` with directions.
+    """
+    figure = Figure(figsize=(8.2, 7.6), layout="constrained")
+    axes: Any = figure.add_subplot(projection="polar")
+    azimuth, elevation = np.meshgrid(
+        np.radians(dataset[f.AZIMUTH].values), np.radians(dataset[f.ELEVATION].values), indexing="ij"
+    )
+    around = np.arctan2(np.sin(elevation), np.cos(elevation) * np.sin(azimuth))
+    outward = dataset[f.DIRECTION_OBLIQUITY].values
+    share, hits = dataset[f.DIRECTION_SHARE].values, dataset[f.DIRECTION_HITS].values
+    sizes = 90.0 + 160.0 * (np.log2(hits) - np.log2(hits.min())) / max(1.0, float(np.log2(hits.max() / hits.min())))
+    artist = axes.scatter(around, outward, c=share, s=sizes, cmap="RdYlBu_r", vmin=0.0, vmax=1.0, edgecolors="black")
+    for angle, radius, value in zip(around.ravel(), outward.ravel(), share.ravel(), strict=True):
+        axes.annotate(
+            f"{value:.2f}",
+            (angle, radius),
+            xytext=(0, -15),
+            textcoords="offset points",
+            ha="center",
+            fontsize="x-small",
+        )
+    axes.set_rlim(0.0, 1.12 * float(outward.max()) if outward.max() > 0.0 else 1.0)
+    axes.set_rlabel_position(-67.5)
+    axes.yaxis.set_major_formatter("{x:g}°")
+    axes.set_xticks(np.radians([0, 90, 180, 270]), ["right", "from above", "left", "from below"])
+    figure.colorbar(artist, ax=axes, label="probability of perforation", shrink=0.8, pad=0.1)
+    low, high = dataset.attrs[f.MEAN_INTERVAL]
+    weight = json.loads(dataset.attrs[f.SETTINGS])["directions"]["weight"].replace("_", " ")
+    mean = f"mean by {weight}: {float(dataset.attrs[f.MEAN]):.3g} ({low:.3g} to {high:.3g}); larger dots: more hits"
+    add_heading(figure, f"{dataset.attrs[attr.TITLE]}\n{mean}")
+    figure.supxlabel(dataset.attrs[f.DISCLAIMER], fontsize="medium")
+    return figure

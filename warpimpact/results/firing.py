@@ -3,6 +3,7 @@
 response        probability of perforation against velocity, and the places that it comes from
 test            what every simulated test reports
 size            how exact tests of other sizes are
+azimuth, elevation   probability of perforation by direction of fire
 proof           probability that n shots with at most k perforations pass, against velocity
 """
 
@@ -72,18 +73,33 @@ PASS_SAME_PLACE = Variable(
     "pass_probability_same_place", ("velocity",), "1", "the same if all shots of a test hit the same place"
 )
 
+AZIMUTH = Variable("azimuth", ("azimuth",), "degree", "direction of the threat about the vertical, from the normal")
+ELEVATION = Variable("elevation", ("elevation",), "degree", "direction of the threat above the horizon")
+_DIRECTIONS = ("azimuth", "elevation")
+DIRECTION_SHARE = Variable("direction_perforation_probability", _DIRECTIONS, "1", "probability of perforation")
+DIRECTION_LOW = Variable("direction_perforation_probability_low", _DIRECTIONS, "1", "lower end of its 95 % interval")
+DIRECTION_HIGH = Variable("direction_perforation_probability_high", _DIRECTIONS, "1", "upper end of its 95 % interval")
+DIRECTION_OBLIQUITY = Variable("direction_obliquity", _DIRECTIONS, "degree", "angle between line of fire and normal")
+DIRECTION_WEIGHT = Variable("direction_weight", _DIRECTIONS, "1", "weight of the direction in the mean")
+DIRECTION_HITS = Variable("direction_hits", _DIRECTIONS, "1", "hits computed in the direction")
+DIRECTION_FAILED = Variable("direction_failed", _DIRECTIONS, "1", "hits whose computation failed")
+
 VARIABLES = (
     *(VELOCITY, SHARE, SHARE_LOW, SHARE_HIGH, QUANTILE, QUANTILE_VELOCITY, QUANTILE_LOW, QUANTILE_HIGH),
     *(CHANGES, HIT_Y, HIT_Z, YAW, OUTLINE_Y, OUTLINE_Z),
     *(SHOT_VELOCITY, SHOT_PERFORATED, SHOT_PLACE, V50, SPREAD, V50_LOW, V50_HIGH, SHOTS),
     *(SIZE, SIZE_SHOTS, SIZE_WITHIN, SIZE_BIAS, SIZE_DEVIATION, PROOF_PERFORATION, PASS, PASS_SAME_PLACE),
+    *(AZIMUTH, ELEVATION, DIRECTION_SHARE, DIRECTION_LOW, DIRECTION_HIGH, DIRECTION_OBLIQUITY, DIRECTION_WEIGHT),
+    *(DIRECTION_HITS, DIRECTION_FAILED),
 )
-COORDINATES = (VELOCITY, QUANTILE, SIZE)
+COORDINATES = (VELOCITY, QUANTILE, SIZE, AZIMUTH, ELEVATION)
 
 TEST = "firing_test"
 """Attribute: the text of the test file."""
 SETTINGS = "firing_test_settings"
 """Attribute: all settings in SI, defaults included, as JSON."""
+REQUIREMENT = "requirement"
+"""Attribute: what a named requirement is taken to ask for, its source and what is assumed; empty without one."""
 DISCLAIMER = "disclaimer"
 SENTENCE = "a computation by a model, not a certificate: no shot was fired"
 TRUE_V50, TRUE_SPREAD = "true_v50", "true_spread"
@@ -92,6 +108,8 @@ PROOF_SHOTS, PROOF_ALLOWED, PROOF_VELOCITY = "proof_shots", "proof_allowed", "pr
 CELL = "plate_period"
 UNFAIR_YAW, UNFAIR_VELOCITY = "unfair_yaw_share", "unfair_velocity_share"
 """Shares of the shots that the rules of fair hits refuse."""
+MEAN, MEAN_INTERVAL = "mean_perforation_probability", "mean_perforation_probability_interval"
+"""Over all directions, weighted."""
 SEARCH = "limit_runs_per_hit"
 """Runs per hit that the search of limits took."""
 
@@ -135,6 +153,6 @@ def read(path: Path) -> xarray.Dataset:
             found = file.load()
     except Exception as error:  # a file that was altered leads xarray into errors of any class
         raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
-    if TEST not in found.attrs or SHARE not in found.variables:
+    if TEST not in found.attrs or not {SHARE, DIRECTION_SHARE} & {*found.variables}:
         raise ResultError(f"{path}: is no firing test, as warpimpact test writes")
     return found

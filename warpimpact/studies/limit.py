@@ -16,7 +16,6 @@ from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.campaign.text import CampaignError
-from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
@@ -40,6 +39,7 @@ from warpimpact.solver.limit import (
     with_thickness,
     with_velocity,
 )
+from warpimpact.solver.limit_near import joined_limits, velocities_from_neighbours
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import LimitErrors, limits_pilot_size
 from warpimpact.solver.worker import Worker
@@ -59,9 +59,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LimitMap:
-    """The limit of every hit, as a `runs.task.Computation`: what `warpimpact limit` computes."""
+    """The limit of every hit, as a `runs.task.Computation`: what `warpimpact limit` computes.
+
+    Attributes:
+        near: whether searches of a velocity begin at limits of neighbours, with fewer runs.
+    """
 
     sought: Sought
+    near: bool = False
     most_solid: ClassVar[int] = 256
 
     @classmethod
@@ -91,7 +96,8 @@ class LimitMap:
         """What decides the bits beside the campaign."""
         sought = self.sought
         of_layer = f" of layer {sought.layer}" if sought.layer else ""
-        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}"}
+        begun = ", begun at neighbours" if self.near else ""
+        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}{begun}"}
 
     @property
     def measures(self) -> tuple[str, ...]:
@@ -108,7 +114,7 @@ class LimitMap:
         numerics, drawn = numerics_of(campaign, found), campaign.drawn
         progress, shots = of_images(progress, images), task.shots[::images]
         begin = time.perf_counter()
-        searched = _searched(drawn, campaign.scene, shots, sought, numerics, worker, progress)
+        searched = _searched(drawn, campaign.scene, shots, sought, numerics, worker, progress, near=self.near)
         elapsed = time.perf_counter() - begin
         attributes = {
             **computed_by(campaign, worker.device, len(shots), elapsed),
@@ -186,20 +192,17 @@ def _searched(
     numerics: Numerics,
     worker: Worker,
     progress: Progress | None = None,
+    near: bool = False,
 ) -> Limits:
     """Limits of shots. Draws of a posterior may need scenes of their own."""
+    search = velocities_from_neighbours if near else limits
     places, parts, done = list[NDArray[np.int64]](), list[Limits](), 0
     for which, own in scenes_of(drawn, scene, shots):
-        parts.append(limits(own, shots[which], sought, numerics, worker, part_of(progress, done, len(shots))))
+        parts.append(search(own, shots[which], sought, numerics, worker, part_of(progress, done, len(shots))))
         places.append(which)
         done += len(which)
     order = np.argsort(np.concatenate(places), kind="stable")
-    numbers = ("value", "lower", "upper", "runs", "converged")
-    return Limits(
-        **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
-        shots=Shots.joined([part.shots for part in parts])[order],
-        outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
-    )
+    return joined_limits(parts, order)
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:

@@ -8,7 +8,7 @@ import pytest
 import xarray
 
 from warpimpact.cli import main
-from warpimpact.firing.plan import firing_test
+from warpimpact.firing.reading import firing_test
 from warpimpact.firing.response import normal_response
 from warpimpact.firing.simulate import simulate_test
 from warpimpact.firing.text import report_lines, verdict

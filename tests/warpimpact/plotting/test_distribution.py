@@ -95,6 +95,12 @@ def test_a_probability_of_shots_that_arrive_alike_is_not_smoothed(make_result):
     assert (certain.norm.vmin, certain.norm.vmax) == (0.0, 1.0)
 
 
+def test_a_share_among_the_measures_of_protection_has_a_map(make_result):
+    figure = probability_map(make_result(np.tile(MIXED, 128)), "P(stopped)")
+    passing = probability_map(make_result(np.tile(MIXED, 128)), "P(perforated)")
+    assert figure.axes[0].images[0].get_array().mean() > passing.axes[0].images[0].get_array().mean() > 0.0
+
+
 @pytest.mark.parametrize(
     ("quantity", "complaint"),
     [

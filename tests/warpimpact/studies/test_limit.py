@@ -1,5 +1,6 @@
 """Limits of a campaign: the command, its file, its figure, resuming it, and what it refuses."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,12 @@ from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
+from warpimpact.runs.task import Task
 from warpimpact.runs.team import local_team
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.limit import limit_velocity
 from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap, quantiles, warning_of
 from warpimpact.studies.limit_text import limits_text
 
@@ -255,3 +258,13 @@ def test_published_limits_stand_beside_the_computed_ones(result: xarray.Dataset)
 
 
 OF = ["shots", "[1]"]
+
+
+def test_searches_that_begin_at_neighbours_take_fewer_runs(result: xarray.Dataset) -> None:
+    of = campaign()
+    near = replace(LimitMap.of(of), near=True)
+    task = Task(of.sampler().shots(0, 64), None, near.found_in(result))
+    table = near.compute(of, task, Worker("cpu"))
+    assert table["limit_runs"].values.mean() < 0.9 * float(result["limit_runs"].mean())
+    assert np.abs(table["limit_velocity"].values - result["limit_velocity"].values).max() <= 1.0
+    assert near.content != LimitMap.of(of).content

@@ -1,0 +1,249 @@
+"""Protection over all directions of fire: P(perforation) on a grid of azimuth and elevation, and its weighted mean.
+
+The plate stands upright and its normal is horizontal. A threat at azimuth α, measured about the vertical from the
+normal, and elevation ε above the horizon meets it at the obliquity θ with cos θ = cos α cos ε. More hits are computed
+in the directions in which the share of perforations is neither 0 nor 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import CampaignError
+from warpimpact.kernels.status import Status
+from warpimpact.scene import Numerics, Shots
+from warpimpact.scene.model import Model
+from warpimpact.scene.units import Angle, Number, PositiveSpeed
+from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import computed, pilot_of, spread
+from warpimpact.solver.worker import Worker
+from warpimpact.statistics.intervals import Estimate, estimate_of
+from warpimpact.statistics.student import student_quantile
+
+Array = NDArray[np.float64]
+Angles = Annotated[tuple[Angle, ...], Field(min_length=1, max_length=64)]
+
+_STEEPEST = math.radians(89.0)
+
+
+class Directions(Model):
+    """Directions that fire comes from.
+
+    Attributes:
+        azimuth: from the normal of the plate about the vertical, ascending [rad].
+        elevation: of the threat above the horizon, ascending [rad].
+        velocity: of the shots at the median [m/s]; not given, that of the named requirement, else of the campaign.
+        weight: of a direction in the mean: "solid_angle", or "area", the solid angle times the area that the plate
+            presents in the direction.
+        half_width: of the 95 % interval of P(perforation) in a direction, at which no more hits are computed.
+        first_count, max_count: hits in a direction: at first, and at most.
+    """
+
+    azimuth: Angles = tuple(math.radians(one) for one in (-60, -40, -20, 0, 20, 40, 60))
+    elevation: Angles = tuple(math.radians(one) for one in (0, 15, 30))
+    velocity: PositiveSpeed | None = None
+    weight: Literal["solid_angle", "area"] = "area"
+    half_width: Annotated[Number, Field(gt=0, lt=1)] = 0.05
+    first_count: Annotated[int, Field(strict=True, ge=32, le=2**20)] = 64
+    max_count: Annotated[int, Field(strict=True, ge=32, le=2**20)] = 512
+
+    @model_validator(mode="after")
+    def _meets_the_plate(self) -> Self:
+        for name in ("azimuth", "elevation"):
+            angles = np.degrees(getattr(self, name))
+            if (np.diff(angles) <= 0.0).any():
+                raise ValueError(f"got {name} = {[f'{one:g}' for one in angles]} deg, but it must ascend")
+        steepest = float(self.obliquities().max())
+        if steepest > _STEEPEST:
+            raise ValueError(f"got {math.degrees(steepest):.3g} deg from the normal, but at most 89 deg is allowed")
+        if self.first_count > self.max_count:
+            raise ValueError(
+                f"got first_count = {self.first_count}, but it must be at most max_count = {self.max_count}"
+            )
+        return self
+
+    def weights(self) -> Array:
+        """Weights of the directions, shape [azimuths, elevations], with the sum 1. A direction stands for the angles up
+        to the middle between it and the next; at the ends of the grid it stands for its inner half alone."""
+        across, up = _widths(self.azimuth), _edges(self.elevation)
+        solid = across[:, None] * (np.sin(up[1:]) - np.sin(up[:-1]))
+        if self.weight == "area":
+            solid = solid * np.cos(self.obliquities())
+        return np.asarray(solid / solid.sum())
+
+    def obliquities(self) -> Array:
+        """Angles between line of fire and normal [rad], shape [azimuths, elevations]."""
+        return np.array([[obliquity(az, el) for el in self.elevation] for az in self.azimuth])
+
+
+def _edges(angles: tuple[float, ...]) -> Array:
+    """Where the stretch of each angle begins, and where the last one ends; a single angle has one of no matter."""
+    if len(angles) == 1:
+        return np.array([angles[0] - 0.01, angles[0] + 0.01])
+    middles = 0.5 * (np.array(angles[1:]) + np.array(angles[:-1]))
+    return np.concatenate([[angles[0]], middles, [angles[-1]]])
+
+
+def _widths(angles: tuple[float, ...]) -> Array:
+    return np.diff(_edges(angles))
+
+
+def obliquity(azimuth: float, elevation: float) -> float:
+    """Angle between the line of fire and the normal of the plate [rad]."""
+    return math.acos(min(1.0, math.cos(azimuth) * math.cos(elevation)))
+
+
+def impact_azimuth(azimuth: float, elevation: float) -> float:
+    """Direction of the obliquity in the plate, from +y towards +z [rad]: a threat to the side of +y flies towards −y,
+    and one above flies towards −z."""
+    return math.atan2(-math.sin(elevation), -math.sin(azimuth) * math.cos(elevation))
+
+
+@dataclass(frozen=True)
+class Sector:
+    """What was found, each of shape [azimuths, elevations].
+
+    Attributes:
+        share, low, high: P(perforation) and its 95 % interval.
+        hits: how many were computed.
+        failed: how many of these failed.
+        mean: the weighted mean of P(perforation) with its 95 % interval.
+    """
+
+    share: Array
+    low: Array
+    high: Array
+    hits: NDArray[np.int64]
+    failed: NDArray[np.int64]
+    mean: Estimate
+
+
+def check_directions(campaign: Campaign) -> None:
+    """Refuse a campaign whose hits do not go on, or whose direction of fire is given otherwise.
+
+    Raises:
+        CampaignError: says why.
+    """
+    if campaign.burst is not None or campaign.stop is not None or campaign.posterior is not None:
+        raise CampaignError("directions cannot be combined with burst, stop or posterior")
+    if campaign.hits.sampling not in ("sobol", "random") or campaign.hits.irreducible:
+        raise CampaignError('directions need hits.sampling = "sobol" or "random", without irreducible')
+    if campaign.impact.obliquity > 0.0 or {("obliquity", 0), ("azimuth", 0)} & {*campaign.scatter.given}:
+        raise CampaignError("impact.obliquity and impact.azimuth are set by directions; leave them out")
+
+
+def protect(
+    campaign: Campaign, directions: Directions, worker: Worker, progress: Callable[[int, int], object] | None = None
+) -> Sector:
+    """Compute P(perforation) in all directions.
+
+    All directions have the same hits, as far as these go, so their errors are not independent. One pilot with hits from
+    all directions finds the resolution.
+
+    Args:
+        progress: called with the directions that are settled, and all.
+    """
+    check_directions(campaign)
+    if directions.velocity is not None:
+        impact = campaign.impact.model_copy(update={"velocity": directions.velocity})
+        campaign = campaign.model_copy(update={"impact": impact})
+    cells = [(row, column) for row in range(len(directions.azimuth)) for column in range(len(directions.elevation))]
+    passed: dict[tuple[int, int], Array] = {cell: np.empty(0) for cell in cells}
+    hits = campaign.hits.model_copy(update={"count": directions.max_count})
+    sampler = campaign.model_copy(update={"hits": hits}).sampler()
+    first = sampler.shots(0, directions.first_count)
+    numerics = _numerics(campaign, Shots.joined([toward(first, directions, cell) for cell in cells]), worker)
+    open_, count = list(cells), directions.first_count
+    while open_:
+        for place, cell in enumerate(open_):
+            known = len(passed[cell])
+            shots = toward(sampler.shots(known, count - known), directions, cell)
+            passed[cell] = np.concatenate([passed[cell], _answers(campaign, shots, numerics, worker)])
+            if progress is not None:
+                progress(len(cells) - len(open_) + place, len(cells))
+        open_ = [cell for cell in open_ if _wanted(campaign, passed[cell], directions)]
+        count = min(2 * count, directions.max_count)
+    return _sector(campaign, directions, passed)
+
+
+def _answers(campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker) -> Array:
+    """1 for a shot that perforates, 0 for one that is stopped, NaN for one that failed."""
+    status = computed(prepare(campaign.scene, shots, numerics), worker).status
+    answers = np.isin(status, (Status.PERFORATED, Status.MISSED)).astype(float)
+    failed = (status >= Status.UNFINISHED) & (status < Status.NOT_REACHED)
+    return np.where(failed, np.nan, answers)
+
+
+def toward(shots: Shots, directions: Directions, cell: tuple[int, int]) -> Shots:
+    """Shots that come from a direction."""
+    azimuth, elevation = directions.azimuth[cell[0]], directions.elevation[cell[1]]
+    one = np.ones(len(shots))
+    return replace(
+        shots, obliquity=obliquity(azimuth, elevation) * one, azimuth=impact_azimuth(azimuth, elevation) * one
+    )
+
+
+def _numerics(campaign: Campaign, shots: Shots, worker: Worker) -> Numerics:
+    if campaign.numerics.explicit is not None:
+        return campaign.numerics
+    pilot = spread(shots, pilot_size(campaign.numerics.asked))
+    return pilot_of(campaign.scene, pilot, campaign.numerics, worker).numerics
+
+
+def _wanted(campaign: Campaign, passed: Array, directions: Directions) -> bool:
+    """Whether more hits are wanted in a direction."""
+    if len(passed) >= directions.max_count:
+        return False
+    known = passed[~np.isnan(passed)]
+    if len(known) and np.ptp(known) == 0.0:
+        return False
+    return _estimate(campaign, passed).half_width > directions.half_width
+
+
+def _estimate(campaign: Campaign, passed: Array) -> Estimate:
+    return estimate_of("share", passed, replicates=campaign.replicates)
+
+
+def _sector(campaign: Campaign, directions: Directions, passed: dict[tuple[int, int], Array]) -> Sector:
+    shape = len(directions.azimuth), len(directions.elevation)
+    estimates = [_estimate(campaign, answers) for answers in passed.values()]
+    share, low, high = (
+        np.array([getattr(one, name) for one in estimates]).reshape(shape) for name in ("value", "low", "high")
+    )
+    hits = np.array([len(answers) for answers in passed.values()]).reshape(shape)
+    failed = np.array([int(np.isnan(answers).sum()) for answers in passed.values()]).reshape(shape)
+    mean = weighted_mean(list(passed.values()), directions.weights().ravel(), campaign.replicates)
+    return Sector(share, low, high, hits, failed, mean)
+
+
+def weighted_mean(passed: list[Array], weights: Array, replicates: int) -> Estimate:
+    """The weighted mean over directions of the share of answers 1, with its 95 % interval.
+
+    With replicates Student's interval over their weighted means is used, which the same hits in all directions do not
+    bias. Without, the errors of all directions are added, as if they went together. Where all answers are alike, the
+    ends are the means of those of the directions.
+
+    Args:
+        passed: answers in every direction, NaN for a hit that failed.
+    """
+    estimates = [estimate_of("share", answers, replicates=replicates) for answers in passed]
+    value, low, high = (
+        float(weights @ np.array([getattr(one, name) for one in estimates])) for name in ("value", "low", "high")
+    )
+    means = np.zeros(replicates)
+    for weight, answers in zip(weights, passed, strict=True):
+        means += weight * np.array([np.nanmean(answers[place::replicates]) for place in range(replicates)])
+    if replicates > 1 and np.ptp(means) > 0.0:
+        half = student_quantile(0.975, replicates - 1) * float(means.std(ddof=1)) / math.sqrt(replicates)
+        low, high = max(0.0, value - half), min(1.0, value + half)
+    total = sum(map(len, passed))
+    return Estimate(value, low, high, total, math.sqrt(value * (1.0 - value)))

@@ -1,0 +1,37 @@
+"""Reads a firing test: one TOML file, validated; a mistake becomes one sentence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from warpimpact.campaign.problems import sentence
+from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.firing.plan import FiringTest
+from warpimpact.firing.requirements import with_requirement
+
+
+def read_test(path: str | Path) -> FiringTest:
+    """Read a test file; file names in it count from its folder.
+
+    Raises:
+        CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
+    """
+    path = Path(path)
+    return firing_test(read_text(path), str(path), path.parent)
+
+
+def firing_test(text: str, name: str, folder: Path) -> FiringTest:
+    """Read a test from its text; `name` is what errors call it."""
+    data: dict[str, Any] = parsed(text, name)
+    try:
+        test = FiringTest.model_validate(data, context={"folder": folder})
+    except ValidationError as error:
+        raise CampaignError(f"{name}: {sentence(error, data)}") from None
+    test._source = text
+    try:
+        return with_requirement(test)
+    except CampaignError as error:
+        raise CampaignError(f"{name}: {error}") from None

@@ -1,0 +1,153 @@
+"""Named requirements: threat, velocity, directions and shots that a standard asks for, as far as it is known here.
+
+Threats and their velocities are those of the catalogue. No text of a standard was at hand: what stands here was found
+second-hand, and `assumed` says what was not found.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import CampaignError
+from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.entries import Threat, Velocity
+from warpimpact.firing.directions import Directions
+from warpimpact.firing.plan import FiringTest
+from warpimpact.scene.units import quoted
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """What a standard asks for.
+
+    Attributes:
+        name: as a test file gives it.
+        standard: its name in the catalogue.
+        shots: of a proof; None for the fewest that show P(stop) ≥ 0.9 at 90 % confidence.
+        azimuth, elevation: of the threat, at which a plate is to hold [degree]; empty for fire along the normal alone.
+        source: of what is known.
+        assumed: what is not known, and what stands in its place.
+    """
+
+    name: str
+    standard: str
+    shots: int | None
+    azimuth: tuple[float, ...]
+    elevation: tuple[float, ...]
+    source: str
+    assumed: str
+
+
+_ROUND = (-80.0, -60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0, 80.0)
+_TABLE = "a second-hand table of threats"
+_STANAG = "a second-hand table of threats, and public summaries of STANAG 4569"
+_STANAG_ASSUMED = (
+    "all azimuths that meet the face of a plate, in steps of 20 deg up to 80 deg, and elevations of 0 to 30 deg; 90 % "
+    "stopped at 90 % confidence, every shot at any place"
+)
+
+
+def _stanag(level: int) -> Requirement:
+    names = f"STANAG 4569 L{level}", f"STANAG 4569 level {level}"
+    return Requirement(*names, None, _ROUND, (0.0, 15.0, 30.0), _STANAG, _STANAG_ASSUMED)
+
+
+REQUIREMENTS = (
+    *(_stanag(level) for level in (2, 3, 4)),
+    Requirement("VPAM 9", "VPAM 9", 3, (), (), _TABLE, "none may perforate; shots at any place"),
+    Requirement("VPAM 10", "VPAM 10", 3, (), (), _TABLE, "3 shots, as of VPAM 9, of which none may perforate"),
+    Requirement("NIJ RF3", "NIJ RF3 / Level IV", None, (), (), _TABLE, "90 % stopped at 90 % confidence"),
+    Requirement("GOST 34286-2017 Br5", "GOST 34286-2017 Br5", 5, (), (), _TABLE, "none may perforate"),
+)
+
+
+def named_requirement(name: str) -> Requirement:
+    """A requirement.
+
+    Raises:
+        CampaignError: there is none of that name.
+    """
+    known = {one.name: one for one in REQUIREMENTS}
+    if name in known:
+        return known[name]
+    meant = get_close_matches(name, known, n=1)
+    hint = f'did you mean "{meant[0]}"?' if meant else f"allowed are {', '.join(known)}"
+    raise CampaignError(f"requirement: got {quoted(name)}, which is not known; {hint}")
+
+
+def threat_of(requirement: Requirement, name: str | None) -> tuple[Threat, Velocity]:
+    """The threat of a requirement, and the velocity that the standard asks for.
+
+    Raises:
+        CampaignError: it has several and none is named, or has none of that name.
+    """
+    asked = {
+        threat.name: (threat, velocity)
+        for threat in Catalogue().all(Threat).values()
+        for velocity in threat.velocities
+        if velocity.standard == requirement.standard
+    }
+    if name is None and len(asked) == 1:
+        return next(iter(asked.values()))
+    if name is None:
+        raise CampaignError(f"threat: is missing, but {requirement.name} has {len(asked)}: {', '.join(asked)}")
+    if name not in asked:
+        raise CampaignError(f"threat: got {quoted(name)}, but {requirement.name} has {', '.join(asked)}")
+    return asked[name]
+
+
+def with_requirement(test: FiringTest) -> FiringTest:
+    """The test with the proof, the window of velocity and the directions of its named requirement, where it gives no
+    others.
+
+    Raises:
+        CampaignError: the requirement or the threat is not known.
+    """
+    if test.requirement is None:
+        return test
+    asked = named_requirement(test.requirement)
+    _, velocity = threat_of(asked, test.threat)
+    proof = {} if test.proof is None else test.proof.model_dump(exclude_none=True, exclude_unset=True)
+    plan = {"velocity": velocity.value} | ({"shots": asked.shots} if asked.shots else {})
+    updates: dict[str, object] = {"proof": plan | proof}
+    if velocity.tolerance and test.gun.window is None:
+        updates["gun"] = {"deviation": test.gun.deviation, "window": velocity.tolerance}
+    if asked.azimuth and test.target.campaign is not None:
+        own = Directions() if test.directions is None else test.directions
+        given = {name: getattr(own, name) for name in own.model_fields_set}
+        angles = {
+            "azimuth": [f"{math.radians(one)!r} rad" for one in asked.azimuth],
+            "elevation": [f"{math.radians(one)!r} rad" for one in asked.elevation],
+        }
+        updates["directions"] = Directions.model_validate({"velocity": velocity.value} | angles | given)
+    completed = test.model_copy(update=updates)
+    completed._source = test._source
+    return completed
+
+
+def with_threat(campaign: Campaign, test: FiringTest) -> Campaign:
+    """The campaign with core and velocity of the threat of a test's requirement; where the catalogue does not know the
+    core, that of the campaign stays."""
+    if test.requirement is None:
+        return campaign
+    threat, velocity = threat_of(named_requirement(test.requirement), test.threat)
+    impact = campaign.impact.model_copy(update={"velocity": velocity.value})
+    core = {} if threat.shape is None else {"core": threat.shape}
+    return campaign.model_copy(update={"impact": impact, **core})
+
+
+def requirement_line(test: FiringTest) -> str:
+    """What a requirement is taken to ask for, with its source and what is assumed; empty where none is named."""
+    if test.requirement is None:
+        return ""
+    asked = named_requirement(test.requirement)
+    threat, velocity = threat_of(asked, test.threat)
+    tolerance = f" ± {velocity.tolerance:g}" if velocity.tolerance else ""
+    core = "" if threat.shape is not None else "; the core of this threat is not known: that of the campaign is used"
+    return (
+        f"{asked.name}: {threat.name} at {velocity.value:g}{tolerance} m/s ({threat.evidence}); source: "
+        f"{asked.source}; assumed: {asked.assumed}{core}"
+    )
