@@ -134,8 +134,9 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
     Raises:
         OutputError: it cannot be written; what was there before is untouched.
     """
+    bare = {name: {"_FillValue": None} for name in dataset.coords}  # CF: a coordinate has no missing values
     with uninterrupted(), aside(path) as file:
-        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4")
+        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4", encoding=bare)
 
 
 def read(path: Path) -> xarray.Dataset:
