@@ -1,14 +1,15 @@
 """Published limit velocities of solid plates, and what the model gives for the same plates per resistance.
 
-Without degradation every term of σ = Y + C √(ρY) v_n + B ρ v_n² scales with Y as the velocity scales with √Y, so the
-limit velocity of one row is √Y times a function of friction η, B and C (docs/model.md §4.5, 6.9). `tabulated` computes
-this function with `limit_velocity` on a few nodes of each; a fit then needs no more runs.
+Without degradation the limit velocity v of a core of mass m and diameter d in a plate of thickness h follows from
+v² m / d³ = Y F(h/d, θ, η, C', B'), with C' = C √(ρ d³/m) and B' = B ρ d³/m (docs/model.md §4.5, 6.9). `tabulated`
+computes F with `limit_velocity` on some nodes of each core; a fit then needs no more runs.
 
-To compute the stored table again, in a minute on one core: python -m tests.validation.limit_rows
+To compute the stored table again, in half an hour on one core: python -m tests.validation.limit_rows
 """
 
 import json
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from warpimpact.scene import Interaction, Numerics, OgiveCore, Plate, Scene, Shots
+from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.scene import Core, Interaction, Numerics, Plate, Scene, Shots
 from warpimpact.solver.limit import limit_velocity
 
 Array = NDArray[np.float64]
@@ -26,16 +29,23 @@ STORED = Path(__file__).parent / "stored"
 PUBLISHED = STORED / "limit_velocities.csv"
 TABLE = STORED / "limit_table.json"
 
-CORE = OgiveCore(diameter=6.248e-3, length=27.5e-3, crh=3.0, mass=5.3e-3)
-"""Of the .30 AP M2 bullet. A bullet counts as its core: jacket and lead are left out."""
-NODES = {"friction": (0.0, 0.1, 0.2), "linear": (0.0, 0.5, 1.0), "quadratic": (0.0, 1.0, 2.0)}
-"""η, C and B of the table."""
-HEAVY = 5000.0
-"""Plate density that parts steel from aluminium [kg/m³]."""
-DENSITY = {"aluminium": 2700.0, "steel": 7850.0}
-"""Plate density of the table [kg/m³]. Another density ρ acts as another C √ρ and B ρ."""
-TYPICAL = {"aluminium": 1.0e9, "steel": 3.0e9}
-"""Y at which the table is computed [Pa]. The limit velocities then are some 300 to 1000 m/s."""
+PROJECTILES = (".30 AP M2", ".50 AP M2", "14.5 mm B32", "14.5 mm BS41")
+BARE = " core"
+"""Ends the name of a projectile that is the core alone, without jacket and lead. A bullet counts as its core."""
+ALIASES = {"bullet": ".30 AP M2", "core": ".30 AP M2 core"}
+NODES = {
+    "calibres": (0.4, 0.65, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0),
+    "obliquity": (0.0, 15.0, 30.0, 45.0),
+    "friction": (0.0, 0.1, 0.2),
+    "linear": (0.0, 0.25, 0.5),
+    "quadratic": (0.0, 0.25, 0.5),
+}
+"""h/d, θ [deg], η, C' and B' of the table."""
+ONSETS = (0.0, 0.02)
+"""κ for which the table has the static law, too."""
+RESISTANCE = 1.0e9
+"""At which the table is computed [Pa]."""
+HIGHEST_OBLIQUITY = 45.0
 
 
 @dataclass(frozen=True)
@@ -43,113 +53,215 @@ class Rows:
     """Rows of the table of limit velocities; arrays of shape [rows].
 
     Attributes:
-        material, projectile, source: names as they are published; the projectile is "bullet" or "core".
+        projectile: name in the catalogue; `bare` says of which rows it is the core alone.
+        material, source: as they are published.
         thickness: of the plate [m].
         obliquity: [rad].
         velocity: published limit velocity [m/s].
+        deviation: its measured standard deviation [m/s]; NaN where there is none.
         density: of the plate [kg/m³].
         flow_stress: mean of yield and tensile strength of the plate [Pa].
-        unit: limit velocity per √Y that the model gives, √(m³/kg), shape [rows, η, C, B] of NODES.
+        hardness: of the plate, Vickers.
     """
 
-    material: NDArray[np.str_]
     projectile: NDArray[np.str_]
+    bare: NDArray[np.bool_]
+    material: NDArray[np.str_]
     source: NDArray[np.str_]
     thickness: Array
     obliquity: Array
     velocity: Array
+    deviation: Array
     density: Array
     flow_stress: Array
-    unit: Array
+    hardness: Array
 
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.velocity)
 
-    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> "Rows":
+    def __getitem__(self, which: NDArray[Any]) -> "Rows":
         """Some of the rows."""
         return Rows(**{name: values[which] for name, values in vars(self).items()})
 
+    @property
+    def diameter(self) -> Array:
+        """Of the cores [m]."""
+        return np.array([2.0 * core(name).max_radius for name in self.projectile])
 
-def metal(density: float) -> str:
-    """The one of DENSITY whose table serves for a plate."""
-    return "steel" if density > HEAVY else "aluminium"
+    @property
+    def mass(self) -> Array:
+        """Of the cores [kg]."""
+        return np.array([core(name).mass_properties.mass for name in self.projectile])
+
+    @property
+    def calibres(self) -> Array:
+        """Thickness over diameter of the core."""
+        return self.thickness / self.diameter
+
+
+@cache
+def core(projectile: str) -> Core:
+    """The core of a projectile, from the catalogue."""
+    found = Catalogue().threat(str(projectile)).shape
+    assert found is not None
+    return found
 
 
 def published(file: Path = PUBLISHED) -> Rows:
-    """All rows of a file, with what the model gives for each: of the published rows the stored table, else computed."""
+    """All rows of a file.
+
+    Raises:
+        ValueError: a projectile has no table, or an obliquity lies beyond it.
+    """
     data = pd.read_csv(file)
-    table = json.loads(TABLE.read_text(encoding="utf-8")) if file == PUBLISHED else tabulated(file)
-    assert {name: tuple(values) for name, values in table["nodes"].items()} == NODES
-    by_plate = {tuple(row["plate"]): row["unit"] for row in table["rows"]}
+    full = data["projectile"].replace(ALIASES)
+    bare = full.str.endswith(BARE).to_numpy(bool)
+    names = full.str.removesuffix(BARE)
+    if foreign := sorted(set(names) - set(PROJECTILES)):
+        raise ValueError(f'{file}: got the projectile "{foreign[0]}", but it must be one of {", ".join(PROJECTILES)}')
+    if (data["obliquity_deg"] > HIGHEST_OBLIQUITY).any():
+        raise ValueError(f"{file}: got an obliquity above {HIGHEST_OBLIQUITY:g} deg, which the table does not reach")
     return Rows(
-        material=data["material"].to_numpy(dtype=np.str_),
-        projectile=data["projectile"].to_numpy(dtype=np.str_),
-        source=data["source"].to_numpy(dtype=np.str_),
+        projectile=names.to_numpy(np.str_),
+        bare=bare,
+        material=data["material"].to_numpy(np.str_),
+        source=data["source"].to_numpy(np.str_),
         thickness=data["thickness_mm"].to_numpy(float) * 1e-3,
         obliquity=np.radians(data["obliquity_deg"].to_numpy(float)),
         velocity=data["limit_velocity_m_s"].to_numpy(float),
+        deviation=data["standard_deviation_m_s"].to_numpy(float),
         density=data["plate_density_g_cm3"].to_numpy(float) * 1e3,
         flow_stress=data[["plate_yield_MPa", "plate_UTS_MPa"]].mean(axis=1).to_numpy(float) * 1e6,
-        unit=np.array([by_plate[plate] for plate in _plates(data)]),
+        hardness=data["plate_hardness_HV"].to_numpy(float),
     )
 
 
-def computed(plates: list[tuple[str, float, float]], *, linear: float, quadratic: float, friction: Array) -> Array:
-    """Limit velocity per √Y of some plates, √(m³/kg), shape [plates, friction].
+def joined(rows: Rows, more: Rows) -> Rows:
+    """One after the other."""
+    return Rows(**{name: np.concatenate([values, getattr(more, name)]) for name, values in vars(rows).items()})
+
+
+def computed(
+    projectile: str,
+    plates: list[tuple[float, float, float]],
+    *,
+    linear: float = 0.0,
+    quadratic: float = 0.0,
+    onset: float = Interaction().onset,
+    start: float = 2.5,
+) -> Array:
+    """F of some plates, shape [plates].
 
     Args:
-        plates: metal, thickness [mm] and obliquity [deg] of each; one metal.
-        linear, quadratic: C and B.
-        friction: η, shape [friction].
+        plates: h/d, θ [deg] and η of each.
+        linear, quadratic: C' and B'.
+        onset: κ.
+        start: energy at which the searches begin, over that of the plain work.
     """
-    (kind,) = {plate[0] for plate in plates}
-    each = [(h * 1e-3, np.radians(angle), eta) for (_, h, angle), eta in product(plates, friction)]
-    thickness, obliquity, shear = np.array(each).T
-    zero = np.zeros(len(each))
-    way = thickness / np.cos(obliquity)
+    body = core(projectile)
+    mass, diameter = body.mass_properties.mass, 2.0 * body.max_radius
+    calibres, obliquity, friction = np.array(plates).T
+    angle, zero = np.radians(obliquity), np.zeros(len(plates))
+    work = RESISTANCE * np.pi / 4.0 * diameter**3 * calibres / np.cos(angle)
     shots = Shots(
         hit_y=zero,
         hit_z=zero,
-        velocity=np.sqrt(2.5 * TYPICAL[kind] * np.pi * CORE.max_radius**2 * way / CORE.mass),
-        obliquity=obliquity,
+        velocity=np.sqrt(start * work / mass),
+        obliquity=angle,
         azimuth=zero,
         pitch=zero,
         yaw=zero,
         spin=zero,
-        thickness=thickness,
-        shear_coefficient=shear,
+        thickness=calibres * diameter,
+        shear_coefficient=friction,
     )
-    plate = Plate(thickness=float(thickness.max()), resistance=TYPICAL[kind], density=DENSITY[kind])
-    scene = Scene(core=CORE, target=plate, interaction=Interaction(linear=linear, quadratic=quadratic))
-    limits = limit_velocity(scene, shots, numerics=Numerics(level=2), tolerance=0.5, device="cpu")
-    assert limits.converged.all()
-    return (limits.value / np.sqrt(TYPICAL[kind])).reshape(len(plates), len(friction))
+    plate = Plate(thickness=float(calibres.max() * diameter), resistance=RESISTANCE, density=mass / diameter**3)
+    law = Interaction(linear=linear, quadratic=quadratic, onset=onset)
+    scene = Scene(core=body, target=plate, interaction=law)
+    found = limit_velocity(scene, shots, numerics=Numerics(level=2), tolerance=0.5, highest=4.0e3, device="cpu")
+    value = found.value**2 * mass / (RESISTANCE * diameter**3)
+    for place in np.flatnonzero(~np.isfinite(value)) if start < 5.0 else ():  # the search went past the limit
+        law_again = {"linear": linear, "quadratic": quadratic, "onset": onset, "start": 2.0 * start}
+        value[place] = computed(projectile, [plates[place]], **law_again)[0]
+    return np.asarray(value)
 
 
-def tabulated(file: Path = PUBLISHED) -> dict[str, Any]:
-    """The table of all plates of a file, as it is stored."""
-    plates = sorted(set(_plates(pd.read_csv(file))))
-    unit = np.empty((len(plates), *(len(values) for values in NODES.values())))
-    for kind in DENSITY:
-        some = [index for index, plate in enumerate(plates) if plate[0] == kind]
-        if not some:
-            continue
+def tabulated() -> dict[str, Any]:
+    """The table of all projectiles, as it is stored."""
+    shape = tuple(len(values) for values in NODES.values())
+    plates = list(product(*(NODES[name] for name in ("calibres", "obliquity", "friction"))))
+    table: dict[str, Any] = {}
+    for name in PROJECTILES:
+        found = np.empty(shape)
         for (c, linear), (b, quadratic) in product(enumerate(NODES["linear"]), enumerate(NODES["quadratic"])):
-            friction = np.array(NODES["friction"])
-            values = computed([plates[i] for i in some], linear=linear, quadratic=quadratic, friction=friction)
-            unit[some, :, c, b] = values
-    rows = [{"plate": plate, "unit": values.tolist()} for plate, values in zip(plates, unit.round(8), strict=True)]
-    return {"nodes": NODES, "rows": rows}
+            found[..., c, b] = computed(name, plates, linear=linear, quadratic=quadratic).reshape(shape[:3])
+        onsets = {str(onset): computed(name, plates, onset=onset).reshape(shape[:3]) for onset in ONSETS}
+        table[name] = {"F": _rounded(found), "onset": {key: _rounded(values) for key, values in onsets.items()}}
+    return {"nodes": NODES, "projectiles": table}
 
 
-def _plates(data: pd.DataFrame) -> list[tuple[str, float, float]]:
-    """Metal, thickness [mm] and obliquity [deg] of each row."""
-    columns = zip(data["plate_density_g_cm3"], data["thickness_mm"], data["obliquity_deg"], strict=True)
-    return [(metal(1e3 * density), float(thickness), float(angle)) for density, thickness, angle in columns]
+def _rounded(values: Array) -> Any:
+    return [float(f"{value:.5g}") for value in values.ravel()]
+
+
+@cache
+def _table() -> dict[str, Any]:
+    stored: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
+    assert {name: tuple(values) for name, values in stored["nodes"].items()} == NODES
+    projectiles: dict[str, Any] = stored["projectiles"]
+    return projectiles
+
+
+def unit(rows: Rows, onset: float | None = None) -> Array:
+    """ln F of rows at the nodes of η, C' and B', shape [rows, 3, 3, 3]; at another onset than that of the package the
+    static law's, which does not depend on C' and B'."""
+    shape = tuple(len(values) for values in NODES.values())
+    calibres = np.array(NODES["calibres"])
+    found = np.empty((len(rows), *shape[2:]))
+    for name in set(rows.projectile):
+        one = _table()[name]
+        flat = np.array(one["F"] if onset is None else one["onset"][str(onset)])
+        values = flat.reshape(shape) if onset is None else np.broadcast_to(flat.reshape(*shape[:3], 1, 1), shape)
+        per_calibre = np.log(values / calibres[:, None, None, None, None])
+        here = np.flatnonzero(rows.projectile == name)
+        at = CubicSpline(np.log(calibres), per_calibre)(np.log(rows.calibres[here]))
+        angles = np.degrees(rows.obliquity[here])
+        for angle in np.unique(angles):
+            some = angles == angle
+            found[here[some]] = PchipInterpolator(NODES["obliquity"], at[some], axis=1)(angle)
+    return found + np.log(rows.calibres)[:, None, None, None]
+
+
+def log_unit(nodes: Array, rows: Rows, friction: float, linear: float, quadratic: float) -> Array:
+    """ln F of rows for a law, interpolated between the nodes by parabolas, shape [rows].
+
+    Args:
+        nodes: `unit` of the rows.
+        friction, linear, quadratic: η, C and B.
+    """
+    share = rows.density * rows.diameter**3 / rows.mass
+    own = {
+        "friction": np.full(len(rows), friction),
+        "linear": linear * np.sqrt(share),
+        "quadratic": quadratic * share,
+    }
+    eta, c, b = (_lagrange(np.array(NODES[name]), values) for name, values in own.items())
+    return np.asarray(np.einsum("recb,re,rc,rb->r", nodes, eta, c, b))
+
+
+def _lagrange(nodes: Array, at: Array) -> Array:
+    """Weights of the nodes for polynomials through them, shape [at, nodes]."""
+    weights = np.ones((len(at), len(nodes)))
+    for i, own in enumerate(nodes):
+        for other in np.delete(nodes, i):
+            weights[:, i] *= (at - other) / (own - other)
+    return weights
+
+
+def main() -> None:
+    TABLE.write_text(json.dumps(tabulated(), separators=(",", ":")) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
-    table = tabulated()
-    lines = ",\n".join(json.dumps(row) for row in table["rows"])
-    TABLE.write_text(f'{{"nodes": {json.dumps(table["nodes"])},\n"rows": [\n{lines}\n]}}\n', encoding="utf-8")
+    main()

@@ -1,169 +1,137 @@
 """Published limit velocities of solid plates beside those that the model and simple rivals predict from other rows.
 
-Every row of a material is predicted by a fit to rows of the same material that leaves it out: all others ("one left
-out"), thinner ones ("thicker"), those at normal incidence ("oblique"). "other materials" predicts a material from its
-tensile test alone. `python -m tests.validation.limit_velocities` writes the predictions and their summary to stored/,
-the figure, and the tables of docs/validation.md. With a file of rows of the same columns it prints the tables instead.
+`python -m tests.validation.limit_velocities` fits the stored rows, writes predictions, summary, figure and the tables
+of docs/validation.md. With a file of rows of the same columns it prints, per projectile and material, what was fitted
+and predicted, from the stored rows and from the other rows of the file.
 """
 
 import json
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from .limit_laws import LAWS, RIVALS, fit, power_law
-from .limit_rows import PUBLISHED, STORED, Rows, published
+from .limit_model import CHOSEN, LAWS, Fit, Law, Model, fit
+from .limit_rows import PUBLISHED, STORED, Rows, joined, published
+from .limit_splits import LAW, Split, left_out, predictions, questions
 
 PREDICTIONS = STORED / "limit_predictions.csv"
 SUMMARY = STORED / "limit_summary.json"
-LEAST_ROWS = 3
-"""Rows of a material that is fitted."""
-LEAST_SQUARES = "De Marre, fitted"
-Mask = NDArray[np.bool_]
 
 
-def fitted_materials(rows: Rows) -> list[str]:
-    """Materials with rows enough for a fit, in the order of the file."""
-    names, counts = np.unique(rows.material, return_counts=True)
-    enough = set(names[counts >= LEAST_ROWS])
-    return [name for name in dict.fromkeys(rows.material.tolist()) if name in enough]
+def stored_fit(law: Law = CHOSEN) -> Fit:
+    """The fit of the stored rows."""
+    stored = json.loads(SUMMARY.read_text(encoding="utf-8"))["fits"][law.name]
+    return Fit(law, np.array(stored["values"]), stored["log_posterior"])
 
 
-def splits(rows: Rows) -> Iterator[tuple[str, Mask, Mask]]:
-    """Of the rows of one material: what is asked, the rows that are fitted and those that are predicted."""
-    for row in range(len(rows)):
-        tested = np.arange(len(rows)) == row
-        yield "one left out", ~tested, tested
-    thick, oblique = rows.thickness > np.median(rows.thickness), rows.obliquity > 0.0
-    for name, tested in (("thicker", thick), ("oblique", oblique)):
-        if tested.any() and (~tested).sum() >= LEAST_ROWS - 1:
-            yield name, ~tested, tested
+def every_prediction(rows: Rows, found: Fit) -> pd.DataFrame:
+    """Of all splits of some rows."""
+    splits = [*left_out(rows), *questions(rows)]
+    return pd.concat([predictions(rows, one, found) for one in splits if one.groups])
 
 
-def predictions(rows: Rows) -> pd.DataFrame:
-    """All predictions: columns split, row (in the file), material, published, method, predicted, low, high [m/s].
+def of_a_file(rows: Rows, stored: Rows, found: Fit) -> pd.DataFrame:
+    """Predictions of the rows of a file: from the stored rows that are not in it, and from its other rows, too.
 
-    low and high enclose 90 %; they are missing where a method has no interval.
+    The sizes of the parts of ln Y are those of the stored rows.
     """
-    found = [one for name in fitted_materials(rows) for one in _of_material(rows, name)]
-    found += _of_other_materials(rows)
-    columns = ["split", "row", "material", "published", "method", "predicted", "low", "high"]
-    return pd.DataFrame(found, columns=columns).round({"predicted": 1, "low": 1, "high": 1})
+    there = _keys(rows)
+    rest = stored[~np.isin(_keys(stored), there)]
+    both, tested = joined(rest, rows), np.arange(len(rest), len(rest) + len(rows))
+    parts = []
+    if len(rest):
+        known = np.arange(len(both)) < len(rest)
+        parts.append(predictions(both, Split("from the stored rows", [tested], [known]), found))
+    parts += [predictions(rows, one, found) for one in [*left_out(rows), *questions(rows)] if one.groups]
+    return pd.concat(parts)
 
 
-def _of_material(rows: Rows, material: str) -> Iterator[tuple[object, ...]]:
-    places = np.flatnonzero(rows.material == material)
-    own = rows[places]
-    for split, fitted, tested in splits(own):
-        answers = {law.name: fit(law, own[fitted]).predict(own[tested]) for law in (*LAWS, *RIVALS)}
-        least = power_law(own[fitted], own[tested])
-        answers[LEAST_SQUARES] = (least, *np.full((2, len(least)), np.nan))
-        for method, answer in answers.items():
-            for place, values in zip(places[tested], np.transpose(answer), strict=True):
-                yield split, place, material, rows.velocity[place], method, *values
+def compare_laws(rows: Rows, fits: dict[str, Fit]) -> pd.DataFrame:
+    """Of each law and split: median error, coverage, logarithm of the predictive density (elpd) and mean CRPS [m/s]."""
+    lines = []
+    for law in LAWS:
+        values = fits[law.name].values
+        model = Model(rows, law).weighed(values)
+        residual = model.residual(values)
+        for split in left_out(rows):
+            mean, variance = model.left_out(values, split.groups)
+            place = np.concatenate(split.groups)
+            middle, low, high = (one[place] for one in model.velocity(values, mean, variance))
+            true, off = rows.velocity[place], (residual - mean)[place] / np.sqrt(variance[place])
+            density = -0.5 * off**2 - 0.5 * np.log(2.0 * np.pi * 0.25 * variance[place]) - np.log(true)
+            spread = 0.5 * np.sqrt(variance[place]) * middle
+            lines.append({
+                "law": law.name,
+                "split": split.name,
+                "rows": len(place),
+                "median": round(float(np.median(np.abs(middle / true - 1.0))), 4),
+                "inside": round(float(((low <= true) & (true <= high)).mean()), 3),
+                "elpd": round(float(density.sum()), 1),
+                "crps": round(float(_crps((true - middle) / spread, spread).mean()), 2),
+            })  # fmt: skip
+    return pd.DataFrame(lines)
 
 
-def _of_other_materials(rows: Rows) -> list[tuple[object, ...]]:
-    """Strength over flow stress as the mean of all other materials, each counted once; all else at its prior."""
-    found: list[tuple[object, ...]] = []
-    names = list(dict.fromkeys(rows.material.tolist()))
-    if len(names) == 1:
-        return []
-    for law in (*LAWS, *RIVALS):
-        x, weights = law.shapes(rows)
-        known = weights @ x + law.expected(rows)
-        excess = np.log(rows.velocity) - known
-        means = {name: excess[rows.material == name].mean() for name in names}
-        for place, name in enumerate(rows.material.tolist()):
-            others = np.array([mean for other, mean in means.items() if other != name])
-            predicted = np.exp(known[place] + others.mean())
-            found.append(("other materials", place, name, rows.velocity[place], law.name, predicted, np.nan, np.nan))
-    return found
+def _crps(z: np.ndarray, spread: np.ndarray) -> np.ndarray:
+    """Continuous ranked probability score of normal predictions (Gneiting and Raftery 2007)."""
+    from scipy.stats import norm
+
+    return np.asarray(spread * (z * (2.0 * norm.cdf(z) - 1.0) + 2.0 * norm.pdf(z) - 1.0 / np.sqrt(np.pi)))
 
 
-def evidence(rows: Rows) -> pd.DataFrame:
-    """Logarithm of the marginal likelihood of each material's rows (index) under each law (columns)."""
-    table = {
-        law.name: {name: fit(law, rows[rows.material == name]).evidence for name in fitted_materials(rows)}
-        for law in (*LAWS, *RIVALS)
-    }
-    return pd.DataFrame(table)
-
-
-def chosen(evidences: pd.DataFrame) -> str:
-    """The law, of those with a core, under which all rows together are the most probable."""
-    return str(evidences[[law.name for law in LAWS]].sum().idxmax())
-
-
-def summary(rows: Rows, found: pd.DataFrame, evidences: pd.DataFrame) -> dict[str, object]:
-    """Median and 90th percentile of the relative error, by split, method and material, and the evidence."""
-    error = (found["predicted"] / found["published"] - 1.0).abs()
-    inside = found["published"].between(found["low"], found["high"])
-    table = found.assign(error=error, inside=inside.where(found["low"].notna()))
-    together, own = _spread(table.assign(material="all")), _spread(table)
-    names = [law.name for law in LAWS]
-    others = {name: str(evidences[names].drop(index=name).sum().idxmax()) for name in evidences.index}
-    return {
-        "law": chosen(evidences),
-        "rows nearer than": _nearer(table, chosen(evidences)),
-        "law by the evidence of the other materials": others,
-        "evidence": evidences.round(2).to_dict(),
-        "strength": _strengths(rows, chosen(evidences)),
-        "errors": pd.concat([together, own]).to_dict("records"),
-    }
-
-
-def _strengths(rows: Rows, law: str) -> dict[str, dict[str, list[float]]]:
-    """Median and ends of the 90 % interval of Y [GPa] of each material, under the static law and the chosen one."""
-    laws = [each for each in LAWS if each.name in ("static", law)]
-    return {
-        name: {
-            each.name: [round(y / 1e9, 3) for y in fit(each, rows[rows.material == name]).strength()] for each in laws
-        }
-        for name in fitted_materials(rows)
-    }
-
-
-def _nearer(table: pd.DataFrame, law: str) -> dict[str, float]:
-    """Share of the rows, one left out, that the law predicts more nearly than each rival does."""
-    errors = table[table["split"] == "one left out"].pivot(index="row", columns="method", values="error")
-    rivals = [rival.name for rival in RIVALS] + [LEAST_SQUARES]
-    return {name: round(float((errors[law] < errors[name]).mean()), 3) for name in rivals}
-
-
-def _spread(table: pd.DataFrame) -> pd.DataFrame:
-    groups = table.groupby(["split", "method", "material"], sort=False)
-    errors = groups["error"]
-    columns = {
-        "rows": errors.size(),
-        "median": errors.median().round(4),
-        "p90": errors.quantile(0.9).round(4),
+def errors(found: pd.DataFrame, by: list[str]) -> pd.DataFrame:
+    """Median and 90th percentile of the relative error, its median with its sign, share inside the intervals."""
+    error = found["predicted"] / found["published"] - 1.0
+    inside = found["published"].between(found["low"], found["high"]).where(found["low"].notna())
+    table = found.assign(error=error.abs(), bias=error, inside=inside)
+    groups = table.groupby(by, sort=False)
+    return pd.DataFrame({
+        "fitted": groups["fitted"].median().astype(int),
+        "rows": groups["error"].size(),
+        "median": groups["error"].median().round(4),
+        "p90": groups["error"].quantile(0.9).round(4),
+        "bias": groups["bias"].median().round(4),
         "inside": groups["inside"].mean().astype(float).round(3),
-    }
-    result = pd.DataFrame(columns).reset_index()
-    return result.astype({"inside": object}).where(result.notna(), None)
+    }).reset_index()  # fmt: skip
+
+
+def printed(found: pd.DataFrame) -> str:
+    """A table per split: by projectile and material, fitted on, predicted, errors in % beside the rivals."""
+    lines = list[str]()
+    for split, own in found.groupby("split", sort=False):
+        lines.append(f"\n{split}: fitted on, predicted, median and 90 % error, bias, inside 90 % | rivals: median")
+        every = [(("all", "all"), own), *own.groupby(["projectile", "material"], sort=False)]
+        for (projectile, material), some in every:
+            table = errors(some, ["method"]).set_index("method")
+            one = table.loc[LAW]
+            rivals = ", ".join(f"{name} {table.loc[name, 'median']:.1%}" for name in table.index if name != LAW)
+            numbers = f"{one['median']:.1%} {one['p90']:.1%} {one['bias']:+.1%} {one['inside']:.0%}"
+            lines.append(f"{projectile:<13}{material:<18}{one['fitted']:>5}{one['rows']:>5}  {numbers} | {rivals}")
+    return "\n".join(lines)
+
+
+def _keys(rows: Rows) -> np.ndarray:
+    columns = (rows.projectile, rows.bare, rows.material, rows.thickness, rows.obliquity.round(6), rows.velocity)
+    return np.array(["|".join(map(str, one)) for one in zip(*columns, strict=True)])
 
 
 def main() -> None:
-    from .limit_report import draw, tables, write_tables
+    if len(sys.argv) > 1:
+        try:
+            rows = published(Path(sys.argv[1]))
+        except ValueError as error:
+            sys.exit(str(error))
+        print(printed(of_a_file(rows, published(), stored_fit())))
+        return
+    from .limit_report import write
 
-    file = Path(sys.argv[1]) if len(sys.argv) > 1 else PUBLISHED
-    rows = published(file)
-    if not fitted_materials(rows):
-        sys.exit(f"{file}: no material has {LEAST_ROWS} rows or more, which a fit needs")
-    found, evidences = predictions(rows), evidence(rows)
-    result = summary(rows, found, evidences)
-    if file == PUBLISHED:
-        found.to_csv(PREDICTIONS, index=False)
-        SUMMARY.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-        draw(rows, found, result)
-        write_tables(rows, result)
-    for table in tables(rows, result).values():
-        print(table, end="\n\n")
+    rows = published(PUBLISHED)
+    fits = {law.name: fit(rows, law) for law in LAWS}
+    found = every_prediction(rows, fits[LAW])
+    write(rows, fits, found, compare_laws(rows, fits))
+    print(printed(found))
 
 
 if __name__ == "__main__":

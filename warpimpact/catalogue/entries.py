@@ -152,7 +152,8 @@ class Material(Model):
     def evidence(self) -> str:
         """State of the evidence, as it stands behind the name."""
         misfit = "" if self.misfit is None else f", error of rows left out {self.misfit:.1%} (median)"
-        rows = f"{self.count} limit velocities{misfit}; " if self.count else ""
+        kind = "limit velocity" if self.count == 1 else "limit velocities"
+        rows = f"{self.count} {kind}{misfit}; " if self.count else ""
         return rows + evidence(self.known, self.assumed)
 
 

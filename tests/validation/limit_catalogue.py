@@ -1,0 +1,103 @@
+"""Entries of the catalogue from the fit of published limit velocities.
+
+To write them again, after `python -m tests.validation.limit_velocities`: python -m tests.validation.limit_catalogue
+"""
+
+import json
+
+import numpy as np
+import pandas as pd
+
+from warpimpact.catalogue.catalogue import FOLDERS, file_name
+from warpimpact.catalogue.entries import Material
+
+from .limit_model import Fit, Model
+from .limit_rows import PROJECTILES, Rows, published
+from .limit_velocities import PREDICTIONS as _PREDICTIONS
+from .limit_velocities import SUMMARY, errors, stored_fit
+
+DATABASE = "ballistic limit database, Mendeley Data 10.17632/4f92y6jzzh.2"
+_APART = 1.25
+"""The thicknesses between which an exponent is found differ at least by this ratio."""
+
+
+def entries(rows: Rows, found: Fit, predicted: pd.DataFrame) -> list[str]:
+    """The text of the file of every material."""
+    model = Model(rows, found.law).weighed(found.values)
+    return [_entry(rows, model, found, name, predicted) for name in dict.fromkeys(rows.material.tolist())]
+
+
+def _entry(rows: Rows, model: Model, found: Fit, name: str, predicted: pd.DataFrame) -> str:
+    own = rows[rows.material == name]
+    counts = {one: int((own.projectile == one).sum()) for one in PROJECTILES if (own.projectile == one).any()}
+    projectile = ".30 AP M2" if ".30 AP M2" in counts else max(counts, key=lambda one: counts[one])
+    of_it = own[own.projectile == projectile]
+    low, high = of_it.calibres.min(), of_it.calibres.max()
+    if high < _APART * low:
+        low, high = np.sqrt(low * high / _APART), np.sqrt(low * high * _APART)
+    wanted = _plates(of_it, np.array([low, np.sqrt(low * high), high]))
+    mean, deviation = model.strength(found.values, wanted)
+    exponent = (mean[2] - mean[0]) / np.log(high / low)
+    strength = float(np.exp(mean[1] - exponent * np.log(np.sqrt(low * high))))
+    spread = float(np.exp(1.645 * deviation[1]))
+    left = predicted[predicted["material"] == name]
+    split = "one row out" if (left["split"] == "one row out").any() else "one material out"
+    miss = errors(left[left["split"] == split], ["material"]).iloc[0]
+    angles = np.degrees(own.obliquity)
+    lines = [
+        f'name = "{name}"',
+        f'density = "{own.density.mean():.0f} kg/m^3"',
+        f'resistance = "{strength / 1e6:.4g} MPa"',
+        f'resistance_low = "{strength / spread / 1e6:.4g} MPa"',
+        f'resistance_high = "{strength * spread / 1e6:.4g} MPa"',
+        f"thickness_exponent = {exponent:.3f}",
+        f"shear_coefficient = {found.coefficients['friction']:.3f}",
+        f"linear = {found.coefficients['linear']:.3g}",
+        f"quadratic = {found.coefficients['quadratic']:.3g}",
+        f"sources = {json.dumps(sorted(set(own.source.tolist())))}",
+        f'thickness_low = "{1e3 * own.thickness.min():.4g} mm"',
+        f'thickness_high = "{1e3 * own.thickness.max():.4g} mm"',
+        f"calibres_low = {own.calibres.min():.3f}",
+        f"calibres_high = {own.calibres.max():.3f}",
+        f'obliquity_low = "{angles.min():.3g} deg"',
+        f'obliquity_high = "{angles.max():.3g} deg"',
+        f"misfit = {miss['median']:.4f}",
+        f"misfit_p90 = {miss['p90']:.4f}",
+        f"coverage = {miss['inside']:.3f}",
+        f"hardness = {own.hardness.mean():.0f}",
+        "",
+        "[rows]",
+        *(f'"{one}" = {count}' for one, count in counts.items()),
+        "",
+        "[known]",
+        f'rows = "{DATABASE}"',
+        f'resistance = "hierarchical fit of the rows, for the {projectile} (docs/validation.md)"',
+        f'misfit = "{split}"',
+        "",
+        "[assumed]",
+        'bullet = "a bullet counts as its core: jacket and lead are left out"',
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _plates(some: Rows, calibres: np.ndarray) -> Rows:
+    """Plates of a material at normal incidence, of these thicknesses in diameters of the core."""
+    first = some[np.zeros(len(calibres), dtype=np.int64)]
+    changed = {
+        "thickness": calibres * first.diameter,
+        "obliquity": np.zeros(len(calibres)),
+        "bare": np.zeros(len(calibres), dtype=bool),
+        "flow_stress": np.full(len(calibres), some.flow_stress.mean()),
+    }
+    return Rows(**(vars(first) | changed))
+
+
+def main() -> None:
+    assert SUMMARY.exists()
+    for text in entries(published(), stored_fit(), pd.read_csv(_PREDICTIONS)):
+        name = text.partition('"')[2].partition('"')[0]
+        (FOLDERS[Material] / f"{file_name(name)}.toml").write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
