@@ -86,12 +86,13 @@ class CampaignReference(FromTheCode):
         if not models or name == "layer.pattern":  # which is that of the plate
             return
         yield from [f"{depth} `[{name}]`", "", part.get("description", "").capitalize(), ""]
-        if len(models) > 1 and "shape" in models[0]["properties"]:
+        decided = [key for key in ("shape", "name") if "const" in models[0]["properties"].get(key, {})]
+        if len(models) > 1 and decided:
             shared = self.shared(models)
             yield from self.keys(shared)
             for model in models:
                 model["properties"] = {k: v for k, v in model["properties"].items() if k not in shared["properties"]}
-                yield from self.variant(model, "shape", depth + "#")
+                yield from self.variant(model, decided[0], depth + "#")
             return
         for model in models:
             if model is not models[0]:
@@ -194,6 +195,19 @@ class CampaignReference(FromTheCode):
 def short(number: float) -> str:
     power = math.log2(number) if number > 0 else 0.5
     return f"2^{power:g}" if power >= 16 and power == int(power) else f"{number:g}"
+
+
+class FiringReference(CampaignReference):
+    """Every key of a test file, table by table, from its JSON schema."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.firing.schema import firing_schema
+
+        self.schema = firing_schema()
+        yield from ["## Tables of the file", ""]
+        yield from self.keys(self.schema)
+        for name, part in self.schema["properties"].items():
+            yield from self.of_table(name, part)
 
 
 # --- Commands ---
@@ -347,6 +361,7 @@ def device_mark(node: ast.FunctionDef | ast.ClassDef) -> str | None:
 def setup(app: Sphinx) -> dict[str, bool]:
     for name, directive in {
         "campaign-reference": CampaignReference,
+        "firing-reference": FiringReference,
         "exclusion-reference": ExclusionReference,
         "command-reference": CommandReference,
         "variable-reference": VariableReference,
