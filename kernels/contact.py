@@ -3,6 +3,8 @@
 A step makes two passes over the patches in the slab. The first pass finds the patches that touch and adds their
 exposure to the plate. The second pass reads the weakened plate and sums the load. Each pass is one loop over the
 patches of all rings without a branch, so a CPU computes several patches at once.
+
+Long because the second pass reads what the first one finds.
 """
 
 from functools import cache
@@ -11,7 +13,19 @@ from typing import Any
 
 import warp as wp
 
-from . import core_surface, damping, exposure, footprint, grip, interaction, lanes, memory, plate_grid, rigid_body
+from . import (
+    channel,
+    core_surface,
+    damping,
+    exposure,
+    footprint,
+    grip,
+    interaction,
+    lanes,
+    memory,
+    plate_grid,
+    rigid_body,
+)
 from .variant import Variant
 
 
@@ -20,7 +34,9 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
     real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(core_surface, damping, exposure, footprint, grip, interaction, lanes, plate_grid, rigid_body)
+    use = variant.use(
+        channel, core_surface, damping, exposure, footprint, grip, interaction, lanes, plate_grid, rigid_body
+    )
     Footprint, Sums = use.footprint.Footprint, use.damping.Sums
     Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
     Plate, Fields, Window = use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
@@ -38,7 +54,8 @@ def build(variant: Variant) -> SimpleNamespace:
         of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
         planes. `ring_area` is the area of all
         patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
-        `total_area` is the area of a ring in all layers of the target.
+        `total_area` is the area of a ring in all layers of the target. `place` and `ahead` are the patch's place in the
+        channels of earlier hits (kernels/channel.py).
         """
 
         area: wp.array(dtype=real)
@@ -53,6 +70,8 @@ def build(variant: Variant) -> SimpleNamespace:
         ring_area: wp.array(dtype=real)
         sums: wp.array(dtype=Sums)
         total_area: wp.array(dtype=real)
+        place: wp.array(dtype=wp.int32)
+        ahead: wp.array(dtype=real)
 
     @wp.func
     def find_touches(
@@ -100,6 +119,10 @@ def build(variant: Variant) -> SimpleNamespace:
             write_index(touches.cell, base + j, index)
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
+            if wp.static(variant.burst):
+                place, ahead = use.channel.place_of(window, patch.x, wp.clamp(cell.index, window.first, last_cell))
+                write_index(touches.place, base + j, place)
+                write(touches.ahead, base + j, ahead)
             if wp.static(variant.window > 0):
                 j += use.lanes.count()
             else:
@@ -295,6 +318,23 @@ def build(variant: Variant) -> SimpleNamespace:
         begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
         base = slot * surface.rings * surface.around - begin  # what a step touches stays in the fastest cache
         find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
+        if wp.static(variant.burst):
+            if window.pierced:
+                use.channel.spare_channels(
+                    touches.area,
+                    touches.slope,
+                    touches.gain,
+                    touches.place,
+                    touches.ahead,
+                    touches.y,
+                    touches.z,
+                    base + begin,
+                    end - begin,
+                    fields.channel,
+                    window.nodes,
+                    window.cells_z,
+                    use.channel.per_wall(window),
+                )
         first, last = int(surface.rings), int(-1)  # of the rings that touch
         for index in range(found.first_ring, found.last_ring + 1):
             area = zero

@@ -28,7 +28,8 @@ def build(variant: Variant) -> SimpleNamespace:
         the change of the normal over it.
         `cosine` and `sine` are those of the azimuths of all patches, ring by ring. Odd rings are turned by half a
         patch, so neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
-        4. `patches` repeats the members of a ring for each of its patches, one array behind the other: a CPU then goes
+        4. `profile` has radii [m] at even stations, `per_station` of them per metre, from the base's station `base` [m]
+        on. `patches` repeats the members of a ring for each of its patches, one array behind the other: a CPU then goes
         through the patches of all rings in one loop.
         """
 
@@ -44,6 +45,9 @@ def build(variant: Variant) -> SimpleNamespace:
         cosine: wp.array(dtype=real)
         sine: wp.array(dtype=real)
         patches: wp.array(dtype=real)
+        profile: wp.array(dtype=real)
+        base: real
+        per_station: real
         rings: wp.int32
         around: wp.int32
         max_radius: real

@@ -1,5 +1,5 @@
-"""Earlier hits on the same plate: what each of them added to the exposure, and what a later one finds of it
-(docs/model.md §8).
+"""Earlier hits on the same plate: what each of them added to the exposure, the channel that it left, and what a later
+one finds of both (docs/model.md §8).
 
 Every shot of a burst keeps its own window about its own hit. A later one reads the windows of the earlier ones
 bilinearly at its own nodes. So windows that do not overlap change no bit, and those about one point add exactly.
@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import exposure, plate_grid
+from . import channel, core_surface, exposure, plate_grid
 from .variant import Variant
 
 
@@ -18,8 +18,9 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of earlier hits for one variant."""
     real = variant.real
-    use = variant.use(exposure, plate_grid)
+    use = variant.use(channel, core_surface, exposure, plate_grid)
     Fields, Plate, Window = use.exposure.Fields, use.plate_grid.Plate, use.plate_grid.Window
+    Surface, Pose, Channels = use.core_surface.Surface, use.core_surface.Pose, use.channel.Channels
 
     @wp.struct
     class Earlier:
@@ -37,6 +38,7 @@ def build(variant: Variant) -> SimpleNamespace:
         y: wp.array(dtype=wp.float64)
         z: wp.array(dtype=wp.float64)
         open: wp.array(dtype=wp.bool)
+        channels: Channels
 
     # Native, because a compiler vectorises these loops only if the pointers do not alias.
     @wp.func_native("""
@@ -104,6 +106,7 @@ def build(variant: Variant) -> SimpleNamespace:
         first = (slot * earlier.count + shot % earlier.count) * earlier.layers
         for layer in range(earlier.layers):
             earlier.open[first + layer] = False
+            earlier.channels.through[first + layer] = False
 
     @wp.func
     def recall(
@@ -117,11 +120,15 @@ def build(variant: Variant) -> SimpleNamespace:
         y: wp.float64,
         z: wp.float64,
     ):
-        """Fill a shot's blank window about (y, z) [m] with what the earlier shots have added to this layer."""
-        order = shot % earlier.count
+        """Fill a shot's blank window about (y, z) [m] with what the earlier shots have left of this layer; whether a
+        core went through it."""
+        order, pierced = shot % earlier.count, bool(False)
         row = row_of(earlier, window, slot, order)
         nodes = window.planes * window.nodes
-        use.exposure.clear(earlier.exposure, row, nodes)
+        mine = (slot * earlier.count + order) * earlier.layers + layer
+        use.channel.begin(earlier.channels, window, slot, layer, shot, mine)
+        if window.weakens:
+            use.exposure.clear(earlier.exposure, row, nodes)
         for before in range(order):
             other = (slot * earlier.count + before) * earlier.layers + layer
             if earlier.open[other]:
@@ -131,23 +138,43 @@ def build(variant: Variant) -> SimpleNamespace:
                 near_z = wp.abs(along) < wp.float64(window.cells_z)
                 if near_y and near_z:
                     rows, columns = wp.floor(across), wp.floor(along)
-                    for plane in range(window.planes):
-                        add_shifted(
-                            earlier.exposure,
-                            row + plane * window.nodes,
-                            row_of(earlier, window, slot, before) + plane * window.nodes,
-                            window.cells_y,
-                            window.cells_z,
+                    far_y, far_z = real(across - rows), real(along - columns)
+                    if window.weakens:
+                        for plane in range(window.planes):
+                            add_shifted(
+                                earlier.exposure,
+                                row + plane * window.nodes,
+                                row_of(earlier, window, slot, before) + plane * window.nodes,
+                                window.cells_y,
+                                window.cells_z,
+                                wp.int32(rows),
+                                wp.int32(columns),
+                                far_y,
+                                far_z,
+                            )
+                    if earlier.channels.through[other]:
+                        if not pierced:
+                            use.channel.clear(fields, window)
+                        pierced = True
+                        use.channel.join(
+                            earlier.channels,
+                            fields,
+                            window,
+                            slot,
+                            layer,
+                            before,
+                            other,
                             wp.int32(rows),
                             wp.int32(columns),
-                            real(across - rows),
-                            real(along - columns),
+                            far_y,
+                            far_z,
                         )
-        copy(fields.exposure, window.first, earlier.exposure, row, nodes)
-        mine = (slot * earlier.count + order) * earlier.layers + layer
+        if window.weakens:
+            copy(fields.exposure, window.first, earlier.exposure, row, nodes)
         earlier.y[mine] = y
         earlier.z[mine] = z
         earlier.open[mine] = True
+        return pierced
 
     @wp.func
     def keep(earlier: Earlier, fields: Fields, window: Window, slot: wp.int32, shot: wp.int32):
@@ -156,5 +183,26 @@ def build(variant: Variant) -> SimpleNamespace:
         row = row_of(earlier, window, slot, shot % earlier.count)
         nodes = window.planes * window.nodes
         subtract_from(earlier.exposure, row, fields.exposure, window.first, nodes)
+
+    @wp.func
+    def follow(
+        earlier: Earlier, surface: Surface, window: Window, slot: wp.int32, layer: wp.int32, shot: wp.int32, pose: Pose
+    ):
+        """Take note of where the core of a shot is in a layer."""
+        mine = (slot * earlier.count + shot % earlier.count) * earlier.layers + layer
+        use.channel.follow(earlier.channels, surface, window, slot, layer, shot, mine, pose)
+
+    @wp.func
+    def leave_channel(
+        earlier: Earlier,
+        surface: Surface,
+        window: Window,
+        slot: wp.int32,
+        layer: wp.int32,
+        shot: wp.int32,
+    ):
+        """Keep the channel of a core that went through a layer."""
+        mine = (slot * earlier.count + shot % earlier.count) * earlier.layers + layer
+        use.channel.conclude(earlier.channels, surface, window, slot, layer, shot, mine)
 
     return SimpleNamespace(**locals())

@@ -34,7 +34,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """Scratch of all slots, or of one: exposure [s], exposure gained in the step [s], and room for the filter.
 
         A slot has `nodes` of each. The window of a layer has planes of cells_y × cells_z of them, from number `first`
-        on; shape [layers].
+        on; shape [layers]. `channel` has other planes of the same windows, `channel_nodes` in a slot: how deep each
+        node lies in the channels of earlier hits [m], negative outside.
         """
 
         exposure: wp.array(dtype=real)
@@ -44,6 +45,8 @@ def build(variant: Variant) -> SimpleNamespace:
         first: wp.array(dtype=wp.int32)
         cells_y: wp.array(dtype=wp.int32)
         cells_z: wp.array(dtype=wp.int32)
+        channel: wp.array(dtype=real)
+        channel_nodes: wp.int32
 
     @wp.func
     def gather(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
@@ -208,6 +211,8 @@ def build(variant: Variant) -> SimpleNamespace:
             own.exposure = part_of(fields.exposure, slot * fields.nodes, fields.nodes)
             own.gain = part_of(fields.gain, slot * fields.nodes, fields.nodes)
             own.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
+        if wp.static(variant.burst):
+            own.channel = part_of(fields.channel, slot * fields.channel_nodes, fields.channel_nodes)
         return own
 
     @wp.func

@@ -223,7 +223,9 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
                     reached.first = wp.min(reached.first, k)
                     reached.last = k
                     found.last_ring = surface.rings - 1
-                    found.inside = found.inside and (touch.inside or not target.weakens[k])
+                    found.inside = found.inside and (
+                        touch.inside or not (target.weakens[k] or wp.static(variant.burst))
+                    )
                 stack.found[here] = touch
             elif low > rear and not use.passage.has_left(passage, shot, k):
                 since = (rearmost - rear) / wp.max(state.velocity[0], one)
@@ -295,6 +297,24 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         return load
 
     @wp.func
+    def follow(
+        surface: Surface,
+        target: Target,
+        stack: Stack,
+        earlier: Earlier,
+        slot: wp.int32,
+        shot: wp.int32,
+        reached: Reached,
+        pose: Pose,
+    ):
+        """Take note, for later shots, of where the core is in the layers that a step can touch."""
+        for k in range(reached.first, reached.last + 1):
+            here = slot * target.count + k
+            if stack.found[here].last_ring >= 0:
+                seen = in_layer(target, stack, slot, k, shot, pose)
+                plates.follow(surface, earlier, stack.window[here], slot, k, shot, seen)
+
+    @wp.func
     def free_time(
         surface: Surface, target: Target, shot: wp.int32, state: State, pose: Pose, reached: Reached, dt: real
     ):
@@ -334,6 +354,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
 
     @wp.func
     def conclude(
+        surface: Surface,
         target: Target,
         fields: Fields,
         stack: Stack,
@@ -353,5 +374,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
             use.passage.conclude(passage, shot, k, status, inside, reached.deepest - front)
             if stack.open[here] and target.laminate[k] == k:
                 plates.keep(fields, earlier, stack.window[here], slot, shot)
+            if stack.open[here] and use.passage.has_left(passage, shot, k):
+                plates.leave_channel(surface, earlier, stack.window[here], slot, k, shot)
 
     return SimpleNamespace(**locals())

@@ -8,6 +8,7 @@ import warp as wp
 from . import (
     bending,
     block,
+    channel,
     contact,
     core_surface,
     damping,
@@ -41,6 +42,7 @@ def build(variant: Variant) -> SimpleNamespace:
     most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
     use = variant.use(
         bending,
+        channel,
         core_surface,
         damping,
         earlier,
@@ -63,6 +65,7 @@ def build(variant: Variant) -> SimpleNamespace:
     Sections, Bending = use.bending.Sections, use.bending.Bending
     Shots, Pace, own = use.shots.Shots, use.shots.Pace, use.shots.own
     Target, Stack, Passage, Earlier = plates.Target, reaches.Stack, use.passage.Passage, use.earlier.Earlier
+    Channels, Section, Box = use.channel.Channels, use.channel.Section, use.plate_grid.Box
 
     @wp.struct
     class Outcomes:
@@ -196,6 +199,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     load = reaches.load_on(
                         surface, target, law, fields, stack, touches, passage, slot, shot, reached, pose, dt
                     )
+                    reaches.follow(surface, target, stack, earlier, slot, shot, reached, pose)
                 else:
                     free, lost = reaches.free_time(surface, target, shot, state, pose, reached, dt)
                 if load.touching:
@@ -223,7 +227,7 @@ def build(variant: Variant) -> SimpleNamespace:
             use.trace.record(trace, shot * pace.rows + step, now, state, vec3(), vec3())
         if status == RUNNING:
             status = reaches.given_up(target, shot, reached, state, touched)
-        reaches.conclude(target, fields, stack, earlier, passage, slot, shot, status, reached)
+        reaches.conclude(surface, target, fields, stack, earlier, passage, slot, shot, status, reached)
         axis = use.rigid_body.axis_of(state.attitude)
         if wp.static(variant.window > 0):
             if use.lanes.lane() > 0:  # all lanes know the outcome

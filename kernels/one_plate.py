@@ -122,6 +122,20 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         return loads.load_on(surface, plate, law, fields, reached.window, touches, slot, reached.found, pose, dt)
 
     @wp.func
+    def follow(
+        surface: Surface,
+        target: Target,
+        stack: Stack,
+        earlier: Earlier,
+        slot: wp.int32,
+        shot: wp.int32,
+        reached: Reached,
+        pose: Pose,
+    ):
+        """Take note, for later shots, of where the core is in the plate."""
+        plates.follow(surface, earlier, reached.window, slot, 0, shot, pose)
+
+    @wp.func
     def free_time(
         surface: Surface, target: Target, shot: wp.int32, state: State, pose: Pose, reached: Reached, dt: real
     ):
@@ -135,6 +149,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
 
     @wp.func
     def conclude(
+        surface: Surface,
         target: Target,
         fields: Fields,
         stack: Stack,
@@ -147,5 +162,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     ):
         """Keep what later shots at this plate need."""
         plates.keep(fields, earlier, reached.window, slot, shot)
+        if status == Status.PERFORATED:
+            plates.leave_channel(surface, earlier, reached.window, slot, 0, shot)
 
     return SimpleNamespace(**locals())

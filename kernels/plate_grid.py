@@ -58,7 +58,8 @@ def build(variant: Variant) -> SimpleNamespace:
         tile per metre. `thickness` is that of the plate; its front face is `behind` [m] the first of
         `planes` planes of `nodes` nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit
         [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the
-        fields hold this window.
+        fields hold this window. `channel` is the first node of its `channel_planes` planes with the channels of earlier
+        hits (kernels/channel.py), `pierced` says whether there are any.
         """
 
         first: wp.int32
@@ -84,6 +85,10 @@ def build(variant: Variant) -> SimpleNamespace:
         y0: real
         z0: real
         weakens: wp.bool
+        channel: wp.int32
+        channel_planes: wp.int32
+        per_channel_plane: real
+        pierced: wp.bool
 
     @wp.struct
     class Cell:

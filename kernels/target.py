@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from . import earlier, interaction, plate_grid, shots
+from . import channel, core_surface, earlier, interaction, plate_grid, shots
 from .variant import Variant
 
 
@@ -15,9 +15,10 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     """Device functions of the target for one variant, whose windows a scheme opens."""
     real, vec3 = variant.real, variant.vec3
     one = real(1.0)
-    use = variant.use(earlier, interaction, plate_grid, shots)
+    use = variant.use(channel, core_surface, earlier, interaction, plate_grid, shots)
     Plate, Window, Law = use.plate_grid.Plate, use.plate_grid.Window, use.interaction.Law
     Shots, Earlier, own = use.shots.Shots, use.earlier.Earlier, use.shots.own
+    Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
     Fields, open_blank = scheme.build(variant).Fields, scheme.build(variant).open_window
 
     # One plate comes by value, because CUDA does not know where a pointer leads that lies in memory.
@@ -130,8 +131,9 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
                 window.planes = 1
                 window.per_plane = real(0.0)
         if wp.static(variant.burst):
-            if window.weakens:
-                use.earlier.recall(earlier, fields, plate, window, slot, layer, shot, y, z)
+            thickness = own_of(target.thickness, layer, shot)
+            window = use.channel.open_window(window, earlier.channels, thickness, layer)
+            window.pierced = use.earlier.recall(earlier, fields, plate, window, slot, layer, shot, y, z)
         return window
 
     @wp.func
@@ -140,5 +142,21 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         if wp.static(variant.burst):
             if window.weakens:
                 use.earlier.keep(earlier, fields, window, slot, shot)
+
+    @wp.func
+    def follow(
+        surface: Surface, earlier: Earlier, window: Window, slot: wp.int32, layer: wp.int32, shot: wp.int32, pose: Pose
+    ):
+        """Take note, for later shots, of where the core is in a layer."""
+        if wp.static(variant.burst):
+            use.earlier.follow(earlier, surface, window, slot, layer, shot, pose)
+
+    @wp.func
+    def leave_channel(
+        surface: Surface, earlier: Earlier, window: Window, slot: wp.int32, layer: wp.int32, shot: wp.int32
+    ):
+        """Keep for later shots where this one went through a layer."""
+        if wp.static(variant.burst):
+            use.earlier.leave_channel(earlier, surface, window, slot, layer, shot)
 
     return SimpleNamespace(**locals())

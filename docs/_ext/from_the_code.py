@@ -76,22 +76,23 @@ class CampaignReference(FromTheCode):
     def chosen(self, part: dict[str, Any]) -> list[dict[str, Any]]:
         """The models that a part of the schema may be."""
         options = [part, *([part["then"]] if "type" in part and "then" in part else [])]
-        options += [one["then"] for one in part.get("allOf", [])]
+        options += [one["then"] for one in part.get("allOf", []) if "then" in one]
         options += [option["items"] for option in options if "items" in option]
         return [self.definition(option["$ref"]) for option in options if "$ref" in option]
 
     def of_table(self, name: str, part: dict[str, Any], depth: str = "##") -> Iterator[str]:
         """A table of the file, and those within it."""
-        models = [one for one in self.chosen(part) if "properties" in one and "allOf" not in one]
+        models = [one for one in self.chosen(part) if "properties" in one]
         if not models or name == "layer.pattern":  # which is that of the plate
             return
         yield from [f"{depth} `[{name}]`", "", part.get("description", "").capitalize(), ""]
-        if len(models) > 1 and "shape" in models[0]["properties"]:
+        decided = [key for key in ("shape", "name") if "const" in models[0]["properties"].get(key, {})]
+        if len(models) > 1 and decided:
             shared = self.shared(models)
             yield from self.keys(shared)
             for model in models:
                 model["properties"] = {k: v for k, v in model["properties"].items() if k not in shared["properties"]}
-                yield from self.variant(model, "shape", depth + "#")
+                yield from self.variant(model, decided[0], depth + "#")
             return
         for model in models:
             if model is not models[0]:
@@ -194,6 +195,19 @@ class CampaignReference(FromTheCode):
 def short(number: float) -> str:
     power = math.log2(number) if number > 0 else 0.5
     return f"2^{power:g}" if power >= 16 and power == int(power) else f"{number:g}"
+
+
+class FiringReference(CampaignReference):
+    """Every key of a test file, table by table, from its JSON schema."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.firing.schema import firing_schema
+
+        self.schema = firing_schema()
+        yield from ["## Tables of the file", ""]
+        yield from self.keys(self.schema)
+        for name, part in self.schema["properties"].items():
+            yield from self.of_table(name, part)
 
 
 # --- Commands ---
@@ -347,6 +361,7 @@ def device_mark(node: ast.FunctionDef | ast.ClassDef) -> str | None:
 def setup(app: Sphinx) -> dict[str, bool]:
     for name, directive in {
         "campaign-reference": CampaignReference,
+        "firing-reference": FiringReference,
         "exclusion-reference": ExclusionReference,
         "command-reference": CommandReference,
         "variable-reference": VariableReference,

@@ -5,13 +5,14 @@ import pytest
 import warp as wp
 from scipy.ndimage import map_coordinates
 
-from warpimpact.kernels import earlier, exposure, plate_grid
+from warpimpact.kernels import channel, earlier, exposure, plate_grid
 from warpimpact.kernels.variant import Variant
 
 from .probes import plate_of, poisoned, poisoned_fields
 
 VARIANT = Variant(double=True, burst=True)
-use = VARIANT.use(earlier, exposure, plate_grid)
+use = VARIANT.use(channel, earlier, exposure, plate_grid)
+Channels = use.channel.Channels
 Earlier, Plate, Fields, Window = use.earlier.Earlier, use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
 
 CELL, CELLS_Y, CELLS_Z = 0.25e-3, 20, 26
@@ -31,6 +32,8 @@ def hit(
 ) -> None:
     fields = use.exposure.own_fields(fields, SLOT)
     window = use.exposure.open_window(plate, wp.float64(4.0e-3), fields, 0, y[shot], z[shot])
+    window.weakens = True
+    window = use.channel.open_window(window, earlier.channels, wp.float64(4.0e-3), 0)
     use.earlier.begin(earlier, SLOT, shot)
     use.earlier.recall(earlier, fields, plate, window, SLOT, 0, shot, y[shot], z[shot])
     for k in range(NODES):
@@ -49,7 +52,20 @@ def scratch(device: str) -> Earlier:
     earlier.exposure = poisoned(SLOTS * COUNT * NODES, wp.float64, device)
     earlier.y, earlier.z = (poisoned(SLOTS * COUNT, wp.float64, device) for _ in range(2))
     earlier.open = poisoned(SLOTS * COUNT, wp.bool, device)
+    earlier.channels = channels(device)
     return earlier
+
+
+def channels(device: str) -> Channels:
+    """Scratch of channels on the two faces of a layer, all poisoned."""
+    channels = Channels()
+    channels.count, channels.nodes, channels.planes = COUNT, 2 * NODES, 2
+    channels.inside = poisoned(SLOTS * COUNT * channels.nodes, wp.float64, device)
+    channels.sections = poisoned(SLOTS * channels.planes, use.channel.Section, device)
+    channels.box, channels.through = (poisoned(SLOTS * COUNT, kind, device) for kind in (use.plate_grid.Box, wp.bool))
+    channels.first, channels.first_plane = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
+    channels.apart = wp.array([4.0e-3], dtype=wp.float64, device=device)
+    return channels
 
 
 def shoot(y: list[float], z: list[float], added: np.ndarray, device: str) -> tuple[list[np.ndarray], np.ndarray]:

@@ -1,8 +1,7 @@
-"""Several shots at one plate: exposure adds (docs/model.md §8), and nothing else couples them."""
+"""Several shots at one plate: exposure adds, cores leave channels (docs/model.md §8), and nothing else couples them."""
 
 from dataclasses import replace
-from itertools import pairwise
-from math import log, pi
+from math import acos, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -40,8 +39,8 @@ def burst(shots: Shots, count: int) -> Shots:
 
 
 def apart(shots: Shots) -> Shots:
-    """The same shots, each at a plate of its own."""
-    return replace(shots, sample=None, burst_order=None)
+    """The same shots, each at a plate of its own, in the build of bursts, as a compiler rounds otherwise in another."""
+    return burst(shots, 1)
 
 
 def near_bursts() -> Shots:
@@ -77,7 +76,6 @@ def test_far_apart_shots_are_independent_to_the_bit(precision: str, device: str)
 
 @TARGETS
 def test_far_apart_shots_have_the_bits_of_first_shots(behind: Any, device: str) -> None:
-    # As above, in one build of the kernels: in that of layers a compiler rounds otherwise.
     shots = bursts_of(0.1 * np.arange(COUNT), yaw=3.0, pitch=2.0, spin=1.7e4)
     got = simulate(paper_plate(), shots, behind, device)
     for order in range(COUNT):
@@ -92,13 +90,8 @@ def test_near_shots_notice_each_other_and_the_first_does_not(behind: Any, device
     shots = near_bursts()
     got, alone = (simulate(paper_plate(), s, behind, device) for s in (shots, apart(shots)))
     faster = (got.residual_velocity - alone.residual_velocity).reshape(SAMPLES, COUNT)
-    np.testing.assert_allclose(faster[:, 0], 0.0, atol=1e-3)  # in another build of the kernels
+    np.testing.assert_array_equal(faster[:, 0], 0.0)
     assert (faster[:, 1:] > 5.0).mean() > 0.7
-
-
-def test_without_weakening_earlier_hits_change_nothing(device: str) -> None:
-    shots, plate = bursts_of(np.zeros(COUNT), yaw=3.0), paper_plate(degradation=1.0)
-    assert_identical(simulate(plate, shots, device=device), simulate(plate, apart(shots), device=device))
 
 
 def test_what_touches_a_plate_of_no_resistance_once_passes_it_freely(device: str) -> None:
@@ -106,29 +99,62 @@ def test_what_touches_a_plate_of_no_resistance_once_passes_it_freely(device: str
     shots = burst(shots_at(np.zeros(2)), 2)
     got = simulate(solid_plate(degradation=0.0), shots, device=device)
     assert got.residual_velocity[1] == 825.0
-    assert got.contact_duration[1] > 0.0
 
 
-@pytest.mark.parametrize("thickness", [4e-3, 12e-3])
-def test_shots_at_one_place_pay_a_geometric_series(thickness: float, device: str) -> None:
-    # Straight flight, η = 0, ℓ → 0, exposure by path: a column is touched over the thickness h, so the first core does
-    # the work Y πR² ∫₀ʰ β^(x/Δs) dx, and each one after it β^(h/Δs) of the work of the one before. A finite ℓ spends
-    # some exposure beyond R: the ratio is off by a share that goes with ℓ.
-    beta, unit, resistance = 0.8, 3e-3, 1.5e9
-    law = {"degradation": beta, "degradation_distance": unit, "degradation_interval": None, "shear_coefficient": 0.0}
-    law["degradation_depth"] = thickness
-    left, off = beta ** (thickness / unit), []
-    first = resistance * pi * references.PAPER_LARGEST_RADIUS**2 * unit / -log(beta) * (1.0 - left)
-    for length in (0.2e-3, 0.1e-3):
-        plate = solid_plate(thickness=thickness, resistance=resistance, degradation_length=length, **law)
-        work = simulate(plate, burst(shots_at(np.zeros(COUNT)), COUNT), device=device, level=2).energy_loss
-        off.append([after / before / left - 1.0 for before, after in pairwise(work)])
-    assert work[0] == pytest.approx(first, rel=4e-3)
-    np.testing.assert_allclose(off[1], 0.0, atol=0.025)
-    np.testing.assert_allclose(off[1], 0.5 * np.array(off[0]), rtol=0.15)
+@pytest.mark.parametrize(
+    ("plate", "behind"),
+    [
+        ({}, ()),
+        ({"degradation": 1.0}, ()),
+        ({"thickness": 12e-3, "resistance": 1e9}, ()),
+        ({"degradation": 1.0}, (BASE,)),
+        ({}, (BASE.model_copy(update={"gap": 0.0}),)),
+    ],
+    ids=["weakens", "does not weaken", "thick", "two layers", "laminate"],
+)
+def test_a_core_leaves_its_cross_section_open(plate: dict[str, Any], behind: Any, device: str) -> None:
+    shots = burst(shots_at(np.zeros(3)), 3)
+    behind = tuple(layer.model_copy(update={"pattern": solid_plate().pattern}) for layer in behind)
+    share = []
+    for level in (0, 3, 6):
+        work = simulate(solid_plate(**plate), shots, behind, device, level=level).energy_loss
+        share.append(work[1:] / work[0])
+    assert np.max(share) < 0.05
+    assert (share[2] < 0.025).all()
 
 
-@pytest.mark.parametrize("offset", [0.0, 1.37e-3])
+def lens(offset: float, radius: float) -> float:
+    """Area that two circles of one radius have in common [m²]."""
+    half = min(1.0, 0.5 * offset / radius)
+    return 2.0 * radius**2 * (acos(half) - half * sqrt(1.0 - half**2))
+
+
+@pytest.mark.parametrize("obliquity", [0.0, 40.0])
+def test_a_core_does_the_work_of_the_material_that_earlier_ones_left(obliquity: float, device: str) -> None:
+    # β = 1, η = 0: the work is Y times the volume that a core displaces. Of parallel cores that are d apart, across the
+    # plane of fire, the second one displaces h / cos θ times πR² less the lens that both have in common.
+    radius, thickness, resistance = references.PAPER_LARGEST_RADIUS, 4e-3, 1e8
+    plate = solid_plate(degradation=1.0, shear_coefficient=0.0, thickness=thickness, resistance=resistance)
+    offsets = np.linspace(0.0, 6.0 * radius, 25)
+    y, z = np.zeros(50), np.stack([np.zeros(25), offsets], axis=1).ravel()
+    shots = burst(shots_at(y, z, velocity=2500.0, obliquity=obliquity), 2)
+    area = np.array([pi * radius**2 - lens(offset, radius) for offset in offsets])
+    off = []
+    for level in (1, 6):
+        work = simulate(plate, shots, device=device, level=level).energy_loss.reshape(-1, 2)
+        free = work[:, 1] * np.cos(np.deg2rad(obliquity)) / (resistance * thickness * pi * radius**2)
+        off.append(np.abs(free - area / (pi * radius**2)).max())
+    assert off[0] < 0.03
+    assert off[1] < 0.4 * off[0]
+
+
+def test_a_core_at_rest_leaves_no_channel(device: str) -> None:
+    plate = solid_plate(degradation=1.0, resistance=2e10, thickness=8e-3)
+    got = simulate(plate, burst(shots_at(np.zeros(2)), 2), device=device)
+    assert got.energy_loss[1] == got.energy_loss[0]
+
+
+@pytest.mark.parametrize("offset", [0.5e-3, 1.37e-3])
 def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float) -> None:
     # Bilinear reading keeps the sum of a field: what the second window holds is what both shots gave. Both cores sweep
     # a solid plate once, each at its own speed.
@@ -142,7 +168,7 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
     added = scratch[3].exposure.numpy().reshape(2, *cells)
     assert (added >= 0.0).all()
     assert scratch[0].exposure.numpy().sum() == pytest.approx(added.sum(), rel=1e-12)
-    assert added[1].sum() == pytest.approx(added[0].sum(), rel=0.1)
+    assert 0.0 < added[1].sum() < added[0].sum()
 
 
 @TARGETS
@@ -213,7 +239,7 @@ def test_a_replay_is_the_shot_of_its_burst(behind: Any, order: int) -> None:
         np.testing.assert_array_equal(getattr(again.outcomes, name)[0], values[at], err_msg=name)
     found = again.resistance_share[0]
     assert found.max() == 1.0
-    assert (found.min() < 0.3) == (order > 0)
+    assert (found.min() == 0.0) == (order > 0)  # where an earlier core passed there is nothing
     assert (np.diff(again.resistance_share, axis=0) <= 1e-6).all()
 
 

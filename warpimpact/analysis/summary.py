@@ -18,7 +18,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, status_codes
 from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing
 from warpimpact.scene.display import STORED
-from warpimpact.solver.pilot import accuracy_text, errors_text, hits_text
+from warpimpact.solver.pilot_text import accuracy_text, errors_text, hits_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
 
@@ -76,9 +76,10 @@ def promise_text(dataset: Result) -> str | None:
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
     asked = json.loads(told[attr.ACCURACY])
-    stated = accuracy_text(asked.get("residual_velocity", math.inf), asked.get("tilt", math.inf), asked["share"])
+    stated = accuracy_text(asked, layered=attr.STATUS_ERROR in told)
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
-    found = f"estimated errors: {errors_text(velocity, tilt, told.get(attr.DEPTH_ERROR, math.nan))}"
+    depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
+    found = f"estimated errors: {errors_text(velocity, tilt, depth, status)}"
     name = "the campaign" if given.get("accuracy") else given["fidelity"]
     if told[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {found}"

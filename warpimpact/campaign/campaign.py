@@ -349,7 +349,7 @@ class Campaign(Model):
 
     @model_validator(mode="after")
     def _looks_as_meant(self) -> Self:
-        warn_of(self.scene, self.impact, self.hits, self.scatter, self.burst)
+        warn_of(self.scene, self.impact, self.hits)
         return self
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..scene import Burst, Hits, Impact, Scatter, Scene
+from ..scene import Hits, Impact, Scene
 from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible
 from ..scene.quantities import SCATTERED
 
@@ -22,15 +22,12 @@ _OF_A_PLATE = (
 )
 
 
-def warn_of(scene: Scene, impact: Impact, hits: Hits, scatter: Scatter, burst: Burst | None) -> None:
+def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
     """Warn (`Implausible`) of every value of a campaign that is possible, but far from what such campaigns have."""
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
     for sentence in implausible(_values(scene, impact, hits), usual):
         warnings.warn(sentence, Implausible, stacklevel=2)
-    if burst is not None and plate.degradation == 1.0 and not scatter.degradation:
-        message = "burst: the plate does not weaken (plate.degradation = 1), so earlier hits change nothing"
-        warnings.warn(message, Implausible, stacklevel=2)
 
 
 def _values(scene: Scene, impact: Impact, hits: Hits) -> Iterator[tuple[str, str, float]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,6 @@ import xarray
 from matplotlib.figure import Figure
 
 from warpimpact.firing.text import verdict
-from warpimpact.plotting.heading import add_heading
 from warpimpact.plotting.style import BLUE, GREEN, VERMILION
 from warpimpact.results import attributes as attr
 from warpimpact.results import firing as f
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 _MM = 1e3
+_ABOVE = (-11, 4, -7)
+"""How far the names of V50, V05 and V01 stand above their points [pt]."""
 _Settings = Mapping[str, Any]
 
 
@@ -45,7 +47,7 @@ def firing_figure(dataset: xarray.Dataset) -> Figure:
         draw(one, dataset, settings)
     for one in axes[len(panels) :]:
         one.set_axis_off()
-    add_heading(figure, f"{dataset.attrs[attr.TITLE]}\n{dataset.attrs[f.DISCLAIMER]}")
+    figure.suptitle(f"{fill(str(dataset.attrs[attr.TITLE]), 100)}\n{dataset.attrs[f.DISCLAIMER]}", fontsize=11)
     return figure
 
 
@@ -72,9 +74,9 @@ def _draw_response(axes: Axes, dataset: xarray.Dataset, settings: _Settings) -> 
                 axes.plot(ends, [share, share], color=VERMILION, linewidth=4, alpha=0.4, solid_capstyle="butt")
             axes.plot(value, share, "o", color=VERMILION, markersize=5)
             name = f"V{100 * share:02.0f} = {value:.4g} m/s"
-            axes.annotate(name, (value, share), xytext=(8, 6 - 11 * row), textcoords="offset points", fontsize="small")
+            axes.annotate(name, (value, share), xytext=(10, _ABOVE[row]), textcoords="offset points", fontsize="small")
     _furnish(
-        axes, title="target", xlabel="impact velocity [m/s]", ylabel="probability of perforation", ylim=(-0.03, 1.03)
+        axes, title="target", xlabel="impact velocity [m/s]", ylabel="probability of perforation", ylim=(-0.06, 1.03)
     )
 
 
@@ -174,6 +176,7 @@ def directions_figure(dataset: xarray.Dataset) -> Figure:
         dataset: the result of `warpimpact test` with directions.
     """
     figure = Figure(figsize=(8.2, 7.6), layout="constrained")
+    figure.get_layout_engine().set(w_pad=0.3)  # type: ignore[call-arg, union-attr]  # for "left"
     axes: Any = figure.add_subplot(projection="polar")
     azimuth, elevation = np.meshgrid(
         np.radians(dataset[f.AZIMUTH].values), np.radians(dataset[f.ELEVATION].values), indexing="ij"
@@ -200,6 +203,6 @@ def directions_figure(dataset: xarray.Dataset) -> Figure:
     low, high = dataset.attrs[f.MEAN_INTERVAL]
     weight = json.loads(dataset.attrs[f.SETTINGS])["directions"]["weight"].replace("_", " ")
     mean = f"mean by {weight}: {float(dataset.attrs[f.MEAN]):.3g} ({low:.3g} to {high:.3g}); larger dots: more hits"
-    add_heading(figure, f"{dataset.attrs[attr.TITLE]}\n{mean}")
+    figure.suptitle(f"{fill(str(dataset.attrs[attr.TITLE]), 75)}\n{mean}", fontsize=11)
     figure.supxlabel(dataset.attrs[f.DISCLAIMER], fontsize="medium")
     return figure

@@ -68,6 +68,8 @@ RESIDUAL_VELOCITY_ERROR = _declared("residual_velocity_error", "number", "m s-1"
 TILT_ERROR = _declared("tilt_error", "number", "degree")
 DEPTH_ERROR = _declared("depth_error", "number", "m")
 """Only where some shots of the pilot stop in a layer."""
+STATUS_ERROR = _declared("status_error", "number")
+"""Share of the hits; only of targets with several layers."""
 FINGERPRINT = _declared("fingerprint")
 COMPUTE_TIME = _declared("compute_time", "number", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "number", "s-1")

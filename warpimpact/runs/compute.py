@@ -27,7 +27,7 @@ from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import Found, HitErrors, pilot_size
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import marched, pilot_of
+from warpimpact.solver.simulate import marched, pilot_of, spread_places
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:
@@ -55,7 +55,8 @@ class HitMap:
         """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
         if campaign.numerics.explicit is not None:
             return None
-        pilot = pilot_shots(campaign, pilot_size(campaign.numerics.asked))
+        computed = len(campaign.sampler()) // len(campaign.symmetries)
+        pilot = pilot_shots(campaign, pilot_size(campaign.numerics.asked, computed))
         return pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying)
 
     def found_in(self, result: Result) -> HitErrors | None:
@@ -68,6 +69,7 @@ class HitMap:
             residual_velocity_error=float(told[attr.RESIDUAL_VELOCITY_ERROR]),
             tilt_error=math.radians(float(told[attr.TILT_ERROR])),
             depth_error=float(told.get(attr.DEPTH_ERROR, math.nan)),
+            status_error=float(told.get(attr.STATUS_ERROR, math.nan)),
         )
 
 
@@ -120,11 +122,13 @@ def _errors(found: Found | None) -> dict[str, float]:
     """The errors that a pilot of a hit map found, as attributes."""
     if not isinstance(found, HitErrors):
         return {}
-    return {
+    told = {
         attr.RESIDUAL_VELOCITY_ERROR: found.residual_velocity_error,
         attr.TILT_ERROR: math.degrees(found.tilt_error),
-        **({} if math.isnan(found.depth_error) else {attr.DEPTH_ERROR: found.depth_error}),
+        attr.DEPTH_ERROR: found.depth_error,
+        attr.STATUS_ERROR: found.status_error,
     }
+    return {name: error for name, error in told.items() if not math.isnan(error)}
 
 
 def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
@@ -153,7 +157,7 @@ def pilot_shots(campaign: Campaign, most: int) -> Shots:
     count = min(most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS), groups)
     if campaign.hits.sampling in ("sobol", "random"):
         return sampler.shots(0, count * group)[::images]
-    places = np.linspace(0, groups, count, endpoint=False).astype(int)
+    places = spread_places(groups, count)
     return Shots.joined([sampler.shots(int(place) * group, group)[::images] for place in places])
 
 

@@ -15,7 +15,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import to_table
 from warpimpact.results.table import Table
-from warpimpact.scene import Burst, Numerics, Shots
+from warpimpact.scene import Accuracy, Burst, Numerics, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
 from warpimpact.solver.materials import weakens
@@ -79,13 +79,12 @@ def found_attributes(campaign: Campaign, found: Found | None) -> dict[str, Any]:
     """What a pilot was asked for and found; nothing without one. The errors are for the kind of computation to add."""
     if found is None:
         return {}
-    asked = campaign.numerics.asked
-    accuracy = {"residual_velocity": asked.residual_velocity, "tilt": asked.tilt, "limit": asked.limit}
-    given = {name: value for name, value in accuracy.items() if value is not None and math.isfinite(value)}
+    asked = {name: getattr(campaign.numerics.asked, name) for name in Accuracy.model_fields}
+    given = {name: value for name, value in asked.items() if value is not None and math.isfinite(value)}
     return {
         attr.RESOLUTION: found.numerics.model_dump_json(),
         attr.PROMISE_KEPT: int(found.kept),
-        attr.ACCURACY: json.dumps(given | {"share": asked.share}),
+        attr.ACCURACY: json.dumps(given),
     }
 
 

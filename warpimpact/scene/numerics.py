@@ -23,12 +23,21 @@ class Accuracy(_AsGiven):
     Attributes:
         residual_velocity: of the residual velocity [m/s].
         tilt: of the tilt at the largest stand-off [rad].
+        residual_velocity_share, tilt_share: behind several layers, what an error may have beyond that, as a share of
+            the residual velocity, and of the tilt.
+        depth: of the depth in a layer that stops a core [m].
+        status_share: of the hits at several layers, those that may end otherwise: in another status or in another
+            layer.
         limit: of a limit velocity, as a share of the median limit; of a limit thickness twice that.
         share: of the hits, from 0.5 to 0.99.
     """
 
     residual_velocity: PositiveSpeed = math.inf
     tilt: PositiveAngle = math.inf
+    residual_velocity_share: Annotated[float, Field(ge=0.0, le=0.2)] = 0.0
+    tilt_share: Annotated[float, Field(ge=0.0, le=0.2)] = 0.0
+    depth: PositiveLength = math.inf
+    status_share: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0
     limit: Annotated[float, Field(gt=0.0, lt=1.0)] | None = None
     share: Annotated[float, Field(ge=0.5, le=0.99)] = 0.9
 
@@ -45,11 +54,20 @@ class Accuracy(_AsGiven):
         return max(draft.residual_velocity / self.residual_velocity, draft.tilt / self.tilt)
 
 
-PRESETS = {
-    "draft": Accuracy(residual_velocity=5.0, tilt="5 deg", limit=0.02),
-    "standard": Accuracy(residual_velocity=1.0, tilt="1 deg", limit=0.006),
-    "reference": Accuracy(residual_velocity=0.2, tilt="0.2 deg", limit=0.0015),
-}
+def _preset(strictness: float, limit: float) -> Accuracy:
+    """So many times as strict as standard."""
+    return Accuracy(
+        residual_velocity=1.0 / strictness,
+        tilt=1.0 / strictness,
+        residual_velocity_share=0.002 / strictness,
+        tilt_share=0.02 / strictness,
+        depth=1e-4 / strictness,
+        status_share=0.01 / strictness,
+        limit=limit,
+    )
+
+
+PRESETS = {"draft": _preset(0.2, 0.02), "standard": _preset(1.0, 0.006), "reference": _preset(5.0, 0.0015)}
 """What a fidelity stands for."""
 
 

@@ -21,13 +21,18 @@ SLOW = 0.25
 proportion to the speed. The energy is computed to some accuracy, so the error of a speed near 0 has no bound."""
 
 
-def upper_errors(coarse: Outcomes, fine: Outcomes, at_a_plate: int, share: float, impact: Array | None) -> Array:
-    """Changes of residual velocity [m/s], last tilt [rad] and depth [m] that a share of all shots stay within, but for
-    RISK. NaN if there is no depth."""
-    velocity, tilt, depth = changes(coarse, fine, impact)
-    depth = depth[np.isfinite(depth)]
-    each = (velocity, tilt, depth)
-    return np.array([upper_error(errors, at_a_plate, share) if len(errors) else math.nan for errors in each])
+def upper_errors(
+    coarse: Outcomes,
+    fine: Outcomes,
+    at_a_plate: int,
+    share: float,
+    impact: Array | None = None,
+    relative: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Changes of residual velocity [m/s], last tilt [rad] and depth [m] that a share of the shots stay within, but for
+    RISK; NaN of what no shot has. The arguments are those of `changes`."""
+    known = [errors[~np.isnan(errors)] for errors in changes(coarse, fine, impact, relative)]
+    return np.array([upper_error(errors, at_a_plate, share) if len(errors) else math.nan for errors in known])
 
 
 def upper_error(errors: Array, at_a_plate: int, share: float) -> float:
@@ -63,42 +68,57 @@ def _median(values: Array) -> float:
     return float(np.median(values)) if len(values) else 0.0
 
 
-def changes(coarse: Outcomes, fine: Outcomes, impact: Array | None = None) -> tuple[Array, Array, Array]:
+def changes(
+    coarse: Outcomes, fine: Outcomes, impact: Array | None = None, relative: tuple[float, float] = (0.0, 0.0)
+) -> tuple[Array, Array, Array]:
     """What changes between the outcomes of the same shots, each of shape [shots]: the residual velocity [m/s], or that
     behind a layer if it changes by more; the tilt at the last stand-off [rad]; and the depth [m].
 
     A core that does not leave the target, or a layer, has the speed 0 there; one that comes back has a negative one. A
     tilt that only one of both has counts as half a turn. The first two are infinite where the computation of one alone
-    failed. The depth is NaN where the core does not stop in the same layer.
+    failed. The depth is NaN where the core does not stop in the same layer. At several layers the first two are NaN
+    where the core ends otherwise (`ended_otherwise`), which is an error of its own.
 
     Args:
         impact: velocities [m/s], shape [shots], to weigh the first two by the energy of slow cores (SLOW).
+        relative: (s/m, 1/rad): an error of a speed v counts as if it were 1 + |v| × the first times smaller, and one of
+            a tilt likewise. So an absolute bound stands for one with a relative part.
     """
-    before, after = _speed(coarse), _speed(fine)
+    before, after = _speeds(coarse), _speeds(fine)
     weight = _weight(before, after, impact)
     failed = [one.status >= Status.UNFINISHED for one in (coarse, fine)]
-    velocity, tilt = weight * np.abs(after - before), np.zeros(len(before))
+    speed = (weight * np.abs(after - before) / (1.0 + relative[0] * np.abs(after))).max(axis=1)
+    tilt = np.zeros(len(speed))
     if coarse.tilt.shape[1]:
         last = coarse.tilt[:, -1], fine.tilt[:, -1]
         neither = np.isnan(last[0]) & np.isnan(last[1])
-        tilt = np.where(neither, 0.0, weight * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi))
-    depth = np.full(len(velocity), math.nan)
+        change = weight[:, 0] * np.nan_to_num(np.abs(last[1] - last[0]), nan=math.pi)
+        tilt = np.where(neither, 0.0, change / (1.0 + relative[1] * np.nan_to_num(last[1])))
+    depth = np.full(len(speed), math.nan)
     if LAYER_RESIDUAL_VELOCITY in coarse:
-        before, after = (np.nan_to_num(one.layer_residual_velocity) for one in (coarse, fine))
-        apart = _weight(before, after, None if impact is None else impact[:, None]) * np.abs(after - before)
-        velocity = np.maximum(velocity, apart.max(axis=1))
-        depth = np.where(coarse.stopped_in == fine.stopped_in, np.abs(fine.depth - coarse.depth), math.nan)
+        other = ended_otherwise(coarse, fine)
+        speed, tilt, depth = (np.where(other, math.nan, x) for x in (speed, tilt, np.abs(fine.depth - coarse.depth)))
     one_failed = failed[0] != failed[1]
-    return np.where(one_failed, math.inf, velocity), np.where(one_failed, math.inf, tilt), depth
+    return np.where(one_failed, math.inf, speed), np.where(one_failed, math.inf, tilt), depth
 
 
-def _speed(outcomes: Outcomes) -> Array:
+def ended_otherwise(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
+    """Whether each shot at several layers ends in another status or in another layer."""
+    return np.asarray((coarse.status != fine.status) | (coarse.stopped_in != fine.stopped_in))
+
+
+def _speeds(outcomes: Outcomes) -> Array:
+    """Residual velocities [m/s] behind the target, then behind its layers; of shape [shots, 1] or [shots, 1 + layers].
+    One that comes back is negative."""
     back = outcomes.status == Status.RICOCHETED
-    return np.nan_to_num(np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity))
+    speeds = np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity)[:, None]
+    if LAYER_RESIDUAL_VELOCITY in outcomes:
+        speeds = np.concatenate([speeds, outcomes.layer_residual_velocity], axis=1)
+    return np.nan_to_num(speeds)
 
 
 def _weight(one: Array, other: Array, impact: Array | None) -> Array:
-    """What an error between two speeds counts."""
+    """What an error between two speeds counts, of their shape."""
     if impact is None:
         return np.ones_like(one)
-    return np.asarray(np.minimum(1.0, 0.5 * (np.abs(one) + np.abs(other)) / (SLOW * impact)))
+    return np.asarray(np.minimum(1.0, 0.5 * (np.abs(one) + np.abs(other)) / (SLOW * impact[:, None])))

@@ -17,6 +17,7 @@ from warpimpact.kernels import free_flight, march
 from warpimpact.kernels.lanes import LANES
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
+from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import free_memory, load
 from warpimpact.solver.grid import Grid, Tile
 from warpimpact.solver.prepare import Prepared
@@ -36,6 +37,8 @@ LARGEST_ONSET = 0.02
 DEEP = 0.6
 """Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
 the core's surface from its centre of mass: the core arrives turned."""
+PROFILE = 128
+"""Parts of a core's length, between which its radius is linear, as its channel has it."""
 CUDA_CHUNK = 65536
 MEMORY_SHARE = 0.5
 """Share of the free memory that scratch may take."""
@@ -144,13 +147,15 @@ class Memory:
         return self.empty(self.stage.Outcomes, (len(self.prepared.shots),))
 
     def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field. A
+        layer that earlier hits pierce keeps their channels."""
         materials, grids, scene = self.prepared.materials, self.prepared.grids, self.prepared.scene
         steepest, own = math.tan(float(self.prepared.shots.obliquity.max())), [cells]
         for material, grid in zip(materials[1:], grids[1:], strict=True):
             thicker = max(0.0, float(material.together.max() - materials[0].together.max()))
             half = 0.5 * cells[0] * grids[0].spacing + DEEP * scene.core.bounding_radius + thicker * steepest
-            count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3) if material.weakens else 0
+            count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3)
+            count = count if material.weakens or self.variant.burst else 0
             own.append((count, count))
         return [own[material.laminate] for material in materials]
 
@@ -177,7 +182,8 @@ class Memory:
         if self.variant.window and self.device.is_cuda:  # the others are in shared memory
             return ["filtered"]
         members, real = self.stage.Fields.vars.items(), self.variant.real
-        return [name for name, member in members if getattr(member.type, "dtype", None) is real]
+        names = [name for name, member in members if getattr(member.type, "dtype", None) is real]
+        return [name for name in names if name != "channel"]
 
     @property
     def _patches(self) -> int:
@@ -189,12 +195,16 @@ class Memory:
         count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        earlier = count * (nodes * size + 17 * layers) if self.variant.burst else 0
-        patches = self._patches * (7 * size + 2 * 4)
+        earlier, pierced = 0, sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
+        if self.variant.burst:
+            each = count * layers * wp.types.type_size_in_bytes(self.stage.Box) + count * layers * 18
+            sections = sum(earlier_hits.planes(self.prepared)) * wp.types.type_size_in_bytes(self.stage.Section)
+            earlier = (count * nodes + (1 + count) * pierced) * size + each + sections
+        patches = self._patches * (8 * size + 3 * 4)
         slot = len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring
         free = free_memory() if self.device.is_cpu else self.device.free_memory
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
-        return min(wanted, int(MEMORY_SHARE * free / slot), (2**31 - 1) // (count * nodes))
+        return min(wanted, int(MEMORY_SHARE * free / slot), (2**31 - 1) // (count * max(nodes, pierced)))
 
     def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
@@ -206,27 +216,21 @@ class Memory:
         for name in self.fields:
             setattr(fields, name, empty(slots * fields.nodes))
         patches, rings = slots * self._patches, slots * self.surface.rings
-        for name in ("area", "slope", "shift", "gain", "y", "z", *(["x"] if self.variant.deep else [])):
+        members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep, "ahead" * self.variant.burst]
+        for name in filter(None, members):
             setattr(touches, name, empty(patches))
-        for name in ("tile", "cell"):
+        for name in filter(None, ["tile", "cell", "place" * self.variant.burst]):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         touches.ring_area = empty(rings)
         if self.variant.bends:
             touches.sums = wp.empty(rings, dtype=stage.Sums, device=self.device)
             touches.total_area = empty(rings)
-        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,))
-        return fields, touches, stack, self._earlier(slots, nodes)
-
-    def _earlier(self, slots: int, nodes: list[int]) -> Any:
-        """Scratch of the earlier hits on a plate (kernels/earlier.py)."""
-        earlier, count, layers = self.stage.Earlier(), self.at_a_plate, len(nodes)
+        earlier = stage.Earlier()
         if self.variant.burst:
-            earlier.count, earlier.nodes, earlier.layers = count, sum(nodes), layers
-            places = dict.fromkeys(("y", "z", "open"), slots * count * layers)
-            for name, size in ({"exposure": slots * count * sum(nodes)} | places).items():
-                kind = self.stage.Earlier.vars[name].type.dtype
-                setattr(earlier, name, wp.empty(size, dtype=kind, device=self.device))
-        return earlier
+            windows = self.windows(cells)
+            earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
+        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,))
+        return fields, touches, stack, earlier
 
     def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:
         """March `count` shots from order[first] on; returns `count`."""
@@ -267,8 +271,10 @@ def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put)
         "sine": np.sin(azimuth),
     }
     values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
+    values["profile"] = core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1))
     for name, array in values.items():
         setattr(surface, name, put(array))
+    surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
     surface.rings, surface.around = len(area), around
     surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
     return surface

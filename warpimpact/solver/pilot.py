@@ -13,15 +13,16 @@ import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from decimal import ROUND_CEILING, Context
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
-from warpimpact.solver.changes import limit_changes, upper_errors
+from warpimpact.solver.changes import ended_otherwise, limit_changes, upper_errors
+from warpimpact.solver.pilot_text import errors_text, hits_text, limit_error_text
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
 Array = NDArray[np.float64]
@@ -34,12 +35,25 @@ estimates are then at least the 90th percentile that other hits show (tests/benc
 SHOTS, SHOTS_OF_FINE, LIMITS = 64, 32, 16
 """Shots of a pilot, of one that begins at FINE or beyond, where they are dear, and limits of a pilot. More shots make a
 lower estimate safe."""
+MORE, PART = 256, 16
+"""Shots of a pilot where SHOTS leave the choice between two levels open, and one of so many shots of a run at most."""
+OPEN = (0.7, 1.5)
+"""Upper estimates over what is allowed, between which more shots may choose another level."""
+FAR = 4.0
+"""Estimates over what is allowed, above which the next level is not tried: errors about halve from level to level."""
+STALLED = 0.7
+"""Share of an error that is left two levels on, above which finer levels are of little use: it falls to a quarter where
+it converges, but not where cores barely pass or tumble."""
+ALIKE = 1.5
+"""Errors of levels up to so many times the smallest are no reason for a finer one, where none keeps the promise."""
 FINE = 4
 FEWEST = 1.6
 """At least so many shots of a pilot lie beyond the promised percentile, in the mean."""
 FURTHER = 5
 """Levels behind the first one on which a promise is looked for: 105 random scenes of single plates needed no finer one
 for draft and standard, but one. Who asks for a draft waits for no level that costs fifty times as much."""
+FURTHER_LAYERED = 3
+"""Likewise behind several layers, where a shot costs more: eight to ten times the first level's cost."""
 FINEST_LIMIT = 6
 """The last level that is taken for limits. A finer one is only compared with."""
 BEYOND, BEYOND_LIMITS = 1, 2
@@ -82,15 +96,19 @@ class HitErrors(Found):
         residual_velocity_error: [m/s]; the residual velocities behind all layers count.
         tilt_error: at the last stand-off [rad].
         depth_error: of the shots that stop in a layer [m]; NaN where none does.
+        status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
     """
 
     residual_velocity_error: float
     tilt_error: float
     depth_error: float = math.nan
+    status_error: float = math.nan
 
     @property
     def errors(self) -> str:
-        return errors_text(self.residual_velocity_error, math.degrees(self.tilt_error), self.depth_error)
+        return errors_text(
+            self.residual_velocity_error, math.degrees(self.tilt_error), self.depth_error, self.status_error
+        )
 
 
 @dataclass(frozen=True)
@@ -110,37 +128,13 @@ class LimitErrors(Found):
         return limit_error_text(self.error, self.quantity)
 
 
-def hits_text(share: float) -> str:
-    """So many of the hits."""
-    return f"{100.0 * share:.3g} % of the hits"
+def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
+    """Shots of a pilot, at most; of a run of so many hits."""
+    return max(_first(accuracy), min(MORE, hits // PART))
 
 
-def errors_text(velocity: float, tilt: float, depth: float = math.nan) -> str:
-    """Errors of residual velocity [m/s], tilt [degree] and depth [m], where there is one."""
-    errors = f"{upper_digits(velocity)} m/s and {upper_digits(tilt)} deg"
-    return errors if math.isnan(depth) else f"{errors} and {upper_digits(1e3 * depth)} mm of depth"
-
-
-def limit_error_text(error: float, quantity: str) -> str:
-    """Error of a limit velocity [m/s] or of a limit thickness [m]."""
-    return f"{upper_digits(error)} m/s" if quantity == "velocity" else f"{upper_digits(1e3 * error)} mm"
-
-
-def upper_digits(error: float) -> str:
-    """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
-    up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count
-    return f"{float(up):g}"
-
-
-def accuracy_text(velocity: float, tilt: float, share: float) -> str:
-    """Errors in residual velocity [m/s] and tilt [rad] that are asked for; an infinite one is not."""
-    parts = [f"{velocity:g} m/s"] if math.isfinite(velocity) else []
-    parts += [f"{math.degrees(tilt):g} deg"] if math.isfinite(tilt) else []
-    return f"{' and '.join(parts)} for {hits_text(share)}"
-
-
-def pilot_size(accuracy: Accuracy) -> int:
-    """Shots of a pilot."""
+def _first(accuracy: Accuracy) -> int:
+    """Shots that a pilot begins with."""
     usual = SHOTS if coarsest_level(accuracy.strictness) < FINE else SHOTS_OF_FINE
     return max(usual, _fewest(accuracy.share))
 
@@ -154,18 +148,22 @@ def _fewest(share: float) -> int:
     return math.ceil(FEWEST / (1.0 - share) - 1e-9)
 
 
-def pilot_hits(outcomes_at: Callable[[int], Outcomes], pilot: Shots, numerics: Numerics) -> HitErrors:
+def pilot_hits(
+    outcomes_at: Callable[[int, Shots], Outcomes], pilot: Shots, numerics: Numerics, layers: int = 1
+) -> HitErrors:
     """Find the coarsest level whose outcomes have the accuracy that is asked for.
 
     Args:
-        outcomes_at: computes the pilot's shots on a level of LADDER.
-        pilot: shots like those that are to be computed, some `pilot_size` of them.
+        outcomes_at: computes some of the pilot's shots on a level of LADDER.
+        pilot: shots like those that are to be computed, some `pilot_size` of them, the first of which are like all. The
+            rest is computed where the first leave the choice between two levels open.
         numerics: their accuracy, precision and layout count; other settings would promise nothing.
+        layers: of the target.
 
     Returns:
         The level that keeps the promise. If none does: the coarsest one that keeps it with errors weighed by the energy
-        of slow cores, where finer ones would be of little use. Else the finest level that has a finer one to compare
-        with.
+        of slow cores, where finer ones would be of little use. Else the coarsest one whose errors are about the
+        smallest of all that were tried.
 
     Raises:
         ValueError: the accuracy says nothing of outcomes.
@@ -173,22 +171,65 @@ def pilot_hits(outcomes_at: Callable[[int], Outcomes], pilot: Shots, numerics: N
     accuracy, at_a_plate = numerics.asked, pilot.at_a_plate
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
-    first = coarsest_level(accuracy.strictness)
+    level = coarsest_level(accuracy.strictness)
+    count = min(len(pilot), -(-_first(accuracy) // at_a_plate) * at_a_plate)
+    some, rest = pilot[:count], pilot[count:]
+    known: dict[tuple[int, bool], Outcomes] = {}
 
-    def judge(index: int, coarse: Outcomes, fine: Outcomes, margin: float) -> tuple[HitErrors, bool]:
-        plain, weighed = (
-            margin * upper_errors(coarse, fine, at_a_plate, accuracy.share, impact) for impact in (None, pilot.velocity)
-        )
-        kept = _within(accuracy, plain)
-        found = HitErrors(at_level(index, numerics), kept, accuracy.share, *(float(error) for error in plain))
-        _logger.info(
-            "pilot at level %d: errors of %s, the promise is %skept", index, found.errors, "" if kept else "not "
-        )
-        return found, _within(accuracy, weighed)
+    def computed(index: int, whole: bool) -> Outcomes:
+        if (index, whole) not in known:
+            others = [computed(index, False), outcomes_at(index, rest)] if whole else []
+            known[index, whole] = Outcomes.joined(others) if whole else outcomes_at(index, some)
+        return known[index, whole]
 
-    levels = range(first, min(first + FURTHER, len(LADDER) - 2) + 1)
-    found = _coarsest(outcomes_at, judge, levels, len(LADDER) - 1, BEYOND)
-    return found or HitErrors(at_level(first, numerics), False, accuracy.share, math.inf, math.inf)
+    def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
+        for whole in (False, True) if len(rest) else (False,):
+            shots = pilot if whole else some
+            found, excess, nearly = _judged(
+                computed(index, whole), computed(finer, whole), shots, at_level(index, numerics), accuracy, margin
+            )
+            _logger.info(
+                "pilot of %d hits at level %d: errors of %s, the promise is %skept",
+                len(shots), index, found.errors, "" if found.kept else "not ",
+            )  # fmt: skip
+            if not OPEN[0] < excess < OPEN[1]:
+                break
+        return found, excess, nearly
+
+    further = FURTHER if layers == 1 else FURTHER_LAYERED
+    levels = range(level, min(level + further, len(LADDER) - 2) + 1)
+    found = _coarsest(judge, levels, len(LADDER) - 1, BEYOND)
+    return found or HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
+
+
+def _judged(
+    coarse: Outcomes, fine: Outcomes, shots: Shots, numerics: Numerics, accuracy: Accuracy, margin: float
+) -> tuple[HitErrors, float, bool]:
+    """What is known of a level from some shots: the finding, its errors over what is allowed, and whether it nearly
+    keeps the promise."""
+    layered = LAYER_RESIDUAL_VELOCITY in coarse
+    relative = (accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt)
+    told, counted, weighed = (
+        margin * upper_errors(coarse, fine, shots.at_a_plate, accuracy.share, impact, given)
+        for impact, given in (
+            (None, (0.0, 0.0)),
+            (None, relative if layered else (0.0, 0.0)),
+            (shots.velocity, relative if layered else (0.0, 0.0)),
+        )
+    )
+    status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
+    excess = _excess(accuracy, counted, layered)
+    kept = excess <= 1.0 and not status > accuracy.status_share
+    velocity, tilt, depth = (float(error) for error in told)
+    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status)
+    return found, excess, _excess(accuracy, weighed, layered) <= 1.0
+
+
+def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
+    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers."""
+    velocity, tilt = np.nan_to_num(errors[:2], nan=math.inf)
+    depth = np.nan_to_num(errors[2], nan=0.0) if layered else 0.0
+    return float(max(velocity / accuracy.residual_velocity, tilt / accuracy.tilt, depth / accuracy.depth))
 
 
 def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:
@@ -215,57 +256,55 @@ def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity
     def found_at(index: int, error: float, allowed: float) -> LimitErrors:
         return LimitErrors(at_level(index, numerics), error <= allowed, share, error, quantity)
 
-    def judge(index: int, coarse: Array, fine: Array, margin: float) -> tuple[LimitErrors, bool]:
-        change, half, typical = limit_changes(coarse, fine, share)
+    known: dict[int, Array] = {}
+
+    def limits(index: int) -> Array:
+        if index not in known:
+            known[index] = limits_at(index)
+        return known[index]
+
+    def judge(index: int, finer: int, margin: float) -> tuple[LimitErrors, float, bool]:
+        change, half, typical = limit_changes(limits(index), limits(finer), share)
         allowed = allowed_share * typical
-        return found_at(index, margin * change, allowed), margin * half <= allowed
+        return found_at(index, margin * change, allowed), margin * half / max(allowed, 1e-30), margin * half <= allowed
 
     levels = range(first, FINEST_LIMIT + 1)
-    found = _coarsest(limits_at, judge, levels, FINEST_LIMIT + 1, BEYOND_LIMITS)
+    found = _coarsest(judge, levels, FINEST_LIMIT + 1, BEYOND_LIMITS)
     return found or found_at(first, math.inf, 0.0)
 
 
-Computed = TypeVar("Computed")
 Finding = TypeVar("Finding", bound=Found)
 
 
 def _coarsest(
-    compute: Callable[[int], Computed],
-    judge: Callable[[int, Computed, Computed, float], tuple[Finding, bool]],
-    levels: range,
-    finest: int,
-    beyond: int,
+    judge: Callable[[int, int, float], tuple[Finding, float, bool]], levels: range, finest: int, beyond: int
 ) -> Finding | None:
     """What is found at the coarsest of some levels that keeps the promise; if none does, at the coarsest one that
-    nearly does, else at the last one tried. None if not even the first level fits the memory.
+    nearly does, else at the coarsest one whose errors are about the smallest. None if not even the first level fits the
+    memory.
 
     Args:
-        compute: what is compared, on a level.
-        judge: the finding at a level by what is computed on it and on a finer one, and a margin; and whether it nearly
-            keeps the promise.
+        judge: the finding at a level by comparing with a finer one, with a margin; its errors over what is allowed; and
+            whether it nearly keeps the promise.
         finest: the last level to compare with.
         beyond: levels that are tried behind one that nearly keeps the promise.
     """
-    known: dict[int, Computed] = {}
-    found = enough = None
-    last = levels[-1]
-    for index in levels:
-        if index > last:
-            break
+    tried: dict[int, tuple[Finding, float]] = {}
+    enough = None
+    index, last = levels[0], levels[-1]
+    while index <= last:
         finer = min(index + 2, finest)  # neighbours err alike
         try:
-            for needed in (index, finer):
-                if needed not in known:
-                    known[needed] = compute(needed)
+            found, excess, nearly = judge(index, finer, MARGIN[finer - index])
         except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
             break
-        found, nearly = judge(index, known[index], known[finer], MARGIN[finer - index])
         if found.kept:
             return found
         if enough is None and nearly:
             enough, last = found, min(last, index + beyond)
-    return enough or found
-
-
-def _within(accuracy: Accuracy, errors: Array) -> bool:
-    return bool(errors[0] <= accuracy.residual_velocity and errors[1] <= accuracy.tilt)
+        if any(excess > STALLED * before for at, (_, before) in tried.items() if at <= index - 2):
+            last = index
+        tried[index] = found, excess
+        index += 2 if excess > FAR and enough is None and index + 2 <= last else 1
+    smallest = min((excess for _, excess in tried.values()), default=math.inf)
+    return enough or next((found for found, excess in tried.values() if excess <= ALIKE * smallest), None)

@@ -105,7 +105,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         bends=record.bending,
         layered=len(plates) > 1,
         deep=deep,
-        burst=any(weakening) and burst,  # also of one shot, as a replay of the first one of several is
+        burst=burst,  # also of one shot, as a replay of the first one of several is
         window=block_window(cells) if resolution.block else 0,
     )
     axial, around = resolution.patches_axial, resolution.patches_around

@@ -15,6 +15,7 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
+from warpimpact.solver.earlier import CLOSED, channel_nodes, planes_of
 from warpimpact.solver.grid import AT_A_TIME, WHOLE
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import March
@@ -33,6 +34,11 @@ SNAPSHOT_COPIES, OTHER_COPIES = 3, 8
 """Numbers for every cell that each snapshot takes until it is written, and that computing any takes."""
 THROUGH = 16
 """Depths at which the mean through a layer is taken."""
+
+
+SAMPLES, MOST_POINTS = 16, 2**24
+"""Points along the side of a node with an edge, and points of all such nodes: a window that is wide and full of small
+holes has fewer along a side, as it would take minutes."""
 
 
 class Weakened(NamedTuple):
@@ -188,24 +194,25 @@ def _left_after(
         memory.launch(order, outcomes, scratch, 1, 0, before)
     for name in memory.fields:  # the window of a layer that is not reached stays closed
         getattr(scratch[0], name).zero_()
+    if variant.burst:  # a shot that meets no channel leaves what the one before knew of channels
+        scratch[0].channel.fill_(CLOSED)
     memory.launch(order, outcomes, scratch, 1, before, 1)
     if variant.nodal:
         return np.asarray(scratch[0].share.numpy().astype(np.float64).reshape(cells)), {}
-    left = np.ones(cells)
-    if variant.degrades and prepared.materials[0].weakens:
-        left = _share_left(memory, 0, scratch[0].exposure.numpy(), cells)
-    return np.asarray(material * left), _behind(memory, scratch, cells) if variant.layered and variant.degrades else {}
+    behind = _behind(memory, scratch, cells) if variant.layered and (variant.degrades or variant.burst) else {}
+    return np.asarray(material * _share_left(memory, 0, scratch[0], cells)), behind
 
 
 def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int, Weakened]:
-    """The layers behind the plate that weaken and that the last shot reached, after a march of one slot.
+    """The layers behind the plate that the last shot reached, of those that weaken or that earlier hits pierce, after a
+    march of one slot.
 
     Args:
         scratch: of the slot.
         plate: cells of the plate's window.
     """
     prepared, (fields, _, stack, _), hit = memory.prepared, scratch, _hit(memory.prepared)
-    is_open, homes, exposure = stack.open.numpy(), stack.home.numpy(), fields.exposure.numpy()
+    is_open, homes = stack.open.numpy(), stack.home.numpy()
     found = {}
     for k, (cells, material) in enumerate(zip(memory.windows(plate), prepared.materials, strict=True)):
         if k > 0 and cells != (0, 0) and is_open[k]:
@@ -213,31 +220,45 @@ def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int,
             y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), cells, spacing)
             offset = float(material.offset_y[-1]), float(material.offset_z[-1])
             solid = material_about(prepared.scene.target.layers[k], y - offset[0], z - offset[1], spacing)
-            found[k] = Weakened(y, z, solid, solid * _share_left(memory, k, exposure, plate))
+            found[k] = Weakened(y, z, solid, solid * _share_left(memory, k, fields, plate))
     return found
 
 
-def _share_left(memory: Memory, layer: int, exposure: NDArray[Any], plate: Cells) -> Array:
+def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
     """Share of the resistance that is left of a layer in its window, the mean through its thickness, of the last shot.
 
     Args:
-        exposure: of one slot.
+        fields: of one slot.
         plate: cells of the plate's window.
     """
-    materials, cells = memory.prepared.materials, memory.windows(plate)[layer]
-    leader = materials[layer].laminate
-    planes = memory.prepared.grids[layer].planes if materials[layer].deep[-1] else WHOLE
-    first = memory.firsts(plate)[layer]
-    field = exposure[first : first + planes.number * cells[0] * cells[1]].reshape(planes.number, *cells)
-    depth = materials[layer].front[-1] - materials[leader].front[-1]
-    depth = depth + materials[layer].thickness[-1] * (np.arange(THROUGH) + 0.5) / THROUGH
-    place = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
-    below = np.floor(place).astype(int)
-    share = np.zeros(field.shape[1:])
-    for at, low in zip(place - below, below, strict=True):
-        exposed = (1.0 - at) * field[low] + at * field[min(low + 1, planes.number - 1)]
-        share += np.exp(materials[layer].decay_rate[-1] * np.maximum(exposed, 0.0))
-    return share / THROUGH
+    material, cells = memory.prepared.materials[layer], memory.windows(plate)[layer]
+    through, share = (np.arange(THROUGH) + 0.5) / THROUGH, np.ones((THROUGH, *cells))
+    if material.weakens:
+        planes = memory.prepared.grids[layer].planes if material.deep[-1] else WHOLE
+        field = _planes_of(fields.exposure, memory.firsts(plate)[layer], planes.number, cells)
+        depth = material.front[-1] - memory.prepared.materials[material.laminate].front[-1]
+        depth = depth + material.thickness[-1] * through
+        place = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
+        share *= np.exp(material.decay_rate[-1] * np.maximum(_between(field, place), 0.0))
+    if memory.variant.burst:
+        firsts = np.cumsum([0, *channel_nodes(memory.prepared, memory.windows(plate))])
+        number = planes_of(memory.prepared, layer, float(material.thickness[-1]))
+        inside = _between(_planes_of(fields.channel, firsts[layer], number, cells), through * (number - 1))
+        share *= np.clip(0.5 - inside / memory.prepared.grids[layer].spacing, 0.0, 1.0)
+    return np.asarray(share.mean(axis=0))
+
+
+def _planes_of(field: Any, first: int, number: int, cells: Cells) -> Array:
+    """Planes of a window from its first node on, shape [number, cells_y, cells_z]."""
+    values = field.numpy()[first : first + number * cells[0] * cells[1]]
+    return np.asarray(values.reshape(number, *cells), dtype=np.float64)
+
+
+def _between(planes: Array, place: Array) -> Array:
+    """Linear interpolation between planes; places count in planes."""
+    low = np.floor(place).astype(int)
+    at = (place - low)[:, None, None]
+    return np.asarray((1.0 - at) * planes[low] + at * planes[np.minimum(low + 1, len(planes) - 1)])
 
 
 def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:
@@ -248,13 +269,15 @@ def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float)
 
 def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:
     """Share of material about every node, shape [nodes_y, nodes_z]; points are taken where an edge may be."""
-    samples = 16
-    fine = ((np.arange(samples) + 0.5) / samples - 0.5) * spacing
     share, rows = np.empty((len(y), len(z))), max(1, AT_A_TIME // len(z))
-    for first in range(0, len(y), rows):
-        along_y = y[first : first + rows, None]
+    parts = {first: y[first : first + rows, None] for first in range(0, len(y), rows)}
+    edges = {first: plate.has_edge(along_y, z, spacing) for first, along_y in parts.items()}
+    nodes = max(1, sum(int(edge.sum()) for edge in edges.values()))
+    samples = min(SAMPLES, max(2, math.isqrt(MOST_POINTS // nodes)))
+    fine = ((np.arange(samples) + 0.5) / samples - 0.5) * spacing
+    for first, along_y in parts.items():
         share[first : first + rows] = plate.is_solid(along_y, z)
-        row, column = np.nonzero(plate.has_edge(along_y, z, spacing))
+        row, column = np.nonzero(edges[first])
         points = along_y[row, :, None] + fine[:, None], z[column, None, None] + fine
         share[first + row, column] = plate.is_solid(*points).mean(axis=(1, 2))
     return share

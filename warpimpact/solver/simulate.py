@@ -53,8 +53,9 @@ def simulate(
         return computed(prepare(scene, some, at), worker, progress)
 
     if numerics.explicit is None:
-        pilot, asked = spread(shots, pilot_size(numerics.asked)), numerics
-        numerics = pilot_hits(lambda level: outcomes(pilot, at_level(level, asked)), pilot, asked).numerics
+        pilot, asked = spread(shots, pilot_size(numerics.asked, len(shots))), numerics
+        layers = len(scene.target.layers)
+        numerics = pilot_hits(lambda level, some: outcomes(some, at_level(level, asked)), pilot, asked, layers).numerics
     return outcomes(shots, numerics, progress)
 
 
@@ -80,19 +81,26 @@ def pilot_of(
         trying: called with every level that is computed.
     """
 
-    def outcomes_at(level: int) -> Outcomes:
+    def outcomes_at(level: int, some: Shots) -> Outcomes:
         trying(level)
-        return computed(prepare(scene, pilot, at_level(level, numerics)), worker)
+        return computed(prepare(scene, some, at_level(level, numerics)), worker)
 
-    return pilot_hits(outcomes_at, pilot, numerics)
+    return pilot_hits(outcomes_at, pilot, numerics, len(scene.target.layers))
 
 
 def spread(shots: Shots, most: int) -> Shots:
-    """Some of the shots at even distances; those at one plate go together."""
+    """Some of the shots, as `spread_places` has them; those at one plate go together."""
     together = shots.at_a_plate
     plates = len(shots) // together
-    places = np.linspace(0, plates, min(plates, -(-most // together)), endpoint=False).astype(int)
+    places = spread_places(plates, min(plates, -(-most // together)))
     return shots[(places[:, None] * together + np.arange(together)).reshape(-1)]
+
+
+def spread_places(places: int, count: int) -> NDArray[np.int64]:
+    """So many of some places at even distances; the first of them lie all over, too."""
+    digits = max(1, (count - 1).bit_length())
+    order = np.array([int(f"{k:0{digits}b}"[::-1], 2) for k in range(2**digits)])
+    return np.asarray(np.linspace(0, places, count, endpoint=False).astype(np.int64)[order[order < count]])
 
 
 def outcomes_of(memory: Memory, contact: Any) -> Outcomes:

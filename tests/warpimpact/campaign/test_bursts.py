@@ -16,7 +16,6 @@ from warpimpact.runs import shards
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, RunProgress, run, run_to_file
-from warpimpact.scene.plausible import Implausible
 from warpimpact.solver.worker import Worker
 
 TEXT = (Path(__file__).parents[3] / "campaigns" / "burst_of_five.toml").read_text(encoding="utf-8")
@@ -125,8 +124,3 @@ def test_what_a_burst_does_not_take_is_refused_in_one_sentence() -> None:
     ):
         with pytest.raises(CampaignError, match=re.escape(sentence)):
             campaign_of(60, change)
-
-
-def test_a_plate_that_does_not_weaken_is_warned_of() -> None:
-    with pytest.warns(Implausible, match="earlier hits change nothing"):
-        campaign_of(60, ("degradation = 0.8\n", "degradation = 1.0\n"))

@@ -103,6 +103,7 @@ def test_a_mistake_gets_one_sentence(make_fit: FitMaker, change: tuple[str, str]
     assert told.startswith("fit.toml")
     assert "\n" not in told
     assert sentence in told
+    assert "at least 1 items" not in told  # of a list whose items are wrong
 
 
 def test_a_class_without_places_is_refused(make_fit: FitMaker) -> None:

@@ -35,7 +35,7 @@ def test_the_error_told_is_that_to_a_level_two_finer() -> None:
 
 
 def test_the_finest_level_that_is_taken_has_one_finer_beside_it() -> None:
-    values = {k: 100.0 * 1.5**-k for k in range(FINEST_LIMIT + 2)}
+    values = {k: 100.0 * (1.0 + 0.9 * 0.6**k) for k in range(FINEST_LIMIT + 2)}
     found = pilot_limits(search(values), DRAFT, "velocity")
     assert not found.kept
     assert found.numerics == Numerics(level=FINEST_LIMIT)
