@@ -8,15 +8,18 @@ import json
 import numpy as np
 import pandas as pd
 
-from warpimpact.catalogue.catalogue import FOLDERS, file_name
+from warpimpact.campaign.doubts import nose_length
+from warpimpact.catalogue.catalogue import FOLDERS, HERE, file_name
 from warpimpact.catalogue.entries import Material
 
-from .limit_model import Fit, Model
-from .limit_rows import PROJECTILES, Rows, published
-from .limit_velocities import PREDICTIONS as _PREDICTIONS
-from .limit_velocities import SUMMARY, errors, stored_fit
+from .limit_model import HEAVY, Fit, Model
+from .limit_rows import PROJECTILES, Rows, core, published
+from .limit_splits import CARBIDE
+from .limit_velocities import PREDICTIONS, errors, stored_fit
 
 DATABASE = "ballistic limit database, Mendeley Data 10.17632/4f92y6jzzh.2"
+HARD, THIN = 450.0, 0.65
+"""Hardness of hard steel [HV], and calibres below which it fails otherwise."""
 _APART = 1.25
 """The thicknesses between which an exponent is found differ at least by this ratio."""
 
@@ -80,6 +83,26 @@ def _entry(rows: Rows, model: Model, found: Fit, name: str, predicted: pd.DataFr
     return "\n".join(lines) + "\n"
 
 
+def figures(rows: Rows, predicted: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """Errors of what the model fails at, for the sentences of a campaign (warpimpact/campaign/doubts.py)."""
+    error = predicted["predicted"] / predicted["published"] - 1.0
+    of, steel = predicted["split"], rows.density[predicted["row"]] > HEAVY
+    hard = steel & (rows.hardness[predicted["row"]] >= HARD) & (rows.calibres[predicted["row"]] < THIN)
+    thin = error[(of == "one thickness out") & hard]
+    in_steel, in_aluminium = (error[(of == CARBIDE) & which] for which in (steel, ~steel))
+    found = {
+        "nose": {"least": min(nose_length(core(name)) for name in PROJECTILES)},
+        "thin hard steel": {"calibres": THIN, "rows": len(thin), "bias": thin.median(), "most": thin.max()},
+        "carbide": {
+            "steel": in_steel.median(),
+            "steel rows": len(in_steel),
+            "aluminium": in_aluminium.median(),
+            "aluminium rows": len(in_aluminium),
+        },
+    }
+    return {name: {key: round(float(value), 4) for key, value in one.items()} for name, one in found.items()}
+
+
 def _plates(some: Rows, calibres: np.ndarray) -> Rows:
     """Plates of a material at normal incidence, of these thicknesses in diameters of the core."""
     first = some[np.zeros(len(calibres), dtype=np.int64)]
@@ -93,8 +116,9 @@ def _plates(some: Rows, calibres: np.ndarray) -> Rows:
 
 
 def main() -> None:
-    assert SUMMARY.exists()
-    for text in entries(published(), stored_fit(), pd.read_csv(_PREDICTIONS)):
+    rows, predicted = published(), pd.read_csv(PREDICTIONS)
+    (HERE / "figures.json").write_text(json.dumps(figures(rows, predicted), indent=1) + "\n", encoding="utf-8")
+    for text in entries(rows, stored_fit(), predicted):
         name = text.partition('"')[2].partition('"')[0]
         (FOLDERS[Material] / f"{file_name(name)}.toml").write_text(text, encoding="utf-8")
 

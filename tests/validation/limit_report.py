@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 
 from .limit_model import CHOSEN, Fit
 from .limit_rows import PROJECTILES, STORED, Rows
-from .limit_splits import LAW, RIVALS
+from .limit_splits import CARBIDE, LAW, RIVALS
 from .limit_velocities import PREDICTIONS, SUMMARY, errors
 
 FIGURE = STORED / "limit_velocities.png"
 PAGE = Path(__file__).parents[2] / "docs" / "validation.md"
-KEPT = ("one row out", "one material out")
+KEPT = ("one row out", "one thickness out", "one material out", CARBIDE)
 """Splits whose predictions are stored."""
 LEAST_ROWS = 6
 _COLOURS = {".30 AP M2": "#0072B2", ".50 AP M2": "#E69F00", "14.5 mm B32": "#009E73", "14.5 mm BS41": "#D55E00"}
@@ -57,10 +57,10 @@ def draw(found: pd.DataFrame) -> None:
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     shown = {
         "every row, from a fit without its fifth of the rows": ["a fifth out"],
-        "from other conditions: hollow, from 0° or from .30 alone": [
+        "angles from 0°, larger and carbide cores from .30 rows alone": [
             "angle: from 0°",
             "scale: .50 and B32 from .30",
-            "core: BS41 carbide from .30",
+            CARBIDE,
         ],
     }
     for axes, (title, splits) in zip(panels, shown.items(), strict=True):

@@ -14,6 +14,7 @@ from .limit_rows import Array, Rows
 LAW = CHOSEN.name
 RIVALS = ("De Marre, fitted", "energy per area")
 COLUMNS = ["split", "row", "projectile", "material", "fitted", "published", "method", "predicted", "low", "high"]
+CARBIDE = "core: BS41 carbide from .30"
 LEAST_ROWS = 3
 
 
@@ -66,7 +67,7 @@ def questions(rows: Rows) -> Iterator[Split]:
             small,
             lambda k: not carbide[k] and bool((small & (rows.material == rows.material[k])).any()),
         ),
-        "core: BS41 carbide from .30": (
+        CARBIDE: (
             small,
             lambda k: bool(carbide[k]) and bool((small & (rows.material == rows.material[k])).any()),
         ),

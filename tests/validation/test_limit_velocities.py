@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.catalogue import HERE, Catalogue
 from warpimpact.catalogue.entries import Material
 
-from .limit_catalogue import entries
+from .limit_catalogue import entries, figures
 from .limit_model import CHOSEN, Fit, Law, Model, coefficients, fit, names
 from .limit_posterior import posterior
 from .limit_report import PAGE, tables, with_tables
@@ -148,6 +148,11 @@ def test_the_catalogue_has_the_fitted_materials(rows: Rows, found: Fit) -> None:
     for text in texts:
         name, strength = text.partition('"')[2].partition('"')[0], text.partition('resistance = "')[2].split()[0]
         assert float(strength) * 1e6 == pytest.approx(stored[name].resistance, rel=2e-3)
+
+
+def test_the_figures_of_its_warnings_are_those_of_the_predictions(rows: Rows) -> None:
+    stored = json.loads((HERE / "figures.json").read_text(encoding="utf-8"))
+    assert figures(rows, pd.read_csv(PREDICTIONS)) == stored
 
 
 def test_a_file_of_other_rows(tmp_path: Path, found: Fit) -> None:

@@ -4,7 +4,6 @@ campaign leaves what limit velocities have tested (docs/validation.md)."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from ..catalogue.catalogue import Catalogue
@@ -12,6 +11,7 @@ from ..catalogue.entries import Material, Threat
 from ..results.attributes import NOT_TESTED
 from ..scene import Core, Plate
 from .catalogued import calibres_of
+from .doubts import doubts_of
 
 if TYPE_CHECKING:
     from .campaign import Campaign
@@ -27,7 +27,7 @@ def evidence_of(campaign: Campaign) -> list[str]:
     for place, plate in campaign.target.named:
         if plate.material is not None:
             lines.append(_of_material(campaign, place, plate, catalogue))
-    return lines + [f"{NOT_TESTED}{doubt}" for doubt in dict.fromkeys(_doubts(campaign, catalogue))]
+    return lines + [f"{NOT_TESTED}{doubt}" for doubt in dict.fromkeys(doubts_of(campaign, catalogue.all(Material)))]
 
 
 def _of_threat(core: Core, catalogue: Catalogue) -> str:
@@ -74,38 +74,3 @@ def _same(one: object, other: object) -> bool:
     if isinstance(one, float) and isinstance(other, float):
         return math.isclose(one, other, rel_tol=_CLOSE)
     return one == other
-
-
-def _doubts(campaign: Campaign, catalogue: Catalogue) -> Iterator[str]:
-    materials = catalogue.all(Material)
-    for place, plate in campaign.target.named:
-        if plate.material in materials:
-            yield from _beyond(campaign, place, plate, materials[plate.material])
-
-
-def _beyond(campaign: Campaign, place: str, plate: Plate, material: Material) -> Iterator[str]:
-    """Where a plate leaves the rows that its material comes from."""
-    if not material.rows:
-        return
-    core, obliquity = campaign.core, math.degrees(campaign.impact.obliquity)
-    ratio = calibres_of(core, plate)
-    if not _within(plate.thickness, material.thickness_low, material.thickness_high):
-        yield (
-            f"{place} is {1e3 * plate.thickness:.4g} mm thick, but the limit velocities of {material.name} are of "
-            f"{1e3 * material.thickness_low:.4g} to {1e3 * (material.thickness_high or 0.0):.4g} mm"
-        )
-    if not _within(ratio, material.calibres_low, material.calibres_high):
-        yield (
-            f"{place} has {ratio:.3g} calibres of the core, but the limit velocities of {material.name} are of "
-            f"{material.calibres_low:.3g} to {material.calibres_high or 0.0:.3g}"
-        )
-    low, high = math.degrees(material.obliquity_low), math.degrees(material.obliquity_high or 0.0)
-    if not _within(obliquity, low, high):
-        angles = f"at {low:.4g}°" if low == high else f"from {low:.4g} to {high:.4g}°"
-        yield f"{place} is hit at {obliquity:.4g}°, but the limit velocities of {material.name} are {angles}"
-    if core.threat is not None and core.threat not in material.rows:
-        yield f"no limit velocity of {material.name} is of the {core.threat}, but of {', '.join(material.rows)}"
-
-
-def _within(value: float, low: float, high: float | None) -> bool:
-    return high is None or low * (1.0 - _CLOSE) - 1e-12 <= value <= high * (1.0 + _CLOSE) + 1e-12

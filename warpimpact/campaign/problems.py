@@ -14,11 +14,18 @@ _MOST = 8
 
 def sentence(error: ValidationError, data: dict[str, Any]) -> str:
     """The first problems as a sentence, and how many more there are."""
-    problems = error.errors(include_url=False)
+    problems = [one for one in error.errors(include_url=False) if not _follows(one, error)]
     described = [_described(problem, data) for problem in problems[:_MOST]]
     if (more := len(problems) - len(described)) > 0:
         described.append(f"{more} more problem{'s' if more > 1 else ''}")
     return "; also ".join(described)
+
+
+def _follows(problem: ErrorDetails, error: ValidationError) -> bool:
+    """Whether a list is too short only because its items are wrong, which is told."""
+    place = problem["loc"]
+    inner = (other["loc"] for other in error.errors(include_url=False) if len(other["loc"]) > len(place))
+    return problem["type"] == "too_short" and any(other[: len(place)] == place for other in inner)
 
 
 def _described(problem: ErrorDetails, data: dict[str, Any]) -> str:

@@ -4,6 +4,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from warpimpact.results import attributes as attr
+
 from .options import Commands, add_campaign, add_command, add_output, at_least, read_option
 from .paths import check_picture, check_place
 from .progress import warn
@@ -63,6 +65,8 @@ def _limit(arguments: argparse.Namespace) -> int:
     run_shown(campaign, output, arguments, computation)
     dataset = files.read(output)
     print(limits_text(dataset))
+    if attr.EVIDENCE in dataset.attrs:
+        print(dataset.attrs[attr.EVIDENCE])
     limit_figure(dataset).savefig(picture, dpi=150)
     print(f"written to {output}, figure in {picture}")
     return failure_code(dataset, output)

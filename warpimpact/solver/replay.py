@@ -36,6 +36,11 @@ THROUGH = 16
 """Depths at which the mean through a layer is taken."""
 
 
+SAMPLES, MOST_POINTS = 16, 2**24
+"""Points along the side of a node with an edge, and points of all such nodes: a window that is wide and full of small
+holes has fewer along a side, as it would take minutes."""
+
+
 class Weakened(NamedTuple):
     """What is left of a layer behind the plate, in the window where a core reached it.
 
@@ -264,13 +269,15 @@ def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float)
 
 def material_about(plate: Plate, y: Array, z: Array, spacing: float) -> Array:
     """Share of material about every node, shape [nodes_y, nodes_z]; points are taken where an edge may be."""
-    samples = 16
-    fine = ((np.arange(samples) + 0.5) / samples - 0.5) * spacing
     share, rows = np.empty((len(y), len(z))), max(1, AT_A_TIME // len(z))
-    for first in range(0, len(y), rows):
-        along_y = y[first : first + rows, None]
+    parts = {first: y[first : first + rows, None] for first in range(0, len(y), rows)}
+    edges = {first: plate.has_edge(along_y, z, spacing) for first, along_y in parts.items()}
+    nodes = max(1, sum(int(edge.sum()) for edge in edges.values()))
+    samples = min(SAMPLES, max(2, math.isqrt(MOST_POINTS // nodes)))
+    fine = ((np.arange(samples) + 0.5) / samples - 0.5) * spacing
+    for first, along_y in parts.items():
         share[first : first + rows] = plate.is_solid(along_y, z)
-        row, column = np.nonzero(plate.has_edge(along_y, z, spacing))
+        row, column = np.nonzero(edges[first])
         points = along_y[row, :, None] + fine[:, None], z[column, None, None] + fine
         share[first + row, column] = plate.is_solid(*points).mean(axis=(1, 2))
     return share

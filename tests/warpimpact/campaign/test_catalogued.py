@@ -139,6 +139,47 @@ def test_evidence_is_told_with_what_leaves_it(folder: Path) -> None:
         assert said in doubts
 
 
+STEEL = {"thickness": "5 mm", "resistance": "4 GPa"}
+BLUNT = {"shape": "ogive", "crh": 0.5, "diameter": "6 mm", "length": "20 mm", "mass": "4 g"}
+
+
+# What validation has shown to fail is said with its figure; beside each the same without what makes it fail.
+@pytest.mark.parametrize(
+    ("changes", "other", "said"),
+    [
+        (
+            {"plate": STEEL},
+            {"plate": STEEL | {"thickness": "7 mm"}},
+            "plate is steel that may be hard and 0.8 calibres",
+        ),
+        ({"plate": STEEL}, {"plate": STEEL | {"resistance": "1 GPa"}}, "predicted 31% too high"),
+        ({"plate": STEEL}, {"plate": STEEL | {"density": 2700}}, "may be hard"),
+        (
+            {"plate": {"material": "MARS600", "thickness": "5 mm"}},
+            {"plate": {"material": "SECURE400", "thickness": "5 mm"}},
+            "plate is steel of 616 HV",
+        ),
+        (
+            {"core": {"threat": "14.5 mm BS41"}},
+            {"core": {"threat": "14.5 mm B32"}},
+            "carbide core in steel 21% too high",
+        ),
+        (
+            {"core": {"threat": "14.5 mm BS41"}, "plate": STEEL | {"density": 2700}},
+            {"core": {"threat": ".50 AP M2"}},
+            "carbide core in aluminium 9% too low (median of 11)",
+        ),
+        ({"core": BLUNT}, {"core": BLUNT | {"crh": 3.0}}, "the nose of the core is 0.35 diameters long"),
+    ],
+)
+def test_where_it_fails_the_program_says_so(
+    folder: Path, changes: dict[str, Any], other: dict[str, Any], said: str
+) -> None:
+    impact = {"impact": {"velocity": 800.0}}
+    assert any(said in line for line in evidence_of(read(folder, **impact | changes)))
+    assert not any(said in line for line in evidence_of(read(folder, **impact | other)))
+
+
 def test_the_schema_knows_the_names(folder: Path) -> None:
     schema = campaign_schema()
     jsonschema.validate(TABLES, schema)

@@ -1,7 +1,8 @@
 """Tile of the plate: material by area, and the filter of the exposure."""
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from warpimpact.scene import (
     SlotPattern,
     TrianglePattern,
 )
+from warpimpact.solver import replay
 from warpimpact.solver.grid import BLUR, FINER, SUBSAMPLES, nearest_wall, tent_taps, tile_of
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
@@ -127,3 +129,20 @@ def test_taps_keep_mass_and_second_moment(ratio: float) -> None:
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 1.414])
 def test_length_within_scattering_and_reading_is_not_filtered(ratio: float) -> None:
     np.testing.assert_array_equal(tent_taps(ratio, 1.0), [1.0])
+
+
+@pytest.mark.parametrize(("nodes", "samples"), [(8, 16), (60, 4), (200, 2)])
+def test_a_window_full_of_edges_takes_a_bounded_number_of_points(
+    nodes: int, samples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(replay, "MOST_POINTS", 2**16)
+    points: list[int] = []
+
+    def is_solid(y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        points.append(np.broadcast(y, z).size)
+        return np.broadcast_to(y - np.floor(y) < 0.5, np.broadcast(y, z).shape)
+
+    plate = SimpleNamespace(is_solid=is_solid, has_edge=lambda y, z, _: np.ones((len(y), len(z)), bool))
+    share = replay.material_about(cast(Any, plate), np.arange(nodes) + 0.5, np.arange(nodes) + 0.5, 1.0)
+    np.testing.assert_array_equal(share, 0.5)
+    assert sum(points) == nodes**2 * (1 + samples**2)
