@@ -115,7 +115,7 @@ SEARCH = "limit_runs_per_hit"
 
 
 def dataset_of(columns: dict[Variable, Any], attributes: dict[str, Any]) -> xarray.Dataset:
-    """The Dataset of these columns; a velocity attribute is in m/s."""
+    """The Dataset of these columns; attributes that are velocities are in m/s."""
     import xarray
 
     data = {name: (name.dims, np.asarray(values), name.attributes) for name, values in columns.items()}
@@ -134,8 +134,9 @@ def write(dataset: xarray.Dataset, path: Path) -> None:
     Raises:
         OutputError: it cannot be written; what was there before is untouched.
     """
+    bare = {name: {"_FillValue": None} for name in dataset.coords}  # CF: a coordinate has no missing values
     with uninterrupted(), aside(path) as file:
-        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4")
+        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4", encoding=bare)
 
 
 def read(path: Path) -> xarray.Dataset:

@@ -7,7 +7,19 @@ from pathlib import Path
 import pytest
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
-HEAVY = {"asyncio", "dask", "distributed", "jinja2", "matplotlib", "pandas", "pint", "scipy", "tqdm", "xarray"}
+HEAVY = {
+    "asyncio",
+    "dask",
+    "distributed",
+    "jinja2",
+    "matplotlib",
+    "pandas",
+    "pint",
+    "scipy",
+    "statsmodels",
+    "tqdm",
+    "xarray",
+}
 """Each takes a twentieth of a second and more, or takes another of them along."""
 
 

@@ -80,6 +80,7 @@ def test_a_shot_may_have_its_own_plate(make_fit: FitMaker) -> None:
         (('low = "1 GPa"', 'low = "1 mm"'), 'low: got "1 mm", which is not a stress'),
         (('low = "1 GPa"', 'low = "-1 GPa"'), "the priors reach plate.resistance = "),
         (('hit = "between holes"', 'hit = "between hole"'), 'got "between hole", but it must be "unknown", "through a'),
+        (("[[shot]]", "[[shot]]\ntypo = 1"), 'got the unknown key "typo"'),
         (('hit = "between holes"', "hit = { y = 1 }"), "or a table with y and z"),
         (('std = "10 m/s"', "std = 0"), "std: got 0, but no measurement is exact: it must be greater than 0"),
         (("[10]", "[10, 20]"), "got 2 values and 2 std at 1 stand-offs"),
