@@ -115,7 +115,7 @@ SEARCH = "limit_runs_per_hit"
 
 
 def dataset_of(columns: dict[Variable, Any], attributes: dict[str, Any]) -> xarray.Dataset:
-    """The Dataset of these columns; a velocity attribute is in m/s."""
+    """The Dataset of these columns; attributes that are velocities are in m/s."""
     import xarray
 
     data = {name: (name.dims, np.asarray(values), name.attributes) for name, values in columns.items()}

@@ -17,7 +17,19 @@ SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 
 @pytest.mark.parametrize(
     "command",
-    [[], ["run"], ["inspect"], ["plot"], ["validate"], ["study"], ["compare"], ["plate"], ["identify"], ["catalogue"]],
+    [
+        [],
+        ["run"],
+        ["inspect"],
+        ["plot"],
+        ["validate"],
+        ["study"],
+        ["compare"],
+        ["plate"],
+        ["identify"],
+        ["catalogue"],
+        ["test"],
+    ],
 )
 def test_help_shows_how(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
