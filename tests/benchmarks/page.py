@@ -22,6 +22,7 @@ RESULTS = HERE / "results"
 RUNS: Mapping[str, Sequence[str]] = {
     "peers": ("peers.py", "--hits", "256"),
     "throughput": ("throughput.py",),
+    "roads": ("roads.py", "--seed", "20261122"),
     "overheads": ("overheads.py",),
     "statistics_cost": (
         "statistics_cost.py",
@@ -68,7 +69,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[Row]:
     for name, of in (
         ("throughput", _throughput),
         ("peers", _peers),
-        ("throughput", _kinds),
+        ("roads", _roads),
         ("overheads", _overheads),
         ("statistics_cost", _statistics),
     ):
@@ -132,23 +133,15 @@ def _peers(values: Mapping[str, Any]) -> Iterator[Row]:
         )
 
 
-def _kinds(values: Mapping[str, Any]) -> Iterator[Row]:
-    rounds = f"median of {values['rounds']} rounds"
-    if of := values.get("layers"):
+def _roads(values: Mapping[str, Any]) -> Iterator[Row]:
+    for name, one in values["roads"].items():
         yield Row(
-            f"target of {of['layers']} layers, times the cost of its plate alone",
-            "slotted plate, 100 mm of air, 10 mm base",
-            f"{of['ratio']:.2f}",
-            f"standard, processor time; {of['microseconds_per_hit']:.3g} µs per hit",
-            f"{rounds}, {of['hits']} Sobol hits",
-        )
-    if of := values.get("bursts"):
-        yield Row(
-            f"bursts of {of['shots_at_a_plate']}, times the cost of single shots",
-            "slotted plate",
-            f"{of['ratio']:.2f}",
-            f"as many single shots at the same places; {of['microseconds_per_hit']:.3g} µs per hit",
-            f"{rounds}, {of['bursts']} bursts",
+            "standard, times the cost of the slotted plate",
+            name,
+            f"{one['ratio']:.1f}; level {one['level']}, {one['microseconds_per_hit']:.3g} µs per hit, "
+            f"pilot {one['pilot_share']:.0%}" + ("" if one["kept"] else "; promise not kept"),
+            f"processor time of a run of {values['run']} hits with its pilot",
+            f"least of {values['rounds']} rounds, {values['hits']} hits",
         )
 
 

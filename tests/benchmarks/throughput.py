@@ -1,18 +1,17 @@
-"""Hits per second of the named fidelities on three scenes, and what a layer and a burst cost.
+"""Hits per second of three levels on three scenes.
 
     python tests/benchmarks/throughput.py          # writes results/throughput.json
 
 The contenders of a scene run in turn, round after round, and the median round counts. Rates are of processor time of
-one core, and of wall time on all cores; those of wall time mean something on a quiet machine only. A burst is compared
-with as many single shots at the same places, a layered target with its plate alone; both are ratios of processor time.
+one core, and of wall time on all cores; those of wall time mean something on a quiet machine only. What other scenes
+cost beside the slotted plate: roads.py.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -36,16 +35,13 @@ Work = Callable[[Shots], Any]
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Measure, print, store."""
-    parser = argparse.ArgumentParser(description="hits per second of levels; cost of layers and bursts")
+    parser = argparse.ArgumentParser(description="hits per second of levels")
     parser.add_argument("--hits", type=int, default=1024, help="Sobol hits over the unit cell (default: 1024)")
     hits = parser.parse_args(argv).hits
     values: dict[str, Any] = {"machine": machine(), "hits": hits, "rounds": ROUNDS, "scenes": {}}
     for name, file in SCENES.items():
         values["scenes"][name] = rates(_campaign(file), hits)
         print(name, values["scenes"][name])
-    values["layers"] = layers(_campaign("layered_target"), hits // 4)
-    values["bursts"] = bursts(_campaign("burst_of_five"), hits // 8)
-    print(values["layers"], values["bursts"])
     store("throughput", values)
 
 
@@ -67,42 +63,6 @@ def rates(campaign: Campaign, hits: int) -> dict[str, dict[str, float]]:
             wall.append(_seconds(together, many, time.perf_counter) / len(many))
         found[f"level {level}"] = {"one_core": 1.0 / float(np.median(one)), "all_cores": 1.0 / float(np.median(wall))}
     return found
-
-
-def layers(campaign: Campaign, hits: int) -> dict[str, float]:
-    """Cost of a target of two layers over that of its plate alone, at standard."""
-    target, shots = campaign.target, shots_of(campaign, hits)
-    alone = campaign.scene.model_copy(update={"target": target.model_copy(update={"layers": ()})})
-    return {"hits": hits, "layers": len(target.layers)} | _compared(
-        {"layered": (_march(campaign.scene, _STANDARD, 1), shots), "single": (_march(alone, _STANDARD, 1), shots)}
-    )
-
-
-def bursts(campaign: Campaign, count: int) -> dict[str, float]:
-    """Cost of bursts over that of as many single shots at the same places, at standard."""
-    each = campaign.at_a_plate
-    shots = campaign.model_copy(update={"hits": campaign.hits.model_copy(update={"count": count})}).sampler()
-    together = shots.shots(0, count * each)
-    single = replace(together, sample=None, burst_order=None, nearest_earlier_hit=None)
-    march = _march(campaign.scene, _STANDARD, 1)
-    return {"bursts": count, "shots_at_a_plate": each} | _compared(
-        {"bursts": (march, together), "single": (march, single)}
-    )
-
-
-_STANDARD = Numerics(level=2)
-
-
-def _compared(works: Mapping[str, tuple[Work, Shots]]) -> dict[str, float]:
-    """Median ratio of the processor times of two works, run in turn; and the microseconds per hit of the first."""
-    times = []
-    for _ in range(ROUNDS + 1):  # the first round builds the kernels
-        times.append([_seconds(work, shots, time.process_time) / len(shots) for work, shots in works.values()])
-    measured = np.array(times[1:])
-    return {
-        "ratio": float(np.median(measured[:, 0] / measured[:, 1])),
-        "microseconds_per_hit": 1e6 * float(np.median(measured[:, 0])),
-    }
 
 
 def _campaign(file: str) -> Campaign:

@@ -44,13 +44,13 @@ def test_rows_follow_from_the_results(found: Results) -> None:
     for scene, bout in found["peers"]["scenes"].items():
         ratios = re.findall(rf"times as fast as Numba \| {scene} \| ([\d.]+) \|", text)
         assert [float(one) for one in ratios] == [round(one["ratio"], 1) for one in bout["ratios"]]
-    for kind in ("layers", "bursts"):
-        assert f"| {found['throughput'][kind]['ratio']:.2f} |" in text
+    for name, one in found["roads"]["roads"].items():
+        assert f"| {name} | {one['ratio']:.1f}; level {one['level']}," in text
 
 
 def test_results_that_change_change_the_table(found: Results) -> None:
-    found["throughput"]["layers"]["ratio"] = 123.456
-    assert any(row.figure == "123.46" for row in page.rows(found))
+    found["roads"]["roads"]["slotted plate"]["ratio"] = 123.456
+    assert any(row.figure.startswith("123.5; level") for row in page.rows(found))
 
 
 def test_a_result_that_is_missing_leaves_its_rows_out(found: Results) -> None:

@@ -1,0 +1,165 @@
+"""What the scenes that users have cost, as ratios to the slotted plate: processor time per hit at standard, its pilot
+included.
+
+    python tests/benchmarks/roads.py            # writes results/roads.json
+
+Every road differs from the slotted plate, or from the oblique one, in what its name says. A road's level is what its
+own pilot finds for a run of RUN hits. The roads are timed in turn with the slotted plate, and the least round counts.
+`--seed` adds scenes of random_layers.py.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bench import machine, store
+from random_layers import drawn
+
+from warpimpact import Campaign, Numerics, Scene, Shots
+from warpimpact.solver.device import find_device
+from warpimpact.solver.marching import March
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.pilot import PRESETS, pilot_size
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import outcomes_of, pilot_of
+from warpimpact.solver.worker import NEVER, Worker
+
+RUN = 16384
+"""Hits of the run that a pilot is made for."""
+ROUNDS, TIMED = 3, 0.4
+"""Runs of each road, in turn with the slotted plate, and processor time of one of them [s]."""
+
+P80 = """
+[core]
+shape = "polynomial"
+coefficients = [3.0e-4, 0.24, -5.29]
+length = "27.86 mm"
+mass = "4 g"
+"""
+OGIVE = """
+[core]
+shape = "ogive"
+diameter = "6.17 mm"
+crh = 3.0
+length = "27 mm"
+mass = "5.25 g"
+"""
+MATERIAL = """resistance = "2600 MPa"
+shear_coefficient = 0.05
+degradation = 0.8
+"""
+SLOTS = (
+    'pattern = { shape = "slot", length = "12 mm", width = "4 mm", spacing = ["8 mm", "16 mm"], staggered = true }\n'
+)
+HOLES = """[plate.pattern]
+shape = "circle"
+diameter = "6 mm"
+spacing = ["8 mm", "13.86 mm"]
+staggered = true
+"""
+SLOTTED = f'[plate]\nthickness = "4 mm"\n{MATERIAL}{SLOTS}'
+ROUND = f'[plate]\nthickness = "5 mm"\n{MATERIAL}{HOLES}'
+BY_PATH = '[plate]\ndegradation_distance = "0.8 mm"'
+NORMAL, OBLIQUE = '[impact]\nvelocity = "825 m/s"\n', '[impact]\nvelocity = "838 m/s"\nobliquity = "30 deg"\n'
+
+
+def base(thickness: str, resistance: str) -> str:
+    """A base 100 mm behind the plate that does not weaken."""
+    return (
+        f'[[layer]]\ngap = "100 mm"\nthickness = "{thickness}"\nresistance = "{resistance}"\nshear_coefficient = 0.05\n'
+    )
+
+
+ROADS = {
+    "slotted plate": P80 + SLOTTED + NORMAL,
+    "ogive with a shank, round holes of 5 mm": OGIVE + ROUND + NORMAL,
+    "the same at 30 degrees": OGIVE + ROUND + OBLIQUE,
+    "the same with a base that it pierces": OGIVE + ROUND + OBLIQUE + base("6 mm", "800 MPa"),
+    "the same with a base that stops half": OGIVE + ROUND + OBLIQUE + base("10 mm", "3000 MPa"),
+    "slotted plate, bursts of three": P80 + SLOTTED + NORMAL + '[burst]\ncount = 3\nscatter = "5 mm"\n',
+    "slotted plate, strength of the core": P80 + 'strength = "3 GPa"\n' + SLOTTED + NORMAL,
+    "slotted plate, weakening by distance": P80
+    + SLOTTED.replace("[plate]\n", '[plate]\ndegradation_distance = "0.8 mm"\n')
+    + NORMAL,
+    "slotted plate, rate-dependent stress": P80 + SLOTTED + NORMAL + "[interaction]\nquadratic = 0.5\n",
+    "slotted plate of 8 mm": P80 + SLOTTED.replace("4 mm", "8 mm", 1) + NORMAL,
+    "slotted plate, double precision": P80 + SLOTTED + NORMAL + '[numerics]\nprecision = "double"\n',
+}
+"""Campaigns by the name of the road, less what all have."""
+
+
+@dataclass(frozen=True)
+class Road:
+    """A scene, its shots, and the numerics that keep standard's promise."""
+
+    scene: Scene
+    shots: Shots
+    numerics: Numerics
+    kept: bool
+    pilot: float
+    """Processor time of the pilot [s]."""
+
+    def seconds(self) -> float:
+        """Processor time of a hit [s]."""
+        begin, count = time.process_time(), 0
+        while time.process_time() - begin < TIMED:
+            march = March(Memory(prepare(self.scene, self.shots, self.numerics), find_device("cpu")), 1)
+            count += len(outcomes_of(march.memory, march.march(None, NEVER)).status)
+        return (time.process_time() - begin) / count
+
+
+def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics) -> Road:
+    """A scene and its shots with what their pilot finds."""
+    worker = Worker("cpu", 1)
+    pilot_of(scene, pilot[: pilot.at_a_plate], asked, worker)  # builds the kernels
+    begin = time.process_time()
+    found = pilot_of(scene, pilot, asked, worker)
+    return Road(scene, shots, found.numerics, found.kept, time.process_time() - begin)
+
+
+def named(text: str, hits: int) -> Road:
+    """A road of ROADS."""
+    bending = "bending = true\n" if "strength" in text else ""
+    whole = f'title = "road"\n{text}[hits]\ncount = {RUN}\nseed = 1\n[output]\nstandoffs = ["130 mm"]\n{bending}'
+    campaign = Campaign.from_text(whole, name="road", folder=Path())
+    each = campaign.at_a_plate
+    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], RUN)) * each)
+    return road(campaign.scene, shots[: hits * each], shots, campaign.numerics)
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Measure, print, store."""
+    parser = argparse.ArgumentParser(description="what the scenes that users have cost, beside the slotted plate")
+    parser.add_argument("--hits", type=int, default=256, help="hits that are timed (default: 256)")
+    parser.add_argument("--seed", type=int, help="of random_layers.py, whose first scenes are timed, too")
+    parser.add_argument("--scenes", type=int, default=6, help="of the seed (default: 6)")
+    given = parser.parse_args(argv)
+    roads = {name: named(text, given.hits) for name, text in ROADS.items()}
+    for index in range(given.scenes if given.seed is not None else 0):
+        case = drawn(given.seed, index)
+        pilot = case.shots(pilot_size(PRESETS["standard"], RUN), seed=77)
+        roads[f"{given.seed}.{index}: {case.name}"] = road(case.scene, case.shots(given.hits), pilot, Numerics())
+    values: dict[str, Any] = {"machine": machine(), "hits": given.hits, "run": RUN, "rounds": ROUNDS, "roads": {}}
+    slotted = roads["slotted plate"]
+    for name, one in roads.items():
+        rounds = [(one.seconds(), slotted.seconds()) for _ in range(ROUNDS)]
+        cost, reference = (min(times) for times in zip(*rounds, strict=True))
+        whole = [seconds * RUN + of.pilot for seconds, of in ((cost, one), (reference, slotted))]
+        values["roads"][name] = {
+            "ratio": whole[0] / whole[1],
+            "microseconds_per_hit": 1e6 * cost,
+            "level": one.numerics.level,
+            "kept": one.kept,
+            "pilot_share": one.pilot / whole[0],
+        }
+        print(name, values["roads"][name], flush=True)
+    store("roads", values)
+
+
+if __name__ == "__main__":
+    main()
