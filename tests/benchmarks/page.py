@@ -22,7 +22,7 @@ RESULTS = HERE / "results"
 RUNS: Mapping[str, Sequence[str]] = {
     "peers": ("peers.py", "--hits", "256"),
     "throughput": ("throughput.py",),
-    "roads": ("roads.py", "--seed", "20261122"),
+    "roads": ("roads.py",),
     "overheads": ("overheads.py",),
     "statistics_cost": (
         "statistics_cost.py",

@@ -139,7 +139,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, help="of random_layers.py, whose first scenes are timed, too")
     parser.add_argument("--scenes", type=int, default=6, help="of the seed (default: 6)")
     given = parser.parse_args(argv)
-    roads = {name: named(text, given.hits) for name, text in ROADS.items()}
+    roads = {}
+    for name, text in ROADS.items():
+        roads[name] = named(text, given.hits)
+        print(name, f"pilot {roads[name].pilot:.1f} s", flush=True)
     for index in range(given.scenes if given.seed is not None else 0):
         case = drawn(given.seed, index)
         pilot = case.shots(pilot_size(PRESETS["standard"], RUN), seed=77)
