@@ -6,7 +6,7 @@ function hitMaps(data) {
   // Of the page, which may be light or dark.
   const ink = getComputedStyle(document.body).color;
   const font = { family: "system-ui, sans-serif", size: 12, color: ink };
-  const sheet = { font, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)" };
+  const sheet = { font, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)" } };
   // Four digits; less than a thousandth of a unit is rounding.
   const number = (value) => {
     if (value === null) return "–";

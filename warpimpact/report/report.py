@@ -151,6 +151,11 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
         variables=data["variables"],
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
-        texts={"number": number_text, "interval": interval_text, "intervals": intervals_text, "units": SHOWN_UNITS},
+        texts=texts(),
         **content,
     )
+
+
+def texts() -> dict[str, Any]:
+    """How tables.html writes numbers, intervals and units."""
+    return {"number": number_text, "interval": interval_text, "intervals": intervals_text, "units": SHOWN_UNITS}
