@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from warpimpact.solver.resolution import Resolution
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 FINER = 5
 """Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the cell under its centre."""
@@ -33,9 +34,11 @@ BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
 SUBSAMPLES = 6
 """Points per cell and direction from which a material fraction is computed."""
-AT_A_TIME = 2**13
-"""Cells of the tile that are computed together."""
-
+BLOCK, PARTS = 16, 4
+"""Cells of the tile along the sides of a block that is looked at first, and into how many parts they are divided where
+an edge of a hole crosses it; a power of it."""
+CROSSED = 2**9
+"""Blocks, or cells, that are divided together."""
 
 FEWEST_PLANES, PLANES = 3, 1.6
 """Per degradation depth: at least, and times the square root of its steps, as planes err by the fourth order of their
@@ -227,22 +230,57 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
             f"plate, {period_y:g} m x {period_z:g} m, needs {needed / 2**30:.3g} GiB in cells of {spacing:.3g} m, and "
             f"{free / 2**30:.3g} GiB are free"
         )
-    samples = 1 if sharp else SUBSAMPLES
-    within = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
-    half_diagonal, middle_z = 0.501 * math.hypot(dy, dz), (np.arange(count_z, dtype=np.float64) + 0.5) * dz
-    material, rows = np.empty((count_y, count_z)), max(1, AT_A_TIME // count_z)
-    for first in range(0, count_y, rows):
-        part = material[first : first + rows]
-        middle_y = (np.arange(first, first + len(part), dtype=np.float64)[:, None] + 0.5) * dy
-        part[:] = ~pattern.is_hole(middle_y, middle_z)
-        row, column = np.nonzero(pattern.has_edge(middle_y, middle_z, half_diagonal))
-        y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
-        part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
+    material = _fractions(pattern, (count_y, count_z), (dy, dz), 1 if sharp else SUBSAMPLES)
     if not sharp:  # no running sum: its rounding would leave material in the middle of a hole
         for axis in range(2):
             beside = sum(np.roll(material, k, axis) + np.roll(material, -k, axis) for k in range(1, BLUR // 2 + 1))
             material = (1.0 / BLUR) * material + (1.0 / BLUR) * beside
     return Tile(material, dy, dz)
+
+
+def _fractions(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Array:
+    """Material fractions of so many cells from the origin on, with these sides [m], each of samples × samples points.
+
+    Blocks of cells that no edge of a hole crosses are material or hole as a whole.
+    """
+    blocks = [-(-count // BLOCK) for count in counts]
+    first_row, first_column = (BLOCK * at.reshape(-1) for at in np.indices(blocks))
+    solid, row, column = _crossed(pattern, first_row, first_column, BLOCK, sides)
+    whole = np.broadcast_to(solid.reshape(blocks[0], 1, blocks[1], 1), (blocks[0], BLOCK, blocks[1], BLOCK))
+    material = whole.astype(np.float64).reshape(blocks[0] * BLOCK, blocks[1] * BLOCK)
+    for first in range(0, len(row), CROSSED):
+        _refine(material, pattern, row[first : first + CROSSED], column[first : first + CROSSED], sides, samples)
+    return material[: counts[0], : counts[1]].copy()
+
+
+def _refine(
+    material: Array, pattern: Pattern, row: Numbers, column: Numbers, sides: tuple[float, float], samples: int
+) -> None:
+    """Fill in the blocks of cells that begin at some rows and columns: part by part, then cell by cell, then point by
+    point those cells that an edge crosses."""
+    size = BLOCK
+    while size > 1:
+        size, within = size // PARTS, np.arange(0, size, size // PARTS)
+        row, column = (row[:, None, None] + within[:, None], column[:, None, None] + within)
+        row, column = (at.reshape(-1) for at in np.broadcast_arrays(row, column))
+        inside = row[:, None, None] + np.arange(size)[:, None], column[:, None, None] + np.arange(size)
+        solid, row, column = _crossed(pattern, row, column, size, sides)
+        material[inside] = solid[:, None, None]
+    points = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
+    for first in range(0, len(row), CROSSED):
+        some = row[first : first + CROSSED], column[first : first + CROSSED]
+        y, z = ((at[:, None, None] + 0.5) * side for at, side in zip(some, sides, strict=True))
+        material[some] = 1.0 - pattern.is_hole(y + points[:, None] * sides[0], z + points * sides[1]).mean(axis=(1, 2))
+
+
+def _crossed(
+    pattern: Pattern, row: Numbers, column: Numbers, size: int, sides: tuple[float, float]
+) -> tuple[NDArray[np.bool_], Numbers, Numbers]:
+    """Whether the middles of blocks of size × size cells are material; rows and columns of the blocks that an edge of a
+    hole may cross."""
+    y, z = (np.asarray((at + 0.5 * size) * side) for at, side in zip((row, column), sides, strict=True))
+    edge = pattern.has_edge(y, z, 0.501 * size * math.hypot(*sides))
+    return ~pattern.is_hole(y, z), row[edge], column[edge]
 
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:

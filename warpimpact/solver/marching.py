@@ -16,7 +16,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.solver.device import cores, halving, load
+from warpimpact.solver.device import halving, launching, load
 from warpimpact.solver.memory import Cells, Memory
 from warpimpact.solver.worker import NEVER, Cancel
 
@@ -45,7 +45,7 @@ class March:
 
     def __init__(self, memory: Memory, threads: int | None = None) -> None:
         self.memory, self.at_a_plate = memory, memory.at_a_plate
-        self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
+        self.threads = launching(threads)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:

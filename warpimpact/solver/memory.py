@@ -4,6 +4,7 @@ computed at a time, and what the kernels fill."""
 from __future__ import annotations
 
 import math
+import threading
 import time
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -24,6 +25,7 @@ from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.rings import Rings
 
 if TYPE_CHECKING:
+    from warpimpact.kernels.variant import Variant
     from warpimpact.scene import Core
 
 Array = NDArray[np.float64]
@@ -61,7 +63,7 @@ class Memory:
     Attributes:
         prepared: what is there.
         device: where.
-        stage: the build of the march that the scene needs.
+        stage, flight: the builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
         surface, sections, target, law, shots, pace: structs of the inputs.
@@ -71,7 +73,8 @@ class Memory:
     def __init__(self, prepared: Prepared, device: Any) -> None:
         variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
         self.prepared, self.device, self.variant = prepared, device, variant
-        self.stage, self.put = march.build(variant), Put(device.alias, variant.real)
+        self.stage, self.flight = built(variant)
+        self.put = Put(device.alias, variant.real)
         self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
         self.surface = surface_of(self.stage.Surface, scene.core, prepared.rings, prepared.azimuths, self.put)
         self.target, self.sections, self.shots = self._target(prepared), self._sections(prepared), self._shots(prepared)
@@ -123,7 +126,7 @@ class Memory:
     def build(self) -> float:
         """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
         begin = time.perf_counter()
-        for kernel in (self.stage.kernel, free_flight.build(self.variant).kernel):
+        for kernel in (self.stage.kernel, self.flight.kernel):
             load(kernel, self.device)
         return time.perf_counter() - begin
 
@@ -249,7 +252,7 @@ class Memory:
     def report(self, contact: Any) -> Returned:
         """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
         scene, count = self.prepared.scene, len(self.prepared.shots)
-        flight, standoffs = free_flight.build(self.variant), np.array(scene.record.standoffs, dtype=np.float64)
+        flight, standoffs = self.flight, np.array(scene.record.standoffs, dtype=np.float64)
         report = self.empty(flight.Report, (count,), (count, len(standoffs)))
         load(flight.kernel, self.device)
         ahead = scene.record.ahead(scene.core)
@@ -257,6 +260,15 @@ class Memory:
         wp.launch(flight.kernel, count, inputs=inputs, outputs=[report], device=self.device)
         status = contact.status.numpy().astype(np.int8)
         return Returned(status, contact, report, self.bending.numpy(), self.passage, self.free)
+
+
+_BUILDING = threading.Lock()
+
+
+def built(variant: Variant) -> tuple[Any, Any]:
+    """The builds of the march and of the free flight for a variant: one each, whichever threads ask for it."""
+    with _BUILDING:
+        return march.build(variant), free_flight.build(variant)
 
 
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
