@@ -172,11 +172,17 @@ def _remove(folder: Path) -> None:
 
 def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
     """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
-    estimate."""
+    estimate.
+
+    Raises:
+        MemoryError: there is no memory for one slot.
+    """
     while True:
         try:
             return slots, allocate(slots)
         except (RuntimeError, MemoryError) as error:
-            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
+            if not (isinstance(error, MemoryError) or "allocate" in str(error)):
                 raise
+            if slots == 1:
+                raise MemoryError(str(error)) from error
         slots //= 2

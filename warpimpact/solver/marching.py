@@ -31,6 +31,8 @@ SHARES = 3
 """Launches per thread into which the shots that are left would be divided at least."""
 CPU_LAUNCH = 0.25
 """Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
+FEWEST_CELLS = 16
+"""Along a side of the plate's window, which would hold no core if it were smaller still."""
 MAX_DOUBLINGS = 6
 """Largest number of times that the windows are doubled for the shots that left theirs."""
 
@@ -78,10 +80,16 @@ class March:
             self.memory = Memory(simple, self.memory.device)
 
     def _window_cells(self) -> Cells:
-        """Cells of a first window, or what memory allows."""
-        cells = (self.memory.prepared.cells,) * 2
+        """Cells of a first window, or what memory allows.
+
+        Raises:
+            MemoryError: windows do not fit in which a core is at all.
+        """
+        cells = first = (self.memory.prepared.cells,) * 2
         while not self._fits(cells):  # a shot that leaves a smaller window ends as LEFT_WINDOW
             cells = cells[0] // 2, cells[1] // 2
+            if min(cells) < FEWEST_CELLS:
+                raise MemoryError(self.memory.too_large(first))
         return cells
 
     def _fits(self, cells: Cells) -> bool:
@@ -122,22 +130,21 @@ class March:
         # thread is to wait long for another.
         most, begun, done = 1, 0, 0
         waiting: set[Future[tuple[int, float]]] = set()
-        with ThreadPoolExecutor(len(slots)) as pool:
-            try:
-                while done < total:
-                    while begun < total and len(waiting) < 2 * len(slots):
-                        share = max(1, (total - begun) // (SHARES * len(slots)))
-                        count = min(chunk_of(min(most, share), self.at_a_plate), total - begun)
-                        waiting.add(pool.submit(work, begun, count))
-                        begun += count
-                    ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                    for shots, seconds in (future.result() for future in ended):
-                        done += shots
-                        most = min(CPU_CHUNK, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
-                    progress(done)
-            finally:
-                for future in waiting:
-                    future.cancel()
+        pool = ThreadPoolExecutor(len(slots))
+        try:
+            while done < total:
+                while begun < total and len(waiting) < 2 * len(slots):
+                    share = max(1, (total - begun) // (SHARES * len(slots)))
+                    count = min(chunk_of(min(most, share), self.at_a_plate), total - begun)
+                    waiting.add(pool.submit(work, begun, count))
+                    begun += count
+                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for shots, seconds in (future.result() for future in ended):
+                    done += shots
+                    most = min(CPU_CHUNK, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
+                progress(done)
+        finally:  # whoever interrupts does not wait for a shot that takes a minute
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _after(finished: int, progress: Progress1) -> Progress1:

@@ -195,19 +195,45 @@ class Memory:
 
     def slots(self, cells: Cells, threads: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
+        count, nodes = self.at_a_plate, max(sum(self.nodes(cells)), self._pierced(cells))
+        wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
+        return min(wanted, int(MEMORY_SHARE * self._free / self._slot(cells)), (2**31 - 1) // (count * max(nodes, 1)))
+
+    def too_large(self, cells: Cells) -> str:
+        """Why there is no slot, if the plate's window has so many cells."""
+        windows = [
+            f"{place}: {y} × {z} nodes" + (f" in {grid.planes.number} planes" if grid.planes.number > 1 else "")
+            for (place, _), grid, (y, z) in zip(
+                self.prepared.scene.target.named, self.prepared.grids, self.windows(cells), strict=True
+            )
+        ]
+        return (
+            f"a shot needs {self._slot(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its way "
+            f"through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 "
+            "nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
+        )
+
+    @property
+    def _free(self) -> int:
+        """Bytes."""
+        return free_memory() if self.device.is_cpu else int(self.device.free_memory)
+
+    def _pierced(self, cells: Cells) -> int:
+        """Nodes of a slot in the channels of earlier hits."""
+        return sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
+
+    def _slot(self, cells: Cells) -> int:
+        """Bytes of a slot."""
         count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        earlier, pierced = 0, sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
+        earlier = 0
         if self.variant.burst:
             each = count * layers * wp.types.type_size_in_bytes(self.stage.Box) + count * layers * 18
             sections = sum(earlier_hits.planes(self.prepared)) * wp.types.type_size_in_bytes(self.stage.Section)
-            earlier = (count * nodes + (1 + count) * pierced) * size + each + sections
+            earlier = (count * nodes + (1 + count) * self._pierced(cells)) * size + each + sections
         patches = self._patches * (8 * size + 3 * 4)
-        slot = len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring
-        free = free_memory() if self.device.is_cpu else self.device.free_memory
-        wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
-        return min(wanted, int(MEMORY_SHARE * free / slot), (2**31 - 1) // (count * max(nodes, pierced)))
+        return int(len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring)
 
     def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
