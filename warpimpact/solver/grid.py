@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.solver.device import free_memory
+from warpimpact.solver.itself import Itself
 from warpimpact.solver.materials import ROUNDING
 
 if TYPE_CHECKING:
@@ -198,26 +199,13 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     Raises:
         MemoryError: the tile does not fit; the message is for the user.
     """
-    return _tile(_Itself(plate.pattern), spacing, sharp)
-
-
-@dataclass(frozen=True, eq=False)
-class _Itself:
-    """A pattern that equals itself only, because the file of a mask may have changed."""
-
-    pattern: Pattern
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Itself) and self.pattern is other.pattern
-
-    def __hash__(self) -> int:
-        return id(self.pattern)
+    return _tile(Itself(plate.pattern), spacing, sharp)
 
 
 @lru_cache(maxsize=16)
-def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
+def _tile(itself: Itself[Pattern], spacing: float, sharp: bool) -> Tile:
     """The tile of a pattern, kept for later shots at the same plate."""
-    pattern = itself.pattern
+    pattern = itself.value
     period_y, period_z = pattern.period
     # An even number, so that a row staggered by half a period sees the same cells.
     step = 1 if sharp else 2
@@ -234,7 +222,8 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
     if not sharp:  # no running sum: its rounding would leave material in the middle of a hole
         for axis in range(2):
             beside = sum(np.roll(material, k, axis) + np.roll(material, -k, axis) for k in range(1, BLUR // 2 + 1))
-            material = (1.0 / BLUR) * material + (1.0 / BLUR) * beside
+            material *= 1.0 / BLUR
+            material += (1.0 / BLUR) * beside
     return Tile(material, dy, dz)
 
 
@@ -246,11 +235,11 @@ def _fractions(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, fl
     blocks = [-(-count // BLOCK) for count in counts]
     first_row, first_column = (BLOCK * at.reshape(-1) for at in np.indices(blocks))
     solid, row, column = _crossed(pattern, first_row, first_column, BLOCK, sides)
-    whole = np.broadcast_to(solid.reshape(blocks[0], 1, blocks[1], 1), (blocks[0], BLOCK, blocks[1], BLOCK))
-    material = whole.astype(np.float64).reshape(blocks[0] * BLOCK, blocks[1] * BLOCK)
+    material = np.empty((blocks[0] * BLOCK, blocks[1] * BLOCK))
+    material.reshape(blocks[0], BLOCK, blocks[1], BLOCK)[:] = solid.reshape(blocks[0], 1, blocks[1], 1)
     for first in range(0, len(row), CROSSED):
         _refine(material, pattern, row[first : first + CROSSED], column[first : first + CROSSED], sides, samples)
-    return material[: counts[0], : counts[1]].copy()
+    return np.ascontiguousarray(material[: counts[0], : counts[1]])
 
 
 def _refine(
@@ -269,8 +258,8 @@ def _refine(
     points = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
     for first in range(0, len(row), CROSSED):
         some = row[first : first + CROSSED], column[first : first + CROSSED]
-        y, z = ((at[:, None, None] + 0.5) * side for at, side in zip(some, sides, strict=True))
-        material[some] = 1.0 - pattern.is_hole(y + points[:, None] * sides[0], z + points * sides[1]).mean(axis=(1, 2))
+        y, z = (np.asarray((at + 0.5) * side) for at, side in zip(some, sides, strict=True))
+        material[some] = 1.0 - pattern.hole_share(y, z, points * sides[0], points * sides[1])
 
 
 def _crossed(
@@ -279,8 +268,8 @@ def _crossed(
     """Whether the middles of blocks of size × size cells are material; rows and columns of the blocks that an edge of a
     hole may cross."""
     y, z = (np.asarray((at + 0.5 * size) * side) for at, side in zip((row, column), sides, strict=True))
-    edge = pattern.has_edge(y, z, 0.501 * size * math.hypot(*sides))
-    return ~pattern.is_hole(y, z), row[edge], column[edge]
+    hole, edge = pattern.looked_at(y, z, 0.501 * size * math.hypot(*sides))
+    return ~hole, row[edge], column[edge]
 
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
@@ -295,8 +284,11 @@ def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
     behind = np.minimum.accumulate(np.where(walls, number, math.inf)[:, ::-1], axis=1)[:, ::-1]
     along = np.minimum(number - before, behind - number)[:, columns : 2 * columns] * widths[1]
     nearest = np.full((rows, columns), math.inf)
-    for shift in range(-(rows // 2), rows // 2 + 1):
-        nearest = np.minimum(nearest, np.square(shift * widths[0]) + np.square(np.roll(along, shift, axis=0)))
+    square = np.square(along)
+    for shift in sorted(range(-(rows // 2), rows // 2 + 1), key=abs):
+        if (beyond := np.square(shift * widths[0])) >= nearest.max():
+            break
+        nearest = np.minimum(nearest, beyond + np.roll(square, shift, axis=0))
     return np.asarray(np.sqrt(nearest))
 
 

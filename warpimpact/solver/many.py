@@ -57,14 +57,15 @@ def simulate_many(
         own = replace(worker, threads=-(-threads // (len(scenes) - number)), cancel=stop)
         return computed(prepare(*scenes[number], numerics), own, told)
 
-    with ThreadPoolExecutor(threads) as pool:
+    pool = ThreadPoolExecutor(threads)
+    try:
         futures = [pool.submit(outcomes, number) for number in range(len(scenes))]
-        try:
-            wait(futures, return_when=FIRST_EXCEPTION)
-        finally:  # after an error or an interrupt the others are worth nothing
-            if not all(future.done() for future in futures):
-                stop.cancel()
-    errors = [error for future in futures if (error := future.exception()) is not None]
+        wait(futures, return_when=FIRST_EXCEPTION)
+    finally:  # after an error or an interrupt the others are worth nothing, and nobody waits for them
+        stop.cancel()
+        pool.shutdown(wait=False, cancel_futures=True)
+    ended = [future for future in futures if future.done() and not future.cancelled()]
+    errors = [error for future in ended if (error := future.exception()) is not None]
     for error in sorted(errors, key=lambda error: isinstance(error, Cancelled)):
         raise error
     return [future.result() for future in futures]

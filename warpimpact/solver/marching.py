@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
@@ -130,7 +131,8 @@ class March:
         # thread is to wait long for another.
         most, begun, done = 1, 0, 0
         waiting: set[Future[tuple[int, float]]] = set()
-        pool = ThreadPoolExecutor(len(slots))
+        alone = len(slots) == 1 and threading.current_thread() is not threading.main_thread()  # which is interrupted
+        pool = _Here() if alone else ThreadPoolExecutor(len(slots))
         try:
             while done < total:
                 while begun < total and len(waiting) < 2 * len(slots):
@@ -145,6 +147,15 @@ class March:
                 progress(done)
         finally:  # whoever interrupts does not wait for a shot that takes a minute
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+class _Here(Executor):
+    """Calls on the thread that submits them."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        future = Future[Any]()
+        future.set_result(function(*arguments, **named))
+        return future
 
 
 def _after(finished: int, progress: Progress1) -> Progress1:

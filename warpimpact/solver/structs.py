@@ -10,6 +10,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.solver.itself import Itself
+
 if TYPE_CHECKING:
     from warpimpact.scene import Core
     from warpimpact.solver.grid import Grid, Tile
@@ -34,14 +36,21 @@ class Put:
 
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
     """The Surface (kernels/core_surface.py) of a core in rings of patches."""
+    return _surface(struct, Itself(core), rings, azimuths.tobytes(), put)
+
+
+@lru_cache(maxsize=64)
+def _surface(struct: Any, itself: Itself[Core], rings: Rings, azimuth: bytes, put: Put) -> Any:
+    """No kernel changes it, so it is kept for later shots with the same core."""
+    core, azimuths = itself.value, np.frombuffer(azimuth)
     surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
-    azimuth = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
+    azimuth_of = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
     values = {name: getattr(rings, name) for name in _OF_A_RING} | {
         "area": area,
         "normal_axial": rings.area_axial / area,
         "normal_radial": rings.area_radial / area,
-        "cosine": np.cos(azimuth),
-        "sine": np.sin(azimuth),
+        "cosine": np.cos(azimuth_of),
+        "sine": np.sin(azimuth_of),
     }
     values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
     values["profile"] = core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1))
