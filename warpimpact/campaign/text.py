@@ -45,7 +45,8 @@ def toml_of(data: Mapping[str, Any]) -> str:
     """The tables of a campaign as the text of a TOML file, from which `parsed` reads the same."""
     import tomli_w  # which a run does not need
 
-    return tomli_w.dumps(data, indent=2)
+    text: str = tomli_w.dumps(data, indent=2)
+    return text
 
 
 def _from_json(text: str) -> Any:

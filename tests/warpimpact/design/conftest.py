@@ -6,10 +6,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-import uvicorn
 
 from warpimpact.design.designs import Shelf, shelf_of
-from warpimpact.design.server import application, bound
 
 TOKEN = "a-token"
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -17,6 +15,9 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 @contextmanager
 def served(shelf: Shelf) -> Iterator[str]:
+    uvicorn = pytest.importorskip("uvicorn", reason="needs the extra design")
+    from warpimpact.design.server import application, bound
+
     with bound(0) as own:
         own.listen()
         port = own.getsockname()[1]
