@@ -7,7 +7,8 @@ import hmac
 import secrets
 import socket
 import warnings
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, MutableMapping
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping, MutableMapping
+from contextlib import aclosing
 from functools import cache, partial
 from importlib.resources import files
 from typing import Any
@@ -154,22 +155,33 @@ class _Pages:
 
         async def lines() -> AsyncIterator[str]:
             try:
-                yield as_json(await run_in_threadpool(self._answers.plate, design)) + "\n"
-                for line in self._lines(design, others, level):
-                    yield as_json(await line) + "\n"
+                async with aclosing(self._lines(design, others, level)) as found:
+                    async for line in found:
+                        yield as_json(line) + "\n"
             except _MISTAKES as error:
                 yield _refused(error)
 
         return StreamingResponse(lines(), media_type=_LINES)
 
-    def _lines(self, design: Design, others: list[tuple[str, Design]], level: int) -> Any:
-        """What is to be awaited for each stage."""
+    async def _lines(self, design: Design, others: list[tuple[str, Design]], level: int) -> AsyncGenerator[Any]:
+        """The plate, and maps and numbers of each stage. The first map is computed while the plate is drawn."""
         total = design.campaign.hits.count or 0
         every = [{stage.name: stage.design for stage in stages(self._shelf, one, level)} for _, one in others]
+        plate = True
         for name, own in stages(self._shelf, design, level):
             at = [(label, one.get(name, one["full"])) for (label, _), one in zip(others, every, strict=True)]
             designs = named(own, at)
-            yield self._desk.do(_STAGES[name], partial(self._answers.stage, name, designs, total))
+            maps = asyncio.ensure_future(
+                self._desk.do(_STAGES[name], partial(self._answers.maps, name, designs, total))
+            )
+            try:
+                if plate:
+                    yield await run_in_threadpool(self._answers.plate, design)
+                    plate = False
+                yield await maps
+            finally:
+                maps.cancel()
+            yield await self._desk.do(_STAGES[name], partial(self._answers.numbers, designs))
 
     async def change(self, request: Request) -> Response:
         async def answer(asked: Tables) -> Any:
