@@ -194,7 +194,9 @@ class Memory:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
         count, nodes = self.at_a_plate, max(sum(self.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
-        return min(wanted, int(MEMORY_SHARE * self._free / self._slot(cells)), (2**31 - 1) // (count * max(nodes, 1)))
+        return min(
+            wanted, int(MEMORY_SHARE * self._free / self.slot_bytes(cells)), (2**31 - 1) // (count * max(nodes, 1))
+        )
 
     def too_large(self, cells: Cells) -> str:
         """Why there is no slot, if the plate's window has so many cells."""
@@ -205,7 +207,7 @@ class Memory:
             )
         ]
         return (
-            f"a shot needs {self._slot(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its way "
+            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its way "
             f"through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 "
             "nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
         )
@@ -219,8 +221,8 @@ class Memory:
         """Nodes of a slot in the channels of earlier hits."""
         return sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
 
-    def _slot(self, cells: Cells) -> int:
-        """Bytes of a slot."""
+    def slot_bytes(self, cells: Cells) -> int:
+        """Memory of a slot of scratch [bytes]."""
         count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
