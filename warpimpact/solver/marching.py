@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.solver.device import cores, halving, load
-from warpimpact.solver.memory import Cells, Memory
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
 
 Array = NDArray[np.float64]

@@ -20,9 +20,10 @@ from warpimpact.solver.earlier import CLOSED, channel_nodes, planes_of
 from warpimpact.solver.grid import AT_A_TIME, WHOLE
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import March, apart
-from warpimpact.solver.memory import Cells, Memory
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.simulate import outcomes_of
+from warpimpact.solver.windows import Cells
 
 if TYPE_CHECKING:
     from warpimpact.scene import Plate
