@@ -177,7 +177,7 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
 def test_any_thread_and_chunk(behind: Any, threads: int, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
     shots = near_bursts()
     expected = simulate(paper_plate(), shots, behind)
-    monkeypatch.setattr(marching, "cores", lambda: threads)
+    monkeypatch.setattr(marching, "launching", lambda _: threads)
     monkeypatch.setattr(marching, "CPU_CHUNK", chunk)
     assert_identical(simulate(paper_plate(), shots, behind), expected)
 

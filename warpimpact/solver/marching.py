@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
@@ -16,7 +17,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.solver.device import cores, halving, load
+from warpimpact.solver.device import halving, launching, load
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
@@ -48,7 +49,7 @@ class March:
 
     def __init__(self, memory: Memory, threads: int | None = None) -> None:
         self.memory, self.at_a_plate = memory, memory.at_a_plate
-        self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
+        self.threads = launching(threads)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:
@@ -131,7 +132,8 @@ class March:
         # thread is to wait long for another.
         most, begun, done = 1, 0, 0
         waiting: set[Future[tuple[int, float]]] = set()
-        pool = ThreadPoolExecutor(len(slots))
+        alone = len(slots) == 1 and threading.current_thread() is not threading.main_thread()  # which is interrupted
+        pool = _Here() if alone else ThreadPoolExecutor(len(slots))
         try:
             while done < total:
                 while begun < total and len(waiting) < 2 * len(slots):
@@ -155,6 +157,15 @@ def apart(function: Callable[..., int], *arguments: Any) -> int:
         return pool.submit(function, *arguments).result()
     finally:
         pool.shutdown(wait=False)
+
+
+class _Here(Executor):
+    """Calls on the thread that submits them."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        future = Future[Any]()
+        future.set_result(function(*arguments, **named))
+        return future
 
 
 def _after(finished: int, progress: Progress1) -> Progress1:

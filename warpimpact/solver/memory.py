@@ -4,9 +4,9 @@ computed at a time, and what the kernels fill."""
 from __future__ import annotations
 
 import math
+import threading
 import time
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,34 +19,20 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import free_memory, load
-from warpimpact.solver.grid import Grid, Tile
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.rings import Rings
+from warpimpact.solver.structs import Put, plate_of, surface_of
 from warpimpact.solver.windows import Cells, windows_behind
 
 if TYPE_CHECKING:
-    from warpimpact.scene import Core
+    from warpimpact.kernels.variant import Variant
 
 Array = NDArray[np.float64]
 
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
-PROFILE = 128
-"""Parts of a core's length, between which its radius is linear, as its channel has it."""
 CUDA_CHUNK = 65536
 MEMORY_SHARE = 0.5
 """Share of the free memory that scratch may take."""
-
-
-@dataclass(frozen=True)
-class Put:
-    """Puts values on the named device, by default in the floating-point type `real` of the kernels."""
-
-    device: str
-    real: Any
-
-    def __call__(self, values: NDArray[Any], dtype: Any = None) -> Any:
-        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.real, device=self.device)
 
 
 class Memory:
@@ -55,7 +41,7 @@ class Memory:
     Attributes:
         prepared: what is there.
         device: where.
-        stage: the build of the march that the scene needs.
+        stage, flight: the builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
         surface, sections, target, law, shots, pace: structs of the inputs.
@@ -65,7 +51,8 @@ class Memory:
     def __init__(self, prepared: Prepared, device: Any) -> None:
         variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
         self.prepared, self.device, self.variant = prepared, device, variant
-        self.stage, self.put = march.build(variant), Put(device.alias, variant.real)
+        self.stage, self.flight = built(variant)
+        self.put = Put(device.alias, variant.real)
         self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
         self.surface = surface_of(self.stage.Surface, scene.core, prepared.rings, prepared.azimuths, self.put)
         self.target, self.sections, self.shots = self._target(prepared), self._sections(prepared), self._shots(prepared)
@@ -117,7 +104,7 @@ class Memory:
     def build(self) -> float:
         """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
         begin = time.perf_counter()
-        for kernel in (self.stage.kernel, free_flight.build(self.variant).kernel):
+        for kernel in (self.stage.kernel, self.flight.kernel):
             load(kernel, self.device)
         return time.perf_counter() - begin
 
@@ -271,7 +258,7 @@ class Memory:
     def report(self, contact: Any) -> Returned:
         """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
         scene, count = self.prepared.scene, len(self.prepared.shots)
-        flight, standoffs = free_flight.build(self.variant), np.array(scene.record.standoffs, dtype=np.float64)
+        flight, standoffs = self.flight, np.array(scene.record.standoffs, dtype=np.float64)
         report = self.empty(flight.Report, (count,), (count, len(standoffs)))
         load(flight.kernel, self.device)
         ahead = scene.record.ahead(scene.core)
@@ -281,55 +268,10 @@ class Memory:
         return Returned(status, contact, report, self.bending.numpy(), self.passage, self.free)
 
 
-def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
-    """The Surface (kernels/core_surface.py) of a core in rings of patches."""
-    surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
-    azimuth = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
-    values = {name: getattr(rings, name) for name in _OF_A_RING} | {
-        "area": area,
-        "normal_axial": rings.area_axial / area,
-        "normal_radial": rings.area_radial / area,
-        "cosine": np.cos(azimuth),
-        "sine": np.sin(azimuth),
-    }
-    values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
-    values["profile"] = core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1))
-    for name, array in values.items():
-        setattr(surface, name, put(array))
-    surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
-    surface.rings, surface.around = len(area), around
-    surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
-    return surface
+_BUILDING = threading.Lock()
 
 
-_OF_A_PATCH = (
-    "station",
-    "radius",
-    "area",
-    "normal_axial",
-    "normal_radial",
-    "half_axial",
-    "half_radial",
-    "turn_axial",
-    "turn_radial",
-)
-_OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
-
-
-def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
-    """The Plate (kernels/plate_grid.py) of a grid."""
-    plate = struct()
-    plate.tile, plate.clear = _on_device(grid.tile, put)
-    plate.tile_y, plate.tile_z = grid.tile.material.shape
-    plate.period_y, plate.period_z = grid.period
-    plate.half_y, plate.half_z = grid.half_size
-    plate.spacing = grid.spacing
-    plate.taps, plate.reach = put(grid.taps), grid.reach
-    plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
-    return plate
-
-
-@lru_cache(maxsize=16)
-def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
-    """Material and clearance of a tile. No kernel changes them, so they are kept for later shots at the same plate."""
-    return put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))
+def built(variant: Variant) -> tuple[Any, Any]:
+    """The builds of the march and of the free flight for a variant: one each, whichever threads ask for it."""
+    with _BUILDING:
+        return march.build(variant), free_flight.build(variant)

@@ -17,7 +17,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
 from warpimpact.solver.earlier import CLOSED, channel_nodes, planes_of
-from warpimpact.solver.grid import AT_A_TIME, WHOLE
+from warpimpact.solver.grid import WHOLE
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import March, apart
 from warpimpact.solver.memory import Memory
@@ -39,6 +39,8 @@ THROUGH = 16
 """Depths at which the mean through a layer is taken."""
 
 
+AT_A_TIME = 2**13
+"""Nodes of a window that are computed together."""
 SAMPLES, MOST_POINTS = 16, 2**24
 """Points along the side of a node with an edge, and points of all such nodes: a window that is wide and full of small
 holes has fewer along a side, as it would take minutes."""
