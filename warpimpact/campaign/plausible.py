@@ -24,15 +24,10 @@ _OF_A_PLATE = (
 
 def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
     """Warn (`Implausible`) of every value of a campaign that is possible, but far from what such campaigns have."""
-    for sentence in doubted(scene, impact, hits):
-        warnings.warn(sentence, Implausible, stacklevel=2)
-
-
-def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
-    """The sentences of `warn_of`."""
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
-    yield from implausible(_values(scene, impact, hits), usual)
+    for sentence in implausible(_values(scene, impact, hits), usual):
+        warnings.warn(sentence, Implausible, stacklevel=2)
 
 
 def _values(scene: Scene, impact: Impact, hits: Hits) -> Iterator[tuple[str, str, float]]:
