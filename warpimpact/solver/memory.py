@@ -21,21 +21,15 @@ from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, plate_of, surface_of
+from warpimpact.solver.windows import Cells, windows_behind
 
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
 
 Array = NDArray[np.float64]
-Cells = tuple[int, int]
-"""Of a window, along y and z."""
 
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
-
-
-DEEP = 0.6
-"""Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
-the core's surface from its centre of mass: the core arrives turned."""
 CUDA_CHUNK = 65536
 MEMORY_SHARE = 0.5
 """Share of the free memory that scratch may take."""
@@ -134,17 +128,15 @@ class Memory:
         return self.empty(self.stage.Outcomes, (len(self.prepared.shots),))
 
     def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field. A
-        layer that earlier hits pierce keeps their channels."""
-        materials, grids, scene = self.prepared.materials, self.prepared.grids, self.prepared.scene
-        steepest, own = math.tan(float(self.prepared.shots.obliquity.max())), [cells]
-        for material, grid in zip(materials[1:], grids[1:], strict=True):
-            thicker = max(0.0, float(material.together.max() - materials[0].together.max()))
-            half = 0.5 * cells[0] * grids[0].spacing + DEEP * scene.core.bounding_radius + thicker * steepest
-            count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3)
-            count = count if material.weakens or self.variant.burst else 0
-            own.append((count, count))
-        return [own[material.laminate] for material in materials]
+        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        counts = self._behind(np.array(cells[:1])).max(axis=1)
+        return [(int(count), int(count)) for count in counts]
+
+    def _behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
+        """`windows_behind` of what was prepared."""
+        prepared = self.prepared
+        core, shots, materials, grids = prepared.scene.core, prepared.shots, prepared.materials, prepared.grids
+        return windows_behind(core, shots, materials, grids, plate, burst=self.variant.burst)
 
     def nodes(self, cells: Cells) -> list[int]:
         """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""
@@ -181,7 +173,9 @@ class Memory:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
         count, nodes = self.at_a_plate, max(sum(self.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
-        return min(wanted, int(MEMORY_SHARE * self._free / self._slot(cells)), (2**31 - 1) // (count * max(nodes, 1)))
+        return min(
+            wanted, int(MEMORY_SHARE * self._free / self.slot_bytes(cells)), (2**31 - 1) // (count * max(nodes, 1))
+        )
 
     def too_large(self, cells: Cells) -> str:
         """Why there is no slot, if the plate's window has so many cells."""
@@ -192,9 +186,9 @@ class Memory:
             )
         ]
         return (
-            f"a shot needs {self._slot(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its way "
-            f"through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 "
-            "nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
+            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its "
+            f"way through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
+            "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
         )
 
     @property
@@ -206,8 +200,8 @@ class Memory:
         """Nodes of a slot in the channels of earlier hits."""
         return sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
 
-    def _slot(self, cells: Cells) -> int:
-        """Bytes of a slot."""
+    def slot_bytes(self, cells: Cells) -> int:
+        """Memory of a slot of scratch [bytes]."""
         count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
@@ -242,7 +236,9 @@ class Memory:
         if self.variant.burst:
             windows = self.windows(cells)
             earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
-        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,))
+        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
+        if self.variant.layered:
+            stack.own_cells = put(self._behind(self.prepared.first_cells), wp.int32)
         return fields, touches, stack, earlier
 
     def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:
