@@ -17,6 +17,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .accuracy import add_study, add_validate
 from .catalogue import add_catalogue
 from .compare import add_compare
+from .design import add_design
 from .export import add_export, add_report
 from .firing import add_test
 from .identify import add_identify
@@ -42,6 +43,7 @@ _COMMANDS = (
     add_plot,
     add_compare,
     add_plate,
+    add_design,
     add_replay,
     add_export,
     add_report,

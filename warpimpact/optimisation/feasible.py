@@ -101,8 +101,8 @@ def _most(key: str, found: float, most: float | None, what: str, unit: str) -> I
 
 
 def hole_sizes(plate: Plate) -> tuple[float, float]:
-    """Diameter of the largest circle in the narrowest hole, and greatest extent of the widest one [m]; of other patterns
-    than lattices within a thousandth of the extent."""
+    """Diameter of the largest circle in the narrowest hole, and greatest extent of the widest one [m]; within a
+    thousandth of the extent where the pattern is no lattice."""
     if isinstance(plate.pattern, LatticePattern):
         return plate.pattern.hole_size
     import shapely
