@@ -23,6 +23,7 @@ from .firing import add_test
 from .identify import add_identify
 from .limit import add_limit
 from .mistakes import bug_report, implausible_told, message_of
+from .optimise import add_optimise
 from .plain import Plain, say
 from .progress import verbosity
 from .replay import add_replay
@@ -49,6 +50,7 @@ _COMMANDS = (
     add_study,
     add_validate,
     add_identify,
+    add_optimise,
     add_test,
     add_schema,
     add_completion,

@@ -87,10 +87,10 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     """
     images, numerics, drawn = len(campaign.symmetries), numerics_of(campaign, task.found), campaign.drawn
     progress = of_images(progress, images)
-    outcomes, elapsed = _outcomes(drawn, campaign.scene, task.shots[::images], numerics, worker, progress)
+    outcomes, elapsed = outcomes_in(drawn, campaign.scene, task.shots[::images], numerics, worker, progress)
     solid = None
     if task.solid is not None:
-        solid = solid_columns(_outcomes(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
+        solid = solid_columns(outcomes_in(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
     return described(campaign, task.shots, outcomes, numerics, attributes, solid)
@@ -161,7 +161,7 @@ def pilot_shots(campaign: Campaign, most: int) -> Shots:
     return Shots.joined([sampler.shots(int(place) * group, group)[::images] for place in places])
 
 
-def _outcomes(
+def outcomes_in(
     drawn: Posterior | None,
     scene: Scene,
     shots: Shots,

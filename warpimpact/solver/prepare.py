@@ -3,6 +3,7 @@ made, for those who build, march or describe."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,10 +12,11 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
-from warpimpact.solver.grid import Grid, block_window, first_window, grids_of
+from warpimpact.solver.grid import Grid, grids_of
 from warpimpact.solver.materials import Materials, materials_of
-from warpimpact.solver.resolution import Resolution, conditions_of, resolve
+from warpimpact.solver.resolution import Resolution, conditions_of, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
+from warpimpact.solver.windows import Cells, block_window, first_windows, windows_behind
 
 if TYPE_CHECKING:
     from warpimpact.scene import Numerics, Scene, Shots
@@ -36,7 +38,9 @@ class Prepared:
         grids: the plate, and the layers behind it.
         materials: of the plate, and of the layers behind it.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
-        cells: nodes of a first window, in each direction.
+        steps: of a passage that nothing hinders, at most.
+        first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
+            [shots].
         rows: of the trace of each shot; 0 for none.
     """
 
@@ -50,13 +54,37 @@ class Prepared:
     grids: list[Grid]
     materials: list[Materials]
     conditions: dict[str, Array]
-    cells: int
+    steps: int
+    first_cells: NDArray[np.int64]
     rows: int = 0
 
     @property
     def grid(self) -> Grid:
         """The plate."""
         return self.grids[0]
+
+    @property
+    def cells(self) -> int:
+        """Nodes of a first window of the plate, in each direction, that serves all shots."""
+        return int(self.first_cells.max())
+
+    def windows(self, cells: Cells) -> list[Cells]:
+        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        counts = self.windows_behind(np.array(cells[:1])).max(axis=1)
+        return [(int(count), int(count)) for count in counts]
+
+    def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
+        """`windows.windows_behind` of what was prepared."""
+        core, burst = self.scene.core, self.variant.burst
+        return windows_behind(core, self.shots, self.materials, self.grids, plate, burst=burst)
+
+    def nodes(self, cells: Cells) -> list[int]:
+        """Nodes that a shot has in the windows of all layers, likewise; those of a laminate are those of its first
+        layer."""
+        return [
+            grid.planes.number * math.prod(own) if material.laminate == k else 0
+            for k, (material, grid, own) in enumerate(zip(self.materials, self.grids, self.windows(cells), strict=True))
+        ]
 
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
@@ -68,6 +96,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
             several shots at one plate or layers; or the block layout does not compute the scene.
+        TooManySteps: a shot would take months.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
     core, target, record, interaction = scene.core, scene.target, scene.record, scene.interaction
@@ -77,6 +106,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     weakening = [one.weakens for one in materials]
     resolution = resolve(scene, numerics, weakening)
     conditions = conditions_of(core, target, shots, materials, resolution)
+    steps = int(steps_of(shots, resolution, conditions).max())
     deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
     exclusions.check_together(
@@ -94,7 +124,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.
     deep |= not simple and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
     grids = grids_of(target.layers, materials, resolution, deep=deep)
-    cells = first_window(core, shots, materials[0], grids[0], nodal=resolution.nodal)
+    first_cells = first_windows(core, shots, materials[0], grids[0], nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,
         nodal=resolution.nodal,
@@ -106,7 +136,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         layered=len(plates) > 1,
         deep=deep,
         burst=burst,  # also of one shot, as a replay of the first one of several is
-        window=block_window(cells) if resolution.block else 0,
+        window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
     axial, around = resolution.patches_axial, resolution.patches_around
     rings = rings_of(core, axial, around, resolution.patch_width, discs=not resolution.nodal)
@@ -121,5 +151,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         grids=grids,
         materials=materials,
         conditions=conditions,
-        cells=cells,
+        steps=steps,
+        first_cells=first_cells,
     )
