@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.analysis import base
-from warpimpact.analysis.numbers import interval_text, intervals_text
+from warpimpact.analysis.numbers import Ends, interval_text, intervals_text
 from warpimpact.analysis.survival import by_draws, draws_note, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import is_choice, status_codes
-from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing
+from warpimpact.results.dataset import finer_pair, is_choice, status_codes
+from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, numerics_of
 from warpimpact.scene.display import STORED
-from warpimpact.solver.pilot_text import accuracy_text, errors_text, hits_text
+from warpimpact.solver.pilot_text import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
+from warpimpact.statistics.shifts import shift_of_mean
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -33,7 +34,8 @@ SLICE = 2**18
 class Spread:
     """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none.
 
-    ``interval`` holds the mean at 95 %, and is NaN if the hits give none.
+    ``interval`` holds the mean at 95 %, and is NaN if the hits give none; ``parameters`` and ``numerics`` are those of
+    the mean's `Estimate`.
     """
 
     count: int
@@ -41,11 +43,18 @@ class Spread:
     standard_deviation: float
     interval: tuple[float, float] = (math.nan, math.nan)
     parameters: tuple[float, float] | None = None
+    numerics: float | None = None
 
     @classmethod
     def of(cls, estimate: Estimate) -> Spread:
         """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
-        return cls(estimate.count, estimate.value, estimate.spread, (estimate.low, estimate.high), estimate.parameters)
+        interval = estimate.low, estimate.high
+        return cls(estimate.count, estimate.value, estimate.spread, interval, estimate.parameters, estimate.numerics)
+
+    def times(self, factor: float) -> Spread:
+        """The same in another unit."""
+        ends = Estimate(self.mean, *self.interval, self.count, self.standard_deviation, self.parameters, self.numerics)
+        return Spread.of(ends.times(factor))
 
 
 @dataclass(frozen=True)
@@ -112,9 +121,13 @@ def summary(dataset: Result) -> Summary:
 def _base_depth(dataset: Result) -> Spread | None:
     if not base.has_base(dataset):
         return None
-    needed = dataset[[name for name in base.NEEDED if name in dataset]]
+    needed = dataset[[name for name in (*base.NEEDED, *v.GROUPS["finer"]) if name in dataset]]
     depths = np.concatenate([base.base_depth(part) for part in slices(needed)])
-    return Spread.of(over_draws(dataset, estimate_of("mean", depths, **dealing(dataset)), depths))
+    estimate, dealt = estimate_of("mean", depths, **dealing(dataset)), dealing(dataset)
+    if (pair := finer_pair(needed)) is not None:
+        levels = base.base_depth(pair[0]), base.base_depth(pair[1])
+        estimate = replace(estimate, numerics=shift_of_mean(*levels, images=dealt["images"]))
+    return Spread.of(over_draws(dataset, estimate, depths))
 
 
 def _broken(dataset: Result) -> int | None:
@@ -141,7 +154,8 @@ def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 
             tally.add(part)
             if v.POSTERIOR_DRAW in dataset:
                 values.append(tally.measure.values(part))
-    found = {tally.measure: tally.estimate() for tally in tallies}
+    pair = finer_pair(dataset[[name for name in (v.STATUS, *MEASURED, *v.GROUPS["finer"]) if name in dataset]])
+    found = {tally.measure: replace(tally.estimate(), numerics=numerics_of(tally.measure, pair)) for tally in tallies}
     if v.POSTERIOR_DRAW not in dataset:
         return found
     return {
@@ -193,27 +207,25 @@ def summary_text(dataset: Result) -> str:
     rows = [_count_row(meaning, count, hits) for meaning, count in result.counts.items() if count]
     if result.broken is not None:
         rows.append(_count_row("broken", result.broken, hits))
-    rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<18}  spread")
-    rows += [
-        _spread_row("residual velocity", result.residual_velocity, "m/s", hits),
-        _spread_row("deflection", result.deflection, "°", hits),
+    means = [
+        ("residual velocity", result.residual_velocity, "m/s"),
+        ("deflection", result.deflection, "°"),
+        *((f"tilt at {standoff * 1e3:g} mm", tilt, "°") for standoff, tilt in result.tilt.items()),
     ]
-    rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°", hits) for standoff, tilt in result.tilt.items()]
     if (depth := result.base_depth) is not None and depth.count:
-        shown = replace(depth, mean=1e3 * depth.mean, standard_deviation=1e3 * depth.standard_deviation)
-        low, high = depth.interval
-        rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm", hits))
-    notes = (numerics_note(dataset, result.residual_velocity), draws_note(dataset))
+        means.append(("depth in the base", depth.times(1e3), "mm"))
+    wide = max(18, *(len(_intervals(spread)) for _, spread, _ in means))
+    rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<{wide}}  spread")
+    rows += [_spread_row(name, spread, unit, hits, wide) for name, spread, unit in means]
+    notes = (numerics_note(dataset), draws_note(dataset))
     return "\n".join([*rows, *stop_lines(dataset), *filter(None, notes)])
 
 
-def numerics_note(dataset: Result, velocity: Spread) -> str:
-    """That an interval is narrower than what the numerics may be off by; empty where it is not."""
-    error, (low, high) = dataset.attrs.get(attr.RESIDUAL_VELOCITY_ERROR, 0.0), velocity.interval
-    if not 0.5 * (high - low) < error:
+def numerics_note(dataset: Result) -> str:
+    """What tells how far the numerics may shift the numbers of a result; empty where nothing does."""
+    if v.FINER_HIT not in dataset:
         return ""
-    hits = hits_text(json.loads(dataset.attrs[attr.ACCURACY])["share"])
-    return f"Intervals are by the hits alone; the numerics may be off by more: {error:.2g} m/s for {hits}."
+    return f"numerics ±: from {dataset.sizes['finer']} of the hits, which were computed at a finer level, too."
 
 
 def stop_lines(dataset: Result) -> list[str]:
@@ -242,9 +254,13 @@ def _count_row(meaning: str, count: int, hits: int) -> str:
     return f"{meaning.replace('_', ' '):<20}{count:>8d}   {count / hits:.1%}"
 
 
-def _spread_row(name: str, spread: Spread, unit: str, hits: int) -> str:
+def _spread_row(name: str, spread: Spread, unit: str, hits: int, wide: int) -> str:
     if spread.count == 0:
         return f"{name:<20}{'-':>8}   no core behind the plate"
-    interval = intervals_text(*spread.interval, spread.parameters, "{:.2f}".format)
     some = f"   of {spread.count} hits" if spread.count < hits else ""
-    return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}{some}"
+    interval = f"{_intervals(spread):<{wide}}"
+    return f"{name:<20}{spread.mean:>8.2f}   {interval}  {spread.standard_deviation:.1f} {unit}{some}"
+
+
+def _intervals(spread: Spread) -> str:
+    return intervals_text(Ends(*spread.interval, spread.parameters, spread.numerics), "{:.2f}".format)

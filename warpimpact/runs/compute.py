@@ -16,7 +16,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import solid_columns
+from warpimpact.results.dataset import finer_columns, solid_columns
 from warpimpact.results.table import Table
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
@@ -55,8 +55,7 @@ class HitMap:
         """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
         if campaign.numerics.explicit is not None:
             return None
-        computed = len(campaign.sampler()) // len(campaign.symmetries)
-        pilot = pilot_shots(campaign, pilot_size(campaign.numerics.asked, computed))
+        pilot = pilot_shots(campaign, pilot_most(campaign))
         return pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying)
 
     def found_in(self, result: Result) -> HitErrors | None:
@@ -88,12 +87,23 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     images, numerics, drawn = len(campaign.symmetries), numerics_of(campaign, task.found), campaign.drawn
     progress = of_images(progress, images)
     outcomes, elapsed = _outcomes(drawn, campaign.scene, task.shots[::images], numerics, worker, progress)
-    solid = None
+    beside = _finer(campaign, task.found)
     if task.solid is not None:
-        solid = solid_columns(_outcomes(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
+        beside |= solid_columns(_outcomes(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
-    return described(campaign, task.shots, outcomes, numerics, attributes, solid)
+    return described(campaign, task.shots, outcomes, numerics, attributes, beside)
+
+
+def _finer(campaign: Campaign, found: Found | None) -> dict[str, Any]:
+    """Columns of the hits that a pilot computed at a finer level. The pilot knows the scene of the campaign, not the
+    draws of a posterior."""
+    if not isinstance(found, HitErrors) or found.finer is None or campaign.drawn is not None:
+        return {}
+    group = len(campaign.symmetries) * campaign.at_a_plate
+    groups = len(found.finer) // campaign.at_a_plate
+    numbers = _pilot_places(campaign, pilot_most(campaign))[:groups, None] * group + np.arange(group)
+    return finer_columns(found.finer.unfolded(campaign.symmetries), numbers.reshape(-1))
 
 
 def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
@@ -151,14 +161,24 @@ def pilot_shots(campaign: Campaign, most: int) -> Shots:
     They depend on the campaign alone: the first hits of a Sobol or random sampling, hits at even distances of a grid or
     a list. Bursts are whole, as a later hit meets what the earlier ones left.
     """
-    sampler, images, at_a_plate = campaign.sampler(), len(campaign.symmetries), campaign.at_a_plate
-    group = images * at_a_plate
-    groups = len(sampler) // group
-    count = min(most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS), groups)
+    sampler, images = campaign.sampler(), len(campaign.symmetries)
+    group, places = images * campaign.at_a_plate, _pilot_places(campaign, most)
     if campaign.hits.sampling in ("sobol", "random"):
-        return sampler.shots(0, count * group)[::images]
-    places = spread_places(groups, count)
+        return sampler.shots(0, len(places) * group)[::images]
     return Shots.joined([sampler.shots(int(place) * group, group)[::images] for place in places])
+
+
+def pilot_most(campaign: Campaign) -> int:
+    """Shots of a pilot of a campaign, at most."""
+    return pilot_size(campaign.numerics.asked, len(campaign.sampler()) // len(campaign.symmetries))
+
+
+def _pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
+    """Which groups of images, or bursts with their images, `pilot_shots` takes."""
+    at_a_plate = campaign.at_a_plate
+    groups = len(campaign.sampler()) // (len(campaign.symmetries) * at_a_plate)
+    count = min(most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS), groups)
+    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
 
 
 def _outcomes(

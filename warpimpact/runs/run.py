@@ -135,8 +135,8 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
     for index in there:
         watch.add(index, shards.shard(index))
     watch.resumed = watch.done
-    if there:
-        watch.found = computation.found_in(shards.shard(there[0]))
+    if 0 in there:  # it holds what the pilot found, and its hits at a finer level
+        watch.found = computation.found_in(shards.shard(0))
     else:
 
         def tick() -> None:
@@ -153,7 +153,8 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
                 shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
                 first = shots[: shards.extent] if task.start == 0 else None
                 solid = None if first is None else _solid_shots(campaign, first, computation.most_solid)
-                waiting[team.submit(Task(shots, solid, watch.found))] = task
+                found = watch.found if task.start == 0 or watch.found is None else watch.found.told
+                waiting[team.submit(Task(shots, solid, found))] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
             stop_if_asked()
             for future in finished:

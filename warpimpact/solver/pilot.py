@@ -12,8 +12,8 @@ import logging
 import math
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import dataclass, field, replace
+from typing import Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,11 @@ class Found:
         """Upper estimates of the errors, with units."""
 
     @property
+    def told(self) -> Self:
+        """The same without outcomes of shots."""
+        return self
+
+    @property
     def phrase(self) -> str:
         """The errors, for a line of progress."""
         return f"accuracy {self.errors} for {hits_text(self.share)}{'' if self.kept else ', not as promised'}"
@@ -97,12 +102,18 @@ class HitErrors(Found):
         tilt_error: at the last stand-off [rad].
         depth_error: of the shots that stop in a layer [m]; NaN where none does.
         status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
+        finer: outcomes of the first shots of the pilot at the finer level that it was compared with.
     """
 
     residual_velocity_error: float
     tilt_error: float
     depth_error: float = math.nan
     status_error: float = math.nan
+    finer: Outcomes | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def told(self) -> Self:
+        return replace(self, finer=None)
 
     @property
     def errors(self) -> str:
@@ -221,7 +232,7 @@ def _judged(
     excess = _excess(accuracy, counted, layered)
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in told)
-    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status)
+    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, fine)
     return found, excess, _excess(accuracy, weighed, layered) <= 1.0
 
 
