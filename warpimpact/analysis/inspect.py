@@ -14,6 +14,7 @@ from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
     estimated,
+    levels_note,
     means_of,
     numerics_note,
     promise_text,
@@ -97,7 +98,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
         for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
             if estimate.count:
                 yield _row(measure, estimate)
-    yield from filter(None, (sampling_note(dataset), numerics_note(dataset), draws_note(dataset)))
+    yield from filter(None, (sampling_note(dataset), numerics_note(dataset), levels_note(dataset), draws_note(dataset)))
     yield from stop_lines(dataset)
 
 

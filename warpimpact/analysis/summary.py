@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -84,6 +84,8 @@ def promise_text(dataset: Result) -> str | None:
         fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
+    if attr.LEVEL_FOR in told:
+        return _level_for(told)
     asked = json.loads(told[attr.ACCURACY])
     stated = accuracy_text(asked, layered=attr.STATUS_ERROR in told)
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
@@ -93,6 +95,19 @@ def promise_text(dataset: Result) -> str | None:
     if told[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {found}"
     return f"{name} does not keep its promise ({stated}) at the level that it may use; {found}"
+
+
+def _level_for(told: Mapping[str, Any]) -> str:
+    """What the level of a run with a stop rule was found for."""
+    velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
+    depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
+    errors = f"single hits may err by {errors_text(velocity, tilt, depth, status)}"
+    which = "found" if told[attr.PROMISE_KEPT] else "not exact enough"
+    return f"{_level(told)} {which} for {told[attr.LEVEL_FOR]}; {errors}"
+
+
+def _level(told: Mapping[str, Any]) -> str:
+    return f"level {json.loads(told[attr.RESOLUTION])['level']}"
 
 
 def breaks_promise(dataset: Result) -> bool:
@@ -217,7 +232,7 @@ def summary_text(dataset: Result) -> str:
     wide = max(18, *(len(_intervals(spread)) for _, spread, _ in means))
     rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<{wide}}  spread")
     rows += [_spread_row(name, spread, unit, hits, wide) for name, spread, unit in means]
-    notes = (numerics_note(dataset), draws_note(dataset))
+    notes = (numerics_note(dataset), levels_note(dataset), draws_note(dataset))
     return "\n".join([*rows, *stop_lines(dataset), *filter(None, notes)])
 
 
@@ -228,6 +243,39 @@ def numerics_note(dataset: Result) -> str:
     return f"numerics ±: from {dataset.sizes['finer']} of the hits, which were computed at a finer level, too."
 
 
+def levels_note(dataset: Result) -> str:
+    """Whether the means of a result ask for another level than its single hits do; empty where they do not."""
+    told = dataset.attrs
+    if attr.LEVEL_SHIFTS not in told or attr.RESOLUTION not in told or attr.LEVEL_FOR in told:
+        return ""
+    standoffs = dataset[v.STANDOFF].values.tolist()[-1:]
+    means = estimated(dataset, means_of((v.RESIDUAL_VELOCITY, v.TILT), standoffs)).values()
+    open_by = [estimate.half_width for estimate in means]
+    level, shifts = json.loads(told[attr.RESOLUTION])["level"], json.loads(told[attr.LEVEL_SHIFTS])
+    enough = [int(at) for at, by in shifts.items() if all(a <= 0.5 * b for a, b in zip(by, open_by, strict=False))]
+    if enough and min(enough) < level:
+        by = _shifts_text(shifts[str(min(enough))])
+        return f"For the means alone level {min(enough)} is enough (numerics.level): it shifts them by at most {by}."
+    if any(a > b for a, b in zip(shifts.get(str(level), ()), open_by, strict=False)):
+        by = _shifts_text(shifts[str(level)])
+        return (
+            f"The numerics may shift the means by more than the hits leave open, by {by}: a stricter numerics.accuracy "
+            "tells more of them than more hits."
+        )
+    return ""
+
+
+def _shifts_text(shifts: Sequence[float]) -> str:
+    return " and ".join(f"{shift:.2g}{unit}" for shift, unit in zip(shifts, (" m/s", "°"), strict=False))
+
+
+_STOPPED = {
+    "half_width": "its half width is met",
+    "numerics": "more hits are of no use, as the numerics may shift it by more than half of that half width",
+    "max_count": "max_count ended it",
+}
+
+
 def stop_lines(dataset: Result) -> list[str]:
     """What the stop rule asked for, if there was one."""
     told = dataset.attrs
@@ -235,10 +283,11 @@ def stop_lines(dataset: Result) -> list[str]:
         return []
     (low, high), unit = told[attr.ESTIMATE_INTERVAL], STORED[told[attr.ESTIMATE_UNITS]]
     interval = interval_text(unit.factor * low, unit.factor * high, "{:.6g}".format)
-    reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told[attr.STOP_REASON]]
+    shift = told.get(attr.ESTIMATE_NUMERICS, 0.0)
+    numerics = f", numerics ± {unit.factor * shift:.2g}{unit.suffix}" if shift > 0.0 else ""
     return [
         f"{told[attr.STOP_QUANTITY]} = {unit.text(told[attr.ESTIMATE], '.6g')}, {told[attr.CONFIDENCE]:.4g} interval "
-        f"{interval}{unit.suffix}; {reason}"
+        f"{interval}{unit.suffix}{numerics}; {_STOPPED[told[attr.STOP_REASON]]}"
     ]
 
 

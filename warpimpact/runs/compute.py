@@ -19,6 +19,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import finer_columns, solid_columns
 from warpimpact.results.table import Table
 from warpimpact.runs.describe import computed_by, described, found_attributes
+from warpimpact.runs.levels import excess_of_stop, seeks_measure, shifts_of
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.quantities import BY_LAYER
@@ -56,7 +57,8 @@ class HitMap:
         if campaign.numerics.explicit is not None:
             return None
         pilot = pilot_shots(campaign, pilot_most(campaign))
-        return pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying)
+        found = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, excess_of_stop(campaign))
+        return replace(found, shifts=shifts_of(campaign, pilot, found), tried=())
 
     def found_in(self, result: Result) -> HitErrors | None:
         """What the pilot of a result found; None if its campaign fixed the resolution."""
@@ -69,6 +71,7 @@ class HitMap:
             tilt_error=math.radians(float(told[attr.TILT_ERROR])),
             depth_error=float(told.get(attr.DEPTH_ERROR, math.nan)),
             status_error=float(told.get(attr.STATUS_ERROR, math.nan)),
+            shifts={int(level): tuple(at) for level, at in json.loads(told.get(attr.LEVEL_SHIFTS, "{}")).items()},
         )
 
 
@@ -92,6 +95,7 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
         beside |= solid_columns(_outcomes(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
+    attributes |= {attr.LEVEL_FOR: campaign.stop.quantity} if campaign.stop and seeks_measure(campaign) else {}
     return described(campaign, task.shots, outcomes, numerics, attributes, beside)
 
 
@@ -128,7 +132,7 @@ def found_in(result: Result) -> tuple[Numerics, bool, float]:
     return numerics, bool(told[attr.PROMISE_KEPT]), float(json.loads(told[attr.ACCURACY])["share"])
 
 
-def _errors(found: Found | None) -> dict[str, float]:
+def _errors(found: Found | None) -> dict[str, Any]:
     """The errors that a pilot of a hit map found, as attributes."""
     if not isinstance(found, HitErrors):
         return {}
@@ -138,7 +142,8 @@ def _errors(found: Found | None) -> dict[str, float]:
         attr.DEPTH_ERROR: found.depth_error,
         attr.STATUS_ERROR: found.status_error,
     }
-    return {name: error for name, error in told.items() if not math.isnan(error)}
+    shifts = {attr.LEVEL_SHIFTS: json.dumps(found.shifts)} if found.shifts else {}
+    return {name: error for name, error in told.items() if not math.isnan(error)} | shifts
 
 
 def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:

@@ -11,9 +11,9 @@ from __future__ import annotations
 import logging
 import math
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Self, TypeVar
+from typing import Self, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,18 +102,22 @@ class HitErrors(Found):
         tilt_error: at the last stand-off [rad].
         depth_error: of the shots that stop in a layer [m]; NaN where none does.
         status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
+        shifts: levels that were tried, each with what the numerics may shift the means of a run by.
         finer: outcomes of the first shots of the pilot at the finer level that it was compared with.
+        tried: levels that were tried, each with the outcomes of these shots there and at a finer level.
     """
 
     residual_velocity_error: float
     tilt_error: float
     depth_error: float = math.nan
     status_error: float = math.nan
+    shifts: Mapping[int, tuple[float, ...]] = field(default_factory=dict, compare=False)
     finer: Outcomes | None = field(default=None, compare=False, repr=False)
+    tried: tuple[tuple[int, Outcomes, Outcomes], ...] = field(default=(), compare=False, repr=False)
 
     @property
     def told(self) -> Self:
-        return replace(self, finer=None)
+        return replace(self, finer=None, tried=())
 
     @property
     def errors(self) -> str:
@@ -159,8 +163,16 @@ def _fewest(share: float) -> int:
     return math.ceil(FEWEST / (1.0 - share) - 1e-9)
 
 
+Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
+"""What outcomes of some shots at a level are off by over what is allowed, from those at a finer level."""
+
+
 def pilot_hits(
-    outcomes_at: Callable[[int, Shots], Outcomes], pilot: Shots, numerics: Numerics, layers: int = 1
+    outcomes_at: Callable[[int, Shots], Outcomes],
+    pilot: Shots,
+    numerics: Numerics,
+    layers: int = 1,
+    excess_of: Excess | None = None,
 ) -> HitErrors:
     """Find the coarsest level whose outcomes have the accuracy that is asked for.
 
@@ -170,6 +182,7 @@ def pilot_hits(
             rest is computed where the first leave the choice between two levels open.
         numerics: their accuracy, precision and layout count; other settings would promise nothing.
         layers: of the target.
+        excess_of: in place of the accuracy, from the coarsest level on.
 
     Returns:
         The level that keeps the promise. If none does: the coarsest one that keeps it with errors weighed by the energy
@@ -182,10 +195,11 @@ def pilot_hits(
     accuracy, at_a_plate = numerics.asked, pilot.at_a_plate
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
-    level = coarsest_level(accuracy.strictness)
+    level = coarsest_level(accuracy.strictness) if excess_of is None else 0
     count = min(len(pilot), -(-_first(accuracy) // at_a_plate) * at_a_plate)
     some, rest = pilot[:count], pilot[count:]
     known: dict[tuple[int, bool], Outcomes] = {}
+    tried: dict[int, tuple[int, Outcomes, Outcomes]] = {}
 
     def computed(index: int, whole: bool) -> Outcomes:
         if (index, whole) not in known:
@@ -196,21 +210,26 @@ def pilot_hits(
     def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
         for whole in (False, True) if len(rest) else (False,):
             shots = pilot if whole else some
-            found, excess, nearly = _judged(
-                computed(index, whole), computed(finer, whole), shots, at_level(index, numerics), accuracy, margin
-            )
+            pair = computed(index, whole), computed(finer, whole)
+            found, excess, nearly = _judged(*pair, shots, at_level(index, numerics), accuracy, margin)
+            if excess_of is not None:
+                excess, nearly = excess_of(*pair, shots), False
+                found = replace(found, kept=excess <= 1.0)
             _logger.info(
                 "pilot of %d hits at level %d: errors of %s, the promise is %skept",
                 len(shots), index, found.errors, "" if found.kept else "not ",
             )  # fmt: skip
             if not OPEN[0] < excess < OPEN[1]:
                 break
+        tried[index] = (index, *pair)
         return found, excess, nearly
 
     further = FURTHER if layers == 1 else FURTHER_LAYERED
     levels = range(level, min(level + further, len(LADDER) - 2) + 1)
     found = _coarsest(judge, levels, len(LADDER) - 1, BEYOND)
-    return found or HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
+    if found is None:
+        return HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
+    return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
 
 
 def _judged(
@@ -232,7 +251,7 @@ def _judged(
     excess = _excess(accuracy, counted, layered)
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in told)
-    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, fine)
+    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
     return found, excess, _excess(accuracy, weighed, layered) <= 1.0
 
 

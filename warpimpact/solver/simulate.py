@@ -13,7 +13,7 @@ from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import HitErrors, pilot_hits, pilot_size
+from warpimpact.solver.pilot import Excess, HitErrors, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
@@ -72,20 +72,26 @@ def marched(memory: Memory, worker: Worker, progress: Progress | None = None) ->
 
 
 def pilot_of(
-    scene: Scene, pilot: Shots, numerics: Numerics, worker: Worker, trying: Callable[[int], object] = lambda level: None
+    scene: Scene,
+    pilot: Shots,
+    numerics: Numerics,
+    worker: Worker,
+    trying: Callable[[int], object] = lambda level: None,
+    excess_of: Excess | None = None,
 ) -> HitErrors:
     """Find the level of resolution for an accuracy (solver/pilot.py).
 
     Args:
         pilot: some of the shots.
         trying: called with every level that is computed.
+        excess_of: as in `pilot_hits`.
     """
 
     def outcomes_at(level: int, some: Shots) -> Outcomes:
         trying(level)
         return computed(prepare(scene, some, at_level(level, numerics)), worker)
 
-    return pilot_hits(outcomes_at, pilot, numerics, len(scene.target.layers))
+    return pilot_hits(outcomes_at, pilot, numerics, len(scene.target.layers), excess_of)
 
 
 def spread(shots: Shots, most: int) -> Shots:
