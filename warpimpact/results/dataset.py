@@ -121,9 +121,11 @@ def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
     if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
         return None
     stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if name in dataset and of_hits in dataset}
+    if any(dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
+        return None  # results that were joined have several
     numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
-    _, places, those = np.intersect1d(hits, numbers, return_indices=True)
-    if not len(places) or v.STATUS not in stored.values():
+    found, places, those = np.intersect1d(hits, numbers, return_indices=True)
+    if not len(found) or v.STATUS not in stored.values() or np.isin(hits, found).sum() > len(found):
         return None
     order = np.argsort(those)
     coarse = dataset.isel(hit=places[order]).load()

@@ -91,6 +91,7 @@ SOLID_LIMIT_VARIABLES = tuple(SOLID_LIMITS.values())
 
 _RECORDED = dict.fromkeys(one for group in registry.RECORDS if group.measured and not group.exact for one in group)
 FINER_HIT = Variable("finer_hit", ("finer",), "1", "number of a hit that was computed at a finer level, too")
+FINER_COORDINATES = (FINER_HIT,)
 FINER_VARIABLES = {
     _beside(one, "finer", "finer", "at a finer level"): one
     for one in (*_RECORDED, STOPPED_IN, DEPTH)
@@ -107,7 +108,7 @@ OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 GROUPS = {
     "plate": OUTLINE_VARIABLES,
     "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES),
-    "finer": (FINER_HIT, *FINER_VARIABLES),
+    "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
 }
 """What is not along "hit" stands in groups of the file. In memory those of other shots are coordinates, which no choice
 of hits spreads over the hits; outlines.py says what becomes of the outlines."""

@@ -24,9 +24,10 @@ from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.device import find_device
+from warpimpact.solver.findings import Found, HitErrors
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import Found, HitErrors, pilot_size
+from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import marched, pilot_of, spread_places
 from warpimpact.solver.worker import Worker

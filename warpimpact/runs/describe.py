@@ -18,8 +18,8 @@ from warpimpact.results.table import Table
 from warpimpact.scene import Accuracy, Burst, Numerics, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
+from warpimpact.solver.findings import Found
 from warpimpact.solver.materials import weakens
-from warpimpact.solver.pilot import Found
 from warpimpact.solver.resolution import Resolution, resolve
 
 

@@ -11,7 +11,8 @@ from warpimpact.results.dataset import to_table
 from warpimpact.results.measures import Measure, numerics_of
 from warpimpact.results.table import Table
 from warpimpact.scene import Shots
-from warpimpact.solver.pilot import Excess, HitErrors
+from warpimpact.solver.findings import HitErrors
+from warpimpact.solver.pilot import Excess
 
 OF_THE_NUMERICS = 0.5
 """Share of an interval's half width that the numerics may take."""
@@ -46,9 +47,10 @@ def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, t
     tilts = [f"mean(tilt@{at!r}m)" for at in campaign.output.standoffs[-1:]]
     measures = [Measure.parse(text) for text in ("mean(residual_velocity)", *tilts)]
     found_at: dict[int, tuple[float, ...]] = {}
-    for level, *outcomes in found.tried:
+    for at, *outcomes in found.tried:
         levels = [_table(campaign, pilot[: len(one)], one) for one in outcomes]
-        found_at[level] = tuple(numerics_of(one, (levels[0], levels[1])) or 0.0 for one in measures)
+        assert at.numerics.level is not None
+        found_at[at.numerics.level] = tuple(numerics_of(one, (levels[0], levels[1])) or 0.0 for one in measures)
     return found_at
 
 

@@ -27,7 +27,7 @@ from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manife
 from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
-from warpimpact.solver.pilot import Found
+from warpimpact.solver.findings import Found
 from warpimpact.statistics.intervals import Dealing
 from warpimpact.statistics.stopping import looks
 

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import logging
 import math
-from abc import abstractmethod
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Self, TypeAlias, TypeVar
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
 from warpimpact.solver.changes import ended_otherwise, limit_changes, upper_errors
-from warpimpact.solver.pilot_text import errors_text, hits_text, limit_error_text
+from warpimpact.solver.findings import Found, HitErrors, LimitErrors, Tried
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
 Array = NDArray[np.float64]
@@ -61,86 +60,6 @@ BEYOND, BEYOND_LIMITS = 1, 2
 twice the one before. Nearly does a level whose weighed errors are within the promise. Of limits, half are: as errors
 about halve from level to level, the others are off by more than four times as much two levels on. Some limits, such as
 those at which the outcome jumps, or that come and go, have no bounded error, and finer levels are of little use."""
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a pilot found.
-
-    Attributes:
-        numerics: the level to compute all shots with.
-        kept: whether the errors are within what was asked for.
-        share: of the shots that are within the errors.
-    """
-
-    numerics: Numerics
-    kept: bool
-    share: float
-
-    @property
-    @abstractmethod
-    def errors(self) -> str:
-        """Upper estimates of the errors, with units."""
-
-    @property
-    def told(self) -> Self:
-        """The same without outcomes of shots."""
-        return self
-
-    @property
-    def phrase(self) -> str:
-        """The errors, for a line of progress."""
-        return f"accuracy {self.errors} for {hits_text(self.share)}{'' if self.kept else ', not as promised'}"
-
-
-@dataclass(frozen=True)
-class HitErrors(Found):
-    """Upper estimates of the errors of what becomes of the shots; infinite where the pilot could not tell.
-
-    Attributes:
-        residual_velocity_error: [m/s]; the residual velocities behind all layers count.
-        tilt_error: at the last stand-off [rad].
-        depth_error: of the shots that stop in a layer [m]; NaN where none does.
-        status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
-        shifts: levels that were tried, each with what the numerics may shift the means of a run by.
-        finer: outcomes of the first shots of the pilot at the finer level that it was compared with.
-        tried: levels that were tried, each with the outcomes of these shots there and at a finer level.
-    """
-
-    residual_velocity_error: float
-    tilt_error: float
-    depth_error: float = math.nan
-    status_error: float = math.nan
-    shifts: Mapping[int, tuple[float, ...]] = field(default_factory=dict, compare=False)
-    finer: Outcomes | None = field(default=None, compare=False, repr=False)
-    tried: tuple[tuple[int, Outcomes, Outcomes], ...] = field(default=(), compare=False, repr=False)
-
-    @property
-    def told(self) -> Self:
-        return replace(self, finer=None, tried=())
-
-    @property
-    def errors(self) -> str:
-        return errors_text(
-            self.residual_velocity_error, math.degrees(self.tilt_error), self.depth_error, self.status_error
-        )
-
-
-@dataclass(frozen=True)
-class LimitErrors(Found):
-    """Upper estimate of the errors of limits.
-
-    Attributes:
-        error: of velocities [m/s] or of thicknesses [m]; infinite where the pilot could not tell.
-        quantity: "velocity" or "thickness".
-    """
-
-    error: float
-    quantity: str
-
-    @property
-    def errors(self) -> str:
-        return limit_error_text(self.error, self.quantity)
 
 
 def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
@@ -199,7 +118,7 @@ def pilot_hits(
     count = min(len(pilot), -(-_first(accuracy) // at_a_plate) * at_a_plate)
     some, rest = pilot[:count], pilot[count:]
     known: dict[tuple[int, bool], Outcomes] = {}
-    tried: dict[int, tuple[int, Outcomes, Outcomes]] = {}
+    tried: dict[int, Tried] = {}
 
     def computed(index: int, whole: bool) -> Outcomes:
         if (index, whole) not in known:
@@ -221,7 +140,7 @@ def pilot_hits(
             )  # fmt: skip
             if not OPEN[0] < excess < OPEN[1]:
                 break
-        tried[index] = (index, *pair)
+        tried[index] = found, *pair
         return found, excess, nearly
 
     further = FURTHER if layers == 1 else FURTHER_LAYERED

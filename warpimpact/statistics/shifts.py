@@ -1,8 +1,7 @@
 """How far the numerics may shift a number over shots: from the same shots computed at a finer level, too.
 
 Two levels differ shot by shot, so a mean has the shift and its interval from a few shots. A share of the shots beyond a
-limit changes by those that the shifts of others would carry across the limit. So a few shots tell the shift of a share
-that moves by less than one of them.
+limit has them from the shifts of the shots near the limit, be it that none of them crosses it.
 """
 
 from __future__ import annotations
@@ -16,6 +15,9 @@ from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimat
 
 BEYOND = 1.4
 """Factor for the error of the finer level itself."""
+WINDOW = 1.84
+"""Half the width of the window of a share, in standard deviations, for one shot: that of a normal density (B. W.
+Silverman, Density Estimation, 1986, section 3.4.2)."""
 
 
 def shift_of_mean(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
@@ -47,26 +49,29 @@ def shift_of_quantile(coarse: Array, fine: Array, share: float, **dealt: Unpack[
 
 
 def shift_of_share(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
-    """As `shift_of_mean`, of the share of the shots whose numbers are positive. The shift of every shot is tried on all
-    shots on its side of 0; it may be infinite."""
+    """As `shift_of_mean`, of the share of the shots whose numbers are positive; they may be infinite.
+
+    The share changes by the density of the numbers at 0 times their mean shift there, E[shift · δ(number)], with a
+    window in place of δ. A shot that shifts farther than that counts by the side that it is on.
+    """
     known = ~np.isnan(coarse) & ~np.isnan(fine)
     if not known.any():
         return math.nan
     coarse, fine = coarse[known], fine[known]
+    finite = np.isfinite(coarse) & np.isfinite(fine)
+    wide = WINDOW * float(np.std(coarse[finite])) * int(finite.sum()) ** -0.2 if finite.any() else 0.0
     with np.errstate(invalid="ignore"):
-        shift = np.where(coarse == fine, 0.0, fine - coarse)
-    change = np.zeros(len(coarse))
-    for side in (1.0, -1.0):
-        mine = side * coarse > 0.0
-        if mine.any():
-            carried = np.searchsorted(np.sort(side * coarse[mine]), -side * shift[mine], side="right")
-            change[mine] = -side * carried / int(mine.sum())
+        shift, middle = fine - coarse, 0.5 * (coarse + fine)
+        near = finite & (np.abs(shift) < wide)
+    change = np.where(fine > 0.0, 1.0, 0.0) - np.where(coarse > 0.0, 1.0, 0.0)
+    change[near] = np.where(np.abs(middle[near]) < wide, shift[near] / (2.0 * wide), 0.0)
     return _most(estimate_of("mean", change, **dealt))
 
 
 def shift_of_yes(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> float:
     """As `shift_of_mean`, of a share of which shots say yes or no, 1 or 0, and no more; 0 where all say the same."""
-    if np.nanmin([coarse, fine]) == np.nanmax([coarse, fine]):
+    both = np.concatenate([coarse, fine])
+    if len(np.unique(both[~np.isnan(both)])) < 2:
         return 0.0
     return _most(estimate_of("difference", fine - coarse, **dealt))
 
