@@ -4,14 +4,19 @@ take, and whether a replay, a part of the shots, other threads and a search of l
 The scenes are those of tests/verification/extremes.py, each a function of seed and index. Every step of every shot is
 looked at. Run it as a script, from the top of the checkout; it goes on where the file of figures ended:
 python tests/benchmarks/envelope.py --scenes 10000 --minutes 15
+
+A scene that takes long is printed with the seconds of each of its parts, and while it still runs with the line where it
+is. --only looks at one scene and writes no figures.
 """
 
 import argparse
+import faulthandler
 import json
 import platform
 import sys
 import time
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +25,10 @@ import numpy as np
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics
+from warpimpact.solver.device import find_device
 from warpimpact.solver.limit import limit_velocity
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.prepare import prepare
 from warpimpact.solver.replay import replay
 from warpimpact.solver.simulate import simulate
 
@@ -31,8 +39,8 @@ from tests.verification.extremes import MOST_RISE, MOST_STRETCH, Extreme, Found,
 
 FIGURES = Path(__file__).parent / "results" / "envelope.json"
 HITS = 3
-LONG = 25.0
-"""Seconds of processor time, above which a scene is named."""
+LONG, VERY_LONG = 25.0, 60.0
+"""Seconds of processor time above which a scene is named; above the first it is printed where it is."""
 NAMED = [Status.NOT_FINITE, Status.GAINED_ENERGY]
 """How no shot may end."""
 NONE: dict[str, Any] = {
@@ -51,7 +59,8 @@ NONE: dict[str, Any] = {
     "faults": [],
     "processor_seconds": 0.0,
     "longest_processor_seconds": 0.0,
-    "long": [],
+    "long": {},
+    "very_long": 0,
     "ways": {},
     "too_large": 0,
     "broken_promises": [],
@@ -91,14 +100,49 @@ WAYS = (replayed, in_part, on_threads, limited)
 """What is tried of a scene beside its shots, one after another from scene to scene."""
 
 
-def promise(extreme: Extreme, index: int) -> tuple[str, bool | None]:
-    """The way that is tried of a scene, and whether it keeps its promise; None if it needs more memory than is free."""
-    way, numerics = WAYS[index % len(WAYS)], Numerics(level=0, precision=extreme.precision)
+@dataclass(frozen=True)
+class Look:
+    """What a look at one scene found.
+
+    Attributes:
+        found: of all steps of its shots; None if a part needs more memory than is free.
+        way: the promise that was tried.
+        kept: whether it holds; None if a part needs more memory than is free.
+        seconds: of processor time, by part.
+    """
+
+    found: Found | None
+    way: str
+    kept: bool | None
+    seconds: dict[str, float]
+
+
+def look(index: int, seed: int) -> Look:
+    """Draw a scene and try it; compiling is not counted."""
+    extreme = drawn(np.random.default_rng([seed, index]).random, HITS)
+    scene, shots, precision = extreme
+    numerics, way = Numerics(level=0, precision=precision), WAYS[index % len(WAYS)]
+    outcome, kept, seconds, begun = None, None, {}, time.process_time()
+
+    def ended(part: str) -> None:
+        nonlocal begun
+        seconds[part] = round(time.process_time() - begun, 2)
+        begun = time.process_time()
+
     try:
-        all_of_them = simulate(extreme.scene, extreme.shots, numerics=numerics, device="cpu", threads=1)
-        return way.__name__, way(extreme, numerics, all_of_them)
-    except MemoryError:
-        return way.__name__, None
+        memory = Memory(prepare(scene, shots, numerics), find_device("cpu"))
+        ended("prepare")
+        memory.build()
+        begun = time.process_time()
+        outcome = found(extreme)
+        ended("histories")
+        all_of_them = simulate(scene, shots, numerics=numerics, device="cpu", threads=1)
+        ended("simulate")
+        kept = way(extreme, numerics, all_of_them)
+    except MemoryError as error:
+        print(index, way.__name__, error, flush=True)
+    ended(way.__name__)
+    return Look(outcome, way.__name__, kept, seconds)
 
 
 def added(figures: dict[str, Any], index: int, outcome: Found) -> dict[str, Any]:
@@ -114,7 +158,7 @@ def added(figures: dict[str, Any], index: int, outcome: Found) -> dict[str, Any]
         "largest_gain_of_energy": outcome.gain,
         "largest_stretch_of_a_quaternion_eps": outcome.stretch,
     }
-    sums = {"scenes": 1, "shots": HITS, "steps": outcome.steps, "undefined": outcome.undefined}
+    sums = {"shots": HITS, "steps": outcome.steps, "undefined": outcome.undefined}
     counts = {
         "statuses": Counter(status.name.lower() for status in outcome.statuses),
         "variants": Counter([outcome.variant.removeprefix("variant_")]),
@@ -128,16 +172,29 @@ def added(figures: dict[str, Any], index: int, outcome: Found) -> dict[str, Any]
     )
 
 
-def tried(figures: dict[str, Any], index: int, way: str, kept: bool | None, seconds: float) -> dict[str, Any]:
-    """Figures with the processor time of a scene, kernels that were compiled included, and the way that was tried."""
+def tried(figures: dict[str, Any], index: int, one: Look) -> dict[str, Any]:
+    """Figures with the processor time of a scene, and the way that was tried."""
+    total = round(sum(one.seconds.values()), 1)
     return figures | {
-        "processor_seconds": round(figures["processor_seconds"] + seconds, 1),
-        "longest_processor_seconds": max(figures["longest_processor_seconds"], round(seconds, 1)),
-        "long": figures["long"] + [index] * (seconds > LONG),
-        "ways": dict(sorted((Counter(figures["ways"]) + Counter([way])).items())),
-        "too_large": figures["too_large"] + (kept is None),
-        "broken_promises": figures["broken_promises"] + [index] * (kept is False),
+        "scenes": index + 1,
+        "processor_seconds": round(figures["processor_seconds"] + total, 1),
+        "longest_processor_seconds": max(figures["longest_processor_seconds"], total),
+        "long": figures["long"] | ({str(index): one.seconds} if total > LONG else {}),
+        "very_long": figures["very_long"] + (total > VERY_LONG),
+        "ways": dict(sorted((Counter(figures["ways"]) + Counter([one.way])).items())),
+        "too_large": figures["too_large"] + (one.kept is None),
+        "broken_promises": figures["broken_promises"] + [index] * (one.kept is False),
     }
+
+
+def with_scene(figures: dict[str, Any], index: int) -> dict[str, Any]:
+    """Figures with one more scene, which is printed if it takes long."""
+    faulthandler.dump_traceback_later(LONG, repeat=True)
+    one = look(index, figures["seed"])
+    faulthandler.cancel_dump_traceback_later()
+    if sum(one.seconds.values()) > LONG:
+        print("long:", index, one.seconds, flush=True)
+    return tried(figures if one.found is None else added(figures, index, one.found), index, one)
 
 
 def main() -> None:
@@ -145,20 +202,19 @@ def main() -> None:
     parser.add_argument("--scenes", type=int, default=10_000, help="scenes in all")
     parser.add_argument("--minutes", type=float, default=60.0, help="longest time of this run")
     parser.add_argument("--figures", type=Path, default=FIGURES, help="file that is read and written")
+    parser.add_argument("--only", type=int, help="look at the scene with this number alone")
     arguments = parser.parse_args()
+    if arguments.only is not None:
+        print(json.dumps(with_scene(NONE, arguments.only), indent=1))
+        return
     figures = NONE | (json.loads(arguments.figures.read_text()) if arguments.figures.exists() else {})
     before, start = figures["seconds"], time.perf_counter()
     while figures["scenes"] < arguments.scenes and time.perf_counter() - start < 60.0 * arguments.minutes:
-        index = figures["scenes"]
-        extreme, begun = drawn(np.random.default_rng([figures["seed"], index]).random, HITS), time.process_time()
-        figures = added(figures, index, found(extreme))
-        way, kept = promise(extreme, index)
-        figures = tried(figures, index, way, kept, time.process_time() - begun)
-        figures["seconds"] = round(before + time.perf_counter() - start, 1)
+        figures = with_scene(figures, figures["scenes"])
+        figures |= {"seconds": round(before + time.perf_counter() - start, 1), "machine": platform.machine()}
+        arguments.figures.write_text(json.dumps(figures, indent=1) + "\n")
         if figures["scenes"] % 100 == 0:
-            arguments.figures.write_text(json.dumps(figures, indent=1) + "\n")
             print(figures["scenes"], figures["seconds"], figures["statuses"], figures["faults"], flush=True)
-    arguments.figures.write_text(json.dumps(figures | {"machine": platform.machine()}, indent=1) + "\n")
     sys.exit(1 if figures["faults"] or figures["broken_promises"] else 0)
 
 

@@ -8,7 +8,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
-from warpimpact.solver import memory
+from warpimpact.solver import structs
 from warpimpact.solver.grid import Grid, Tile, half_taps
 from warpimpact.solver.rings import azimuths_of, rings_of
 
@@ -56,8 +56,8 @@ def astride(count: int) -> dict[str, NDArray[np.float64]]:
 
 def surface_of(struct: Any, core: Core, axial: int, around: int, device: str) -> Any:
     """The Surface of a core in `axial` × `around` patches and its discs."""
-    put = memory.Put(device, wp.float64)
-    return memory.surface_of(struct, core, rings_of(core, axial, around), azimuths_of(around), put)
+    put = structs.Put(device, wp.float64)
+    return structs.surface_of(struct, core, rings_of(core, axial, around), azimuths_of(around), put)
 
 
 def plate_of(
@@ -80,7 +80,7 @@ def plate_of(
         spacing=spacing,
         taps=half_taps(length, spacing),
     )
-    return memory.plate_of(struct, grid, memory.Put(device, real))
+    return structs.plate_of(struct, grid, structs.Put(device, real))
 
 
 def poisoned_fields(struct: Any, slots: int, cells_y: int, cells_z: int, device: str, *, real: Any = wp.float64) -> Any:

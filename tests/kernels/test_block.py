@@ -39,7 +39,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.solver import grid, memory, replay, simulate
+from warpimpact.solver import grid, replay, simulate
 from warpimpact.solver.rings import azimuths_of, rings_of
 
 from .probes import astride, plate_of, poisoned, poisoned_fields
@@ -222,9 +222,9 @@ def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
     """Loads of random poses, and the exposure of their plates."""
     kernel, *structs = probe_of(variant)
     Surface, Plate_, Fields, Law, Load, Touches = structs
-    put = memory.Put("cpu", variant.real)
+    put = structs.Put("cpu", variant.real)
     around = 36  # so that a round of the lanes spans two rings
-    surface = memory.surface_of(Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)
+    surface = structs.surface_of(Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)
     plate = plate_of(Plate_, np.ones((1, 1)), np.array([CELL, CELL]), CELL, "cpu", real=variant.real)
     law = Law()
     law.a0, law.friction, law.onset, law.decay_rate = 2.6e9, 0.05, 2.0, np.log(0.8) / 1e-6

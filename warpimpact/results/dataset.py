@@ -99,6 +99,19 @@ def to_table(
     )
 
 
+def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> Table:
+    """Only some columns of `to_table`, as far as the outcomes have them, with stand-offs and the core: for who computes
+    with many small results at once."""
+    own = own_columns(scene.target, shots)
+    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    values |= vars(outcomes) | faces(scene.target)
+    kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in names and name in values]
+    coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
+    attributes = {attr.CORE: scene.core.model_dump_json()}
+    return Table.of(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
+
+
 def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any) -> xarray.Dataset:
     """The Dataset of the hit map; the arguments are those of `to_table`."""
     return in_memory(to_table(scene, shots, outcomes, **arguments).to_xarray())

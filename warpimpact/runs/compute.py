@@ -90,10 +90,10 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     """
     images, numerics, drawn = len(campaign.symmetries), numerics_of(campaign, task.found), campaign.drawn
     progress = of_images(progress, images)
-    outcomes, elapsed = _outcomes(drawn, campaign.scene, task.shots[::images], numerics, worker, progress)
+    outcomes, elapsed = outcomes_in(drawn, campaign.scene, task.shots[::images], numerics, worker, progress)
     beside = _finer(campaign, task.found)
     if task.solid is not None:
-        beside |= solid_columns(_outcomes(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
+        beside |= solid_columns(outcomes_in(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
     attributes |= {attr.LEVEL_FOR: campaign.stop.quantity} if campaign.stop and seeks_measure(campaign) else {}
@@ -187,7 +187,7 @@ def _pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
     return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
 
 
-def _outcomes(
+def outcomes_in(
     drawn: Posterior | None,
     scene: Scene,
     shots: Shots,

@@ -28,6 +28,7 @@ from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import Found
+from warpimpact.solver.worker import Cancel
 from warpimpact.statistics.intervals import Dealing
 from warpimpact.statistics.stopping import looks
 
@@ -42,21 +43,25 @@ class Interrupted(KeyboardInterrupt):
     """A run was interrupted; the message says what is saved."""
 
 
-def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = None) -> xarray.Dataset:
+def run(
+    campaign: Campaign, *, device: str = "auto", progress: Follow | None = None, cancel: Cancel | None = None
+) -> xarray.Dataset:
     """Compute every hit of a campaign, in memory.
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
         progress: called several times a second; without it a notebook shows a bar.
+        cancel: ends the run from another thread.
 
     Returns:
         The Dataset of results/dataset.py, one entry per hit.
 
     Raises:
         DeviceError: the device is absent.
+        Cancelled: by `cancel`.
     """
     total = len(campaign.sampler())
-    with local_team(campaign, device) as team, followed(progress) as follow:
+    with local_team(campaign, device, cancel=cancel) as team, followed(progress) as follow:
         shards = Shards(extent(total, campaign.at_a_plate))
         end = _fill(campaign, shards, team, follow)
     table = joined(shards.shard(index) for index in range(end.shards))

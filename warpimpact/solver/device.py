@@ -7,6 +7,7 @@ import logging
 import os
 import shutil
 import tempfile
+import threading
 import time
 import zlib
 from collections.abc import Callable
@@ -86,14 +87,23 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def launching(threads: int | None) -> int:
+    """Threads that launch on a CPU: so many, or one for every core; where Warp runs blocks there, they crash in two."""
+    return 1 if wp.config.enable_cpu_blocks else threads or cores()
+
+
 def block_size(kernel: Any, device: Any) -> int:
     """Threads of a block: on CUDA those of the layout, on a CPU 1 unless Warp is told to run blocks there."""
     lanes: int = kernel.options.get("launch_bounds", (256,))[0]
     return lanes if device.is_cuda or wp.config.enable_cpu_blocks else 1
 
 
+_LOADING = threading.RLock()
+
+
 def load(kernel: Any, device: Any) -> None:
     """Load a kernel on a device for launches with Warp's own block size; compile it if it is not cached or damaged.
+    Several threads may load the same one.
 
     A module is compiled for one block size. By default Warp loads with the block size of CUDA on a CPU, too, and
     compiles again at the launch. Warp trusts the files of its cache, and one wrong bit in them can end the process.
@@ -101,6 +111,11 @@ def load(kernel: Any, device: Any) -> None:
     Raises:
         DeviceError: the cached files are damaged and cannot be removed.
     """
+    with _LOADING:
+        _load(kernel, device)
+
+
+def _load(kernel: Any, device: Any) -> None:
     begin, block = time.perf_counter(), block_size(kernel, device)
     module = kernel.module
     loaded = module.execs.get((device.context, block))
@@ -157,11 +172,17 @@ def _remove(folder: Path) -> None:
 
 def halving(slots: int, allocate: Callable[[int], Scratch]) -> tuple[int, Scratch]:
     """Slots and their scratch. The number is halved until the allocation succeeds, because the free memory is only an
-    estimate."""
+    estimate.
+
+    Raises:
+        MemoryError: there is no memory for one slot.
+    """
     while True:
         try:
             return slots, allocate(slots)
         except (RuntimeError, MemoryError) as error:
-            if slots == 1 or not (isinstance(error, MemoryError) or "allocate" in str(error)):
+            if not (isinstance(error, MemoryError) or "allocate" in str(error)):
                 raise
+            if slots == 1:
+                raise MemoryError(str(error)) from error
         slots //= 2

@@ -51,7 +51,7 @@ def scratch(
 
     Args:
         stage: the build of the march.
-        put: puts values on the device (`solver.memory.Put`).
+        put: puts values on the device (`solver.structs.Put`).
         nodes: of the exposure in a slot.
         windows: cells of the windows of all layers.
     """

@@ -1,5 +1,4 @@
-"""Plates as the kernels see them: one period of material fractions, the grid of the exposure with its filter, and the
-first window about a hit."""
+"""Plates as the kernels see them: one period of material fractions, and the grid of the exposure with its filter."""
 
 from __future__ import annotations
 
@@ -13,14 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.solver.device import free_memory
+from warpimpact.solver.itself import Itself
 from warpimpact.solver.materials import ROUNDING
 
 if TYPE_CHECKING:
-    from warpimpact.scene import Core, Pattern, Plate, Shots
+    from warpimpact.scene import Pattern, Plate
     from warpimpact.solver.materials import Materials
     from warpimpact.solver.resolution import Resolution
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 FINER = 5
 """Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the cell under its centre."""
@@ -33,21 +34,17 @@ BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
 SUBSAMPLES = 6
 """Points per cell and direction from which a material fraction is computed."""
-AT_A_TIME = 2**13
-"""Cells of the tile that are computed together."""
-
+BLOCK, PARTS = 16, 4
+"""Cells of the tile along the sides of a block that is looked at first, and into how many parts they are divided where
+an edge of a hole crosses it; a power of it."""
+CROSSED = 2**9
+"""Blocks, or cells, that are divided together."""
 
 FEWEST_PLANES, PLANES = 3, 1.6
 """Per degradation depth: at least, and times the square root of its steps, as planes err by the fourth order of their
 distance and steps by the second of theirs. Twice as many change no answer by a tenth of its error (oblique, slots)."""
 SPARE = 4
 """Planes beyond those within a laminate: one on each side, the one behind the last whole spacing, and its neighbour."""
-SIZES = (1024, 2048, 3072, 4096, 6144)
-"""Windows that blocks have [nodes]; each is compiled by itself. Two fields of float32 of the largest fill the 48 KiB of
-shared memory that a block of every CUDA device has."""
-WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
-"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
-its fine grid, large windows cost more time than the repetition of some shots."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,25 +164,6 @@ def _planes(plate: Plate, material: Materials, resolution: Resolution) -> Planes
     return Planes(math.floor(most * reach + ROUNDING) + SPARE, depth / reach, reach)
 
 
-def first_window(core: Core, shots: Shots, material: Materials, grid: Grid, *, nodal: bool) -> int:
-    """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
-    plate, or the laminate that it begins. Layers farther away have windows of their own.
-
-    Args:
-        material, grid: of the plate.
-    """
-    slack = NODAL_SLACK if nodal else WINDOW_SLACK
-    steepest, thickness = float(shots.obliquity.max()), float(material.together.max())
-    turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
-    half = slack * core.max_radius / math.cos(steepest) + thickness * math.tan(steepest) + core.bounding_radius * turned
-    return 2 * (math.ceil(half / grid.spacing) + 2 * grid.reach + 3)
-
-
-def block_window(cells: int) -> int:
-    """Nodes of the window of a block that holds so many in each direction; 0 if none does."""
-    return next((size for size in SIZES if size >= cells**2), 0)
-
-
 def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     """Material fraction about every cell of one period; cell (0, 0) has its corner at the origin.
 
@@ -195,26 +173,13 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     Raises:
         MemoryError: the tile does not fit; the message is for the user.
     """
-    return _tile(_Itself(plate.pattern), spacing, sharp)
-
-
-@dataclass(frozen=True, eq=False)
-class _Itself:
-    """A pattern that equals itself only, because the file of a mask may have changed."""
-
-    pattern: Pattern
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Itself) and self.pattern is other.pattern
-
-    def __hash__(self) -> int:
-        return id(self.pattern)
+    return _tile(Itself(plate.pattern), spacing, sharp)
 
 
 @lru_cache(maxsize=16)
-def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
+def _tile(itself: Itself[Pattern], spacing: float, sharp: bool) -> Tile:
     """The tile of a pattern, kept for later shots at the same plate."""
-    pattern = itself.pattern
+    pattern = itself.value
     period_y, period_z = pattern.period
     # An even number, so that a row staggered by half a period sees the same cells.
     step = 1 if sharp else 2
@@ -227,22 +192,58 @@ def _tile(itself: _Itself, spacing: float, sharp: bool) -> Tile:
             f"plate, {period_y:g} m x {period_z:g} m, needs {needed / 2**30:.3g} GiB in cells of {spacing:.3g} m, and "
             f"{free / 2**30:.3g} GiB are free"
         )
-    samples = 1 if sharp else SUBSAMPLES
-    within = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
-    half_diagonal, middle_z = 0.501 * math.hypot(dy, dz), (np.arange(count_z, dtype=np.float64) + 0.5) * dz
-    material, rows = np.empty((count_y, count_z)), max(1, AT_A_TIME // count_z)
-    for first in range(0, count_y, rows):
-        part = material[first : first + rows]
-        middle_y = (np.arange(first, first + len(part), dtype=np.float64)[:, None] + 0.5) * dy
-        part[:] = ~pattern.is_hole(middle_y, middle_z)
-        row, column = np.nonzero(pattern.has_edge(middle_y, middle_z, half_diagonal))
-        y, z = middle_y[row, :, None] + within[:, None] * dy, middle_z[column, None, None] + within * dz
-        part[row, column] = 1.0 - pattern.is_hole(y, z).mean(axis=(1, 2))
+    material = _fractions(pattern, (count_y, count_z), (dy, dz), 1 if sharp else SUBSAMPLES)
     if not sharp:  # no running sum: its rounding would leave material in the middle of a hole
         for axis in range(2):
             beside = sum(np.roll(material, k, axis) + np.roll(material, -k, axis) for k in range(1, BLUR // 2 + 1))
-            material = (1.0 / BLUR) * material + (1.0 / BLUR) * beside
+            material *= 1.0 / BLUR
+            material += (1.0 / BLUR) * beside
     return Tile(material, dy, dz)
+
+
+def _fractions(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Array:
+    """Material fractions of so many cells from the origin on, with these sides [m], each of samples × samples points.
+
+    Blocks of cells that no edge of a hole crosses are material or hole as a whole.
+    """
+    blocks = [-(-count // BLOCK) for count in counts]
+    first_row, first_column = (BLOCK * at.reshape(-1) for at in np.indices(blocks))
+    solid, row, column = _crossed(pattern, first_row, first_column, BLOCK, sides)
+    material = np.empty((blocks[0] * BLOCK, blocks[1] * BLOCK))
+    material.reshape(blocks[0], BLOCK, blocks[1], BLOCK)[:] = solid.reshape(blocks[0], 1, blocks[1], 1)
+    for first in range(0, len(row), CROSSED):
+        _refine(material, pattern, row[first : first + CROSSED], column[first : first + CROSSED], sides, samples)
+    return np.ascontiguousarray(material[: counts[0], : counts[1]])
+
+
+def _refine(
+    material: Array, pattern: Pattern, row: Numbers, column: Numbers, sides: tuple[float, float], samples: int
+) -> None:
+    """Fill in the blocks of cells that begin at some rows and columns: part by part, then cell by cell, then point by
+    point those cells that an edge crosses."""
+    size = BLOCK
+    while size > 1:
+        size, within = size // PARTS, np.arange(0, size, size // PARTS)
+        row, column = (row[:, None, None] + within[:, None], column[:, None, None] + within)
+        row, column = (at.reshape(-1) for at in np.broadcast_arrays(row, column))
+        inside = row[:, None, None] + np.arange(size)[:, None], column[:, None, None] + np.arange(size)
+        solid, row, column = _crossed(pattern, row, column, size, sides)
+        material[inside] = solid[:, None, None]
+    points = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
+    for first in range(0, len(row), CROSSED):
+        some = row[first : first + CROSSED], column[first : first + CROSSED]
+        y, z = (np.asarray((at + 0.5) * side) for at, side in zip(some, sides, strict=True))
+        material[some] = 1.0 - pattern.hole_share(y, z, points * sides[0], points * sides[1])
+
+
+def _crossed(
+    pattern: Pattern, row: Numbers, column: Numbers, size: int, sides: tuple[float, float]
+) -> tuple[NDArray[np.bool_], Numbers, Numbers]:
+    """Whether the middles of blocks of size × size cells are material; rows and columns of the blocks that an edge of a
+    hole may cross."""
+    y, z = (np.asarray((at + 0.5 * size) * side) for at, side in zip((row, column), sides, strict=True))
+    hole, edge = pattern.looked_at(y, z, 0.501 * size * math.hypot(*sides))
+    return ~hole, row[edge], column[edge]
 
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
@@ -257,8 +258,11 @@ def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
     behind = np.minimum.accumulate(np.where(walls, number, math.inf)[:, ::-1], axis=1)[:, ::-1]
     along = np.minimum(number - before, behind - number)[:, columns : 2 * columns] * widths[1]
     nearest = np.full((rows, columns), math.inf)
-    for shift in range(-(rows // 2), rows // 2 + 1):
-        nearest = np.minimum(nearest, np.square(shift * widths[0]) + np.square(np.roll(along, shift, axis=0)))
+    square = np.square(along)
+    for shift in sorted(range(-(rows // 2), rows // 2 + 1), key=abs):
+        if (beyond := np.square(shift * widths[0])) >= nearest.max():
+            break
+        nearest = np.minimum(nearest, beyond + np.roll(square, shift, axis=0))
     return np.asarray(np.sqrt(nearest))
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
@@ -16,8 +17,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
-from warpimpact.solver.device import cores, halving, load
-from warpimpact.solver.memory import Cells, Memory
+from warpimpact.solver.device import halving, launching, load
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
 
 Array = NDArray[np.float64]
@@ -31,6 +33,8 @@ SHARES = 3
 """Launches per thread into which the shots that are left would be divided at least."""
 CPU_LAUNCH = 0.25
 """Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
+FEWEST_CELLS = 16
+"""Along a side of the plate's window, which would hold no core if it were smaller still."""
 MAX_DOUBLINGS = 6
 """Largest number of times that the windows are doubled for the shots that left theirs."""
 
@@ -45,7 +49,7 @@ class March:
 
     def __init__(self, memory: Memory, threads: int | None = None) -> None:
         self.memory, self.at_a_plate = memory, memory.at_a_plate
-        self.threads = 1 if wp.config.enable_cpu_blocks else threads or cores()
+        self.threads = launching(threads)
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:
@@ -65,12 +69,12 @@ class March:
             wider = 2 * self.cells[0], 2 * self.cells[1]
             if not len(pending) or not self._fits(wider):
                 break
-            self._widen(wider)
+            self.widen(wider)
         outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
         reached(count)
         return outcomes
 
-    def _widen(self, cells: Cells) -> None:
+    def widen(self, cells: Cells) -> None:
         """Have wider windows; those that do not fit a block are for the simple layout."""
         self.cells, prepared = cells, self.memory.prepared
         if 0 < prepared.variant.window < math.prod(cells):
@@ -78,10 +82,16 @@ class March:
             self.memory = Memory(simple, self.memory.device)
 
     def _window_cells(self) -> Cells:
-        """Cells of a first window, or what memory allows."""
-        cells = (self.memory.prepared.cells,) * 2
+        """Cells of a first window, or what memory allows.
+
+        Raises:
+            MemoryError: windows do not fit in which a core is at all.
+        """
+        cells = first = (self.memory.prepared.cells,) * 2
         while not self._fits(cells):  # a shot that leaves a smaller window ends as LEFT_WINDOW
             cells = cells[0] // 2, cells[1] // 2
+            if min(cells) < FEWEST_CELLS:
+                raise MemoryError(self.memory.too_large(first))
         return cells
 
     def _fits(self, cells: Cells) -> bool:
@@ -122,22 +132,40 @@ class March:
         # thread is to wait long for another.
         most, begun, done = 1, 0, 0
         waiting: set[Future[tuple[int, float]]] = set()
-        with ThreadPoolExecutor(len(slots)) as pool:
-            try:
-                while done < total:
-                    while begun < total and len(waiting) < 2 * len(slots):
-                        share = max(1, (total - begun) // (SHARES * len(slots)))
-                        count = min(chunk_of(min(most, share), self.at_a_plate), total - begun)
-                        waiting.add(pool.submit(work, begun, count))
-                        begun += count
-                    ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                    for shots, seconds in (future.result() for future in ended):
-                        done += shots
-                        most = min(CPU_CHUNK, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
-                    progress(done)
-            finally:
-                for future in waiting:
-                    future.cancel()
+        alone = len(slots) == 1 and threading.current_thread() is not threading.main_thread()  # which is interrupted
+        pool = _Here() if alone else ThreadPoolExecutor(len(slots))
+        try:
+            while done < total:
+                while begun < total and len(waiting) < 2 * len(slots):
+                    share = max(1, (total - begun) // (SHARES * len(slots)))
+                    count = min(chunk_of(min(most, share), self.at_a_plate), total - begun)
+                    waiting.add(pool.submit(work, begun, count))
+                    begun += count
+                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+                for shots, seconds in (future.result() for future in ended):
+                    done += shots
+                    most = min(CPU_CHUNK, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
+                progress(done)
+        finally:  # whoever interrupts does not wait for a shot that takes a minute
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def apart(function: Callable[..., int], *arguments: Any) -> int:
+    """Call what computes without the interpreter lock on a thread of its own, so that a signal need not wait for it."""
+    pool = ThreadPoolExecutor(1)
+    try:
+        return pool.submit(function, *arguments).result()
+    finally:
+        pool.shutdown(wait=False)
+
+
+class _Here(Executor):
+    """Calls on the thread that submits them."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
+        future = Future[Any]()
+        future.set_result(function(*arguments, **named))
+        return future
 
 
 def _after(finished: int, progress: Progress1) -> Progress1:

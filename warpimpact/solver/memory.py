@@ -4,9 +4,9 @@ computed at a time, and what the kernels fill."""
 from __future__ import annotations
 
 import math
+import threading
 import time
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,40 +19,20 @@ from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import free_memory, load
-from warpimpact.solver.grid import Grid, Tile
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.rings import Rings
+from warpimpact.solver.structs import Put, plate_of, surface_of
+from warpimpact.solver.windows import Cells, windows_behind
 
 if TYPE_CHECKING:
-    from warpimpact.scene import Core
+    from warpimpact.kernels.variant import Variant
 
 Array = NDArray[np.float64]
-Cells = tuple[int, int]
-"""Of a window, along y and z."""
 
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
-
-
-DEEP = 0.6
-"""Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
-the core's surface from its centre of mass: the core arrives turned."""
-PROFILE = 128
-"""Parts of a core's length, between which its radius is linear, as its channel has it."""
 CUDA_CHUNK = 65536
 MEMORY_SHARE = 0.5
 """Share of the free memory that scratch may take."""
-
-
-@dataclass(frozen=True)
-class Put:
-    """Puts values on the named device, by default in the floating-point type `real` of the kernels."""
-
-    device: str
-    real: Any
-
-    def __call__(self, values: NDArray[Any], dtype: Any = None) -> Any:
-        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.real, device=self.device)
 
 
 class Memory:
@@ -61,7 +41,7 @@ class Memory:
     Attributes:
         prepared: what is there.
         device: where.
-        stage: the build of the march that the scene needs.
+        stage, flight: the builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
         surface, sections, target, law, shots, pace: structs of the inputs.
@@ -71,7 +51,8 @@ class Memory:
     def __init__(self, prepared: Prepared, device: Any) -> None:
         variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
         self.prepared, self.device, self.variant = prepared, device, variant
-        self.stage, self.put = march.build(variant), Put(device.alias, variant.real)
+        self.stage, self.flight = built(variant)
+        self.put = Put(device.alias, variant.real)
         self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
         self.surface = surface_of(self.stage.Surface, scene.core, prepared.rings, prepared.azimuths, self.put)
         self.target, self.sections, self.shots = self._target(prepared), self._sections(prepared), self._shots(prepared)
@@ -123,7 +104,7 @@ class Memory:
     def build(self) -> float:
         """Compile the kernels, once per version and machine, and load them; returns how long that took [s]."""
         begin = time.perf_counter()
-        for kernel in (self.stage.kernel, free_flight.build(self.variant).kernel):
+        for kernel in (self.stage.kernel, self.flight.kernel):
             load(kernel, self.device)
         return time.perf_counter() - begin
 
@@ -147,17 +128,15 @@ class Memory:
         return self.empty(self.stage.Outcomes, (len(self.prepared.shots),))
 
     def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field. A
-        layer that earlier hits pierce keeps their channels."""
-        materials, grids, scene = self.prepared.materials, self.prepared.grids, self.prepared.scene
-        steepest, own = math.tan(float(self.prepared.shots.obliquity.max())), [cells]
-        for material, grid in zip(materials[1:], grids[1:], strict=True):
-            thicker = max(0.0, float(material.together.max() - materials[0].together.max()))
-            half = 0.5 * cells[0] * grids[0].spacing + DEEP * scene.core.bounding_radius + thicker * steepest
-            count = 2 * (math.ceil(half / grid.spacing) + 2 * len(grid.taps) + 3)
-            count = count if material.weakens or self.variant.burst else 0
-            own.append((count, count))
-        return [own[material.laminate] for material in materials]
+        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        counts = self._behind(np.array(cells[:1])).max(axis=1)
+        return [(int(count), int(count)) for count in counts]
+
+    def _behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
+        """`windows_behind` of what was prepared."""
+        prepared = self.prepared
+        core, shots, materials, grids = prepared.scene.core, prepared.shots, prepared.materials, prepared.grids
+        return windows_behind(core, shots, materials, grids, plate, burst=self.variant.burst)
 
     def nodes(self, cells: Cells) -> list[int]:
         """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""
@@ -192,19 +171,47 @@ class Memory:
 
     def slots(self, cells: Cells, threads: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
+        count, nodes = self.at_a_plate, max(sum(self.nodes(cells)), self._pierced(cells))
+        wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
+        return min(
+            wanted, int(MEMORY_SHARE * self._free / self.slot_bytes(cells)), (2**31 - 1) // (count * max(nodes, 1))
+        )
+
+    def too_large(self, cells: Cells) -> str:
+        """Why there is no slot, if the plate's window has so many cells."""
+        windows = [
+            f"{place}: {y} × {z} nodes" + (f" in {grid.planes.number} planes" if grid.planes.number > 1 else "")
+            for (place, _), grid, (y, z) in zip(
+                self.prepared.scene.target.named, self.prepared.grids, self.windows(cells), strict=True
+            )
+        ]
+        return (
+            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its "
+            f"way through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
+            "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
+        )
+
+    @property
+    def _free(self) -> int:
+        """Bytes."""
+        return free_memory() if self.device.is_cpu else int(self.device.free_memory)
+
+    def _pierced(self, cells: Cells) -> int:
+        """Nodes of a slot in the channels of earlier hits."""
+        return sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
+
+    def slot_bytes(self, cells: Cells) -> int:
+        """Memory of a slot of scratch [bytes]."""
         count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
-        earlier, pierced = 0, sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
+        earlier = 0
         if self.variant.burst:
             each = count * layers * wp.types.type_size_in_bytes(self.stage.Box) + count * layers * 18
             sections = sum(earlier_hits.planes(self.prepared)) * wp.types.type_size_in_bytes(self.stage.Section)
-            earlier = (count * nodes + (1 + count) * pierced) * size + each + sections
+            earlier = (count * nodes + (1 + count) * self._pierced(cells)) * size + each + sections
         patches = self._patches * (8 * size + 3 * 4)
-        slot = len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring
-        free = free_memory() if self.device.is_cpu else self.device.free_memory
-        wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
-        return min(wanted, int(MEMORY_SHARE * free / slot), (2**31 - 1) // (count * max(nodes, pierced)))
+        return int(len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring)
 
     def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
@@ -229,7 +236,9 @@ class Memory:
         if self.variant.burst:
             windows = self.windows(cells)
             earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
-        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,))
+        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
+        if self.variant.layered:
+            stack.own_cells = put(self._behind(self.prepared.first_cells), wp.int32)
         return fields, touches, stack, earlier
 
     def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:
@@ -249,7 +258,7 @@ class Memory:
     def report(self, contact: Any) -> Returned:
         """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
         scene, count = self.prepared.scene, len(self.prepared.shots)
-        flight, standoffs = free_flight.build(self.variant), np.array(scene.record.standoffs, dtype=np.float64)
+        flight, standoffs = self.flight, np.array(scene.record.standoffs, dtype=np.float64)
         report = self.empty(flight.Report, (count,), (count, len(standoffs)))
         load(flight.kernel, self.device)
         ahead = scene.record.ahead(scene.core)
@@ -259,55 +268,10 @@ class Memory:
         return Returned(status, contact, report, self.bending.numpy(), self.passage, self.free)
 
 
-def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
-    """The Surface (kernels/core_surface.py) of a core in rings of patches."""
-    surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
-    azimuth = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
-    values = {name: getattr(rings, name) for name in _OF_A_RING} | {
-        "area": area,
-        "normal_axial": rings.area_axial / area,
-        "normal_radial": rings.area_radial / area,
-        "cosine": np.cos(azimuth),
-        "sine": np.sin(azimuth),
-    }
-    values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
-    values["profile"] = core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1))
-    for name, array in values.items():
-        setattr(surface, name, put(array))
-    surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
-    surface.rings, surface.around = len(area), around
-    surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
-    return surface
+_BUILDING = threading.Lock()
 
 
-_OF_A_PATCH = (
-    "station",
-    "radius",
-    "area",
-    "normal_axial",
-    "normal_radial",
-    "half_axial",
-    "half_radial",
-    "turn_axial",
-    "turn_radial",
-)
-_OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
-
-
-def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
-    """The Plate (kernels/plate_grid.py) of a grid."""
-    plate = struct()
-    plate.tile, plate.clear = _on_device(grid.tile, put)
-    plate.tile_y, plate.tile_z = grid.tile.material.shape
-    plate.period_y, plate.period_z = grid.period
-    plate.half_y, plate.half_z = grid.half_size
-    plate.spacing = grid.spacing
-    plate.taps, plate.reach = put(grid.taps), grid.reach
-    plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
-    return plate
-
-
-@lru_cache(maxsize=16)
-def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
-    """Material and clearance of a tile. No kernel changes them, so they are kept for later shots at the same plate."""
-    return put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))
+def built(variant: Variant) -> tuple[Any, Any]:
+    """The builds of the march and of the free flight for a variant: one each, whichever threads ask for it."""
+    with _BUILDING:
+        return march.build(variant), free_flight.build(variant)

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
-from warpimpact.solver.grid import Grid, block_window, first_window, grids_of
+from warpimpact.solver.grid import Grid, grids_of
 from warpimpact.solver.materials import Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, resolve
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
+from warpimpact.solver.windows import block_window, first_windows
 
 if TYPE_CHECKING:
     from warpimpact.scene import Numerics, Scene, Shots
@@ -36,7 +37,8 @@ class Prepared:
         grids: the plate, and the layers behind it.
         materials: of the plate, and of the layers behind it.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
-        cells: nodes of a first window, in each direction.
+        first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
+            [shots].
         rows: of the trace of each shot; 0 for none.
     """
 
@@ -50,13 +52,18 @@ class Prepared:
     grids: list[Grid]
     materials: list[Materials]
     conditions: dict[str, Array]
-    cells: int
+    first_cells: NDArray[np.int64]
     rows: int = 0
 
     @property
     def grid(self) -> Grid:
         """The plate."""
         return self.grids[0]
+
+    @property
+    def cells(self) -> int:
+        """Nodes of a first window of the plate, in each direction, that serves all shots."""
+        return int(self.first_cells.max())
 
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
@@ -94,7 +101,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.
     deep |= not simple and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
     grids = grids_of(target.layers, materials, resolution, deep=deep)
-    cells = first_window(core, shots, materials[0], grids[0], nodal=resolution.nodal)
+    first_cells = first_windows(core, shots, materials[0], grids[0], nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,
         nodal=resolution.nodal,
@@ -106,7 +113,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         layered=len(plates) > 1,
         deep=deep,
         burst=burst,  # also of one shot, as a replay of the first one of several is
-        window=block_window(cells) if resolution.block else 0,
+        window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
     axial, around = resolution.patches_axial, resolution.patches_around
     rings = rings_of(core, axial, around, resolution.patch_width, discs=not resolution.nodal)
@@ -121,5 +128,5 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         grids=grids,
         materials=materials,
         conditions=conditions,
-        cells=cells,
+        first_cells=first_cells,
     )

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
+from warpimpact.solver.itself import Itself
 
 Array = NDArray[np.float64]
 
@@ -22,9 +24,10 @@ THINNEST = 0.5
 nose, and beam theory does not hold within a diameter of a load."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rings:
-    """Rings of patches from nose to base; arrays of shape [rings], SI (see kernels/core_surface.py)."""
+    """Rings of patches from nose to base; arrays of shape [rings], SI (see kernels/core_surface.py). A core has one
+    such object for the same patches."""
 
     station: Array
     radius: Array
@@ -67,16 +70,22 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
     Each patch carries its exact vector area (that of the true surface, not of a flat facet), so the areas of the
     closed surface sum to zero and the work of a straight shot is exact (docs/model.md §6.1).
     """
-    if discs:
-        nose, base = (float(r) for r in core.radius(np.array([0.0, core.length])))
-        across = min(widest, core.length / axial)
-        parts = [
-            _disc_rings(0.0, nose, across, facing=1.0),
-            _profile_rings(core, _divided(core, _stations(core, axial), widest)),
-            _disc_rings(core.length, base, across, facing=-1.0),
-        ]
-    else:
-        parts = [_profile_rings(core, np.linspace(0.0, core.length, axial + 1))]
+    if not discs:
+        return _rings(Itself(core), np.linspace(0.0, core.length, axial + 1).tobytes(), 0, 0, around)
+    edges, (nose, base), across = _stations(Itself(core), axial), _ends(Itself(core)), min(widest, core.length / axial)
+    divided = _divided(core, edges, widest)
+    return _rings(Itself(core), divided.tobytes(), _discs(nose, across), _discs(base, across), around)
+
+
+@lru_cache(maxsize=64)
+def _rings(itself: Itself[Core], edges: bytes, nose: int, base: int, around: int) -> Rings:
+    """Rings between some edges of the profile, and so many of the discs at the nose and at the base."""
+    core = itself.value
+    parts = [
+        _disc_rings(0.0, _ends(itself)[0], nose, facing=1.0),
+        _profile_rings(core, np.frombuffer(edges)),
+        _disc_rings(core.length, _ends(itself)[1], base, facing=-1.0),
+    ]
     s, r, axial_area, radial_area, half_s, half_r, turn_s, turn_r = (
         np.concatenate(column) for column in zip(*parts, strict=True)
     )
@@ -94,9 +103,18 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
     )
 
 
-def _stations(core: Core, count: int) -> Array:
+@lru_cache(maxsize=16)
+def _ends(itself: Itself[Core]) -> tuple[float, float]:
+    """Radii of a core at its nose and its base [m]."""
+    nose, base = itself.value.radius(np.array([0.0, itself.value.length]))
+    return float(nose), float(base)
+
+
+@lru_cache(maxsize=16)
+def _stations(itself: Itself[Core], count: int) -> Array:
     """Edges of the profile's rings: length/count apart ahead of the widest station, BEHIND times this distance behind
     it. The widest station is an edge. Jumps of the slope are edges, too, if they are fewer than `count`."""
+    core = itself.value
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
     inner = np.unique([*breaks, widest])
     apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length
@@ -157,9 +175,13 @@ def _normals(core: Core, stations: Array, step: Array) -> Array:
     return np.stack([slope, np.ones_like(slope)]) / np.hypot(slope, 1.0)
 
 
-def _disc_rings(station: float, radius: float, widest: float, *, facing: float) -> tuple[Array, ...]:
-    """As `_profile_rings`, for a disc that faces along the axis (+1 towards the nose)."""
-    count = int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # below that it is a point
+def _discs(radius: float, widest: float) -> int:
+    """Rings of a disc that are no wider than that radially [m]."""
+    return int(np.ceil(radius / widest)) if radius > 1e-6 * widest else 0  # below that it is a point
+
+
+def _disc_rings(station: float, radius: float, count: int, *, facing: float) -> tuple[Array, ...]:
+    """As `_profile_rings`, for a disc in so many rings that faces along the axis (+1 towards the nose)."""
     edges = np.linspace(0.0, radius, count + 1)
     low, high = edges[:-1], edges[1:]
     nothing = np.zeros(count)

@@ -11,8 +11,9 @@ class Cancelled(Exception):
 class Cancel:
     """Passed down to the march, which looks at it between two launches of a kernel."""
 
-    def __init__(self) -> None:
-        self._asked = threading.Event()
+    def __init__(self, outer: "Cancel | None" = None) -> None:
+        """A token that is cancelled with an outer one, too."""
+        self._asked, self._outer = threading.Event(), outer
 
     def cancel(self) -> None:
         """End what was given this token."""
@@ -21,11 +22,11 @@ class Cancel:
     @property
     def cancelled(self) -> bool:
         """Whether it was cancelled."""
-        return self._asked.is_set()
+        return self._asked.is_set() or (self._outer is not None and self._outer.cancelled)
 
     def check(self) -> None:
         """Raise Cancelled if it was cancelled."""
-        if self._asked.is_set():
+        if self.cancelled:
             raise Cancelled
 
 

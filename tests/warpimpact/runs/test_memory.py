@@ -13,7 +13,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import files
 from warpimpact.results.variables import EXIT_VARIABLES
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene import Numerics
+from warpimpact.scene import Layer, Numerics, Target
 from warpimpact.solver import device, replay, simulate
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.replay import material_about
@@ -71,7 +71,9 @@ def test_scratch_is_halved_until_it_can_be_had() -> None:
     assert device.halving(1000, allocate) == (62, "62 slots")
 
 
-@pytest.mark.parametrize("error", [RuntimeError("Failed to allocate 8 bytes"), MemoryError(), RuntimeError("other")])
+@pytest.mark.parametrize(
+    "error", [RuntimeError("Failed to allocate 8 bytes"), MemoryError("full"), RuntimeError("other")]
+)
 def test_what_halving_cannot_cure_is_told(error: Exception) -> None:
     asked = []
 
@@ -79,9 +81,10 @@ def test_what_halving_cannot_cure_is_told(error: Exception) -> None:
         asked.append(slots)
         raise error
 
-    with pytest.raises(type(error)):
+    cured = str(error) != "other"
+    with pytest.raises(MemoryError if cured else RuntimeError, match=str(error)):
         device.halving(8, allocate)
-    assert asked == ([8] if str(error) == "other" else [8, 4, 2, 1])
+    assert asked == ([8, 4, 2, 1] if cured else [8])
 
 
 def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -105,6 +108,14 @@ def test_a_failing_allocation_changes_no_bit(campaign: Campaign, monkeypatch: py
     assert granted >= 5  # 4 slots fail at the second, 2 at the second, 1 does not; wider windows come after these
     assert np.array_equal(plenty.residual_velocity, little.residual_velocity)
     assert np.array_equal(plenty.tilt, little.tilt)
+
+
+def test_windows_that_do_not_fit_are_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    base = Layer(**campaign.plate.model_dump() | {"thickness": 0.2}, gap=0.0)  # wide, however narrow the plate's is
+    scene = campaign.scene.model_copy(update={"target": Target(layers=(campaign.plate, base))})
+    monkeypatch.setattr("warpimpact.solver.memory.free_memory", lambda: 2**20)
+    with pytest.raises(MemoryError, match=r"needs .* GiB in .* nodes .*layer\[0\]: \d+ × \d+ nodes in \d+ planes"):
+        simulate.simulate(scene, campaign.sampler().shots(0, 1), numerics=Numerics(level=0), device="cpu")
 
 
 def test_a_replay_that_does_not_fit_is_refused(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """How shots are dealt out to the threads of a CPU."""
 
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import pytest
@@ -31,3 +32,25 @@ def test_launches_begin_and_end_with_single_shots(hits: int, threads: int, monke
     assert max(first_windows) > 1
     assert first_windows[: 2 * threads] == [1] * 2 * threads
     assert first_windows[-threads:] == [1] * threads
+
+
+def test_an_interrupt_does_not_wait_for_a_long_shot(monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign, launch, over = Campaign.from_toml(CAMPAIGN), Memory.launch, Event()
+    begun, ended = list[int](), list[int]()
+
+    def slow(self: Memory, *arguments: Any) -> int:
+        begun.append(1)
+        if len(begun) == 2:
+            over.wait(30.0)
+            ended.append(2)
+        return launch(self, *arguments)
+
+    def interrupt(done: int, total: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Memory, "launch", slow)
+    shots = campaign.sampler().shots(0, 8)
+    with pytest.raises(KeyboardInterrupt):
+        simulate(campaign.scene, shots, numerics=Numerics(level=0), device="cpu", threads=2, progress=interrupt)
+    assert not ended
+    over.set()

@@ -39,22 +39,28 @@ def test_tile_has_the_plate_s_share_of_material(pattern: Any) -> None:
     np.testing.assert_allclose(extent, pattern.period, rtol=1e-12)
 
 
-def test_tile_looks_closely_only_where_edges_are_and_misses_none() -> None:
-    holes = [["0 mm", "0 mm", "20 deg"], ["6 mm", "3 mm", "-70 deg"]]
-    hairlines = SlotPattern(length="6 mm", width="0.05 mm", spacing=["12 mm", "8 mm"], holes=holes)
-    plate = PLATE.model_copy(update={"pattern": hairlines})
-    tile = tile_of(plate, 0.25e-3)
+HAIRLINES = SlotPattern(
+    length="6 mm",
+    width="0.05 mm",
+    spacing=["12 mm", "8 mm"],
+    holes=[["0 mm", "0 mm", "20 deg"], ["6 mm", "3 mm", "-70 deg"]],
+)
+
+
+@pytest.mark.parametrize(("pattern", "spacing"), [(HAIRLINES, 0.25e-3), (PATTERNS[0], 0.05e-3), (PATTERNS[1], 0.03e-3)])
+def test_tile_looks_closely_only_where_edges_are_and_misses_none(pattern: Any, spacing: float) -> None:
+    tile = tile_of(PLATE.model_copy(update={"pattern": pattern}), spacing)
     samples = SUBSAMPLES
     y, z = (
         (np.arange(samples * n) + 0.5) * d / samples
         for n, d in zip(tile.material.shape, (tile.dy, tile.dz), strict=True)
     )
-    solid = ~hairlines.is_hole(y[:, None], z)
+    solid = ~pattern.is_hole(y[:, None], z)
     sharp = solid.reshape(tile.material.shape[0], samples, -1, samples).mean(axis=(1, 3))
     shares = ndimage.uniform_filter(sharp, BLUR, mode="wrap")
     np.testing.assert_allclose(tile.material, shares, rtol=0, atol=1.5 / samples**2)  # rounding decides on edges
     assert (~np.isclose(tile.material, shares)).mean() < 1e-2
-    assert 0.0 < 1.0 - tile.material.mean() < 0.01
+    assert tile.material.mean() == pytest.approx(1.0 - pattern.open_area, abs=0.01)
 
 
 def test_tile_is_kept_for_the_next_shots_but_not_for_another_mask_of_the_same_name(tmp_path: Path) -> None:

@@ -80,6 +80,13 @@ class LatticePattern(Pattern):
         return area(self.spine, self.rounding)
 
     @property
+    def hole_size(self) -> tuple[float, float]:
+        """Diameter of the largest circle in a hole, about its place, and greatest extent of a hole [m]."""
+        apart = np.linalg.norm(self.spine[:, None] - self.spine[None], axis=-1).max()
+        inside = float(self._depth(np.zeros(1), np.zeros(1))[0])
+        return 2.0 * inside, float(apart) + 2.0 * self.rounding
+
+    @property
     def _marks(self) -> Array:
         """Points, shape [marks, 2] [m]. Two holes of the shape are the same if their marks are the same."""
         return self.spine
@@ -149,17 +156,42 @@ class LatticePattern(Pattern):
         return inside
 
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
-        nearby: BoolArray = ~(np.abs(self._deepest(y, z)) > reach)
-        return nearby if reach <= self._sight else np.ones_like(nearby)
+        return self.looked_at(y, z, reach)[1]
+
+    def looked_at(self, y: Array, z: Array, reach: float) -> tuple[BoolArray, BoolArray]:
+        deepest = self._deepest(y, z)
+        nearby: BoolArray = ~(np.abs(deepest) > reach)
+        return deepest >= 0, nearby if reach <= self._sight else np.ones_like(nearby)
+
+    def hole_share(self, y: Array, z: Array, from_y: Array, from_z: Array) -> Array:
+        """Holes in which the points lie are in sight of their middle."""
+        if np.hypot(np.abs(from_y).max(), np.abs(from_z).max()) > self._sight:
+            return super().hole_share(y, z, from_y, from_z)
+        (far_y, far_z), cell = self._homes(y, z)
+        points_y, points_z = (y[:, None] + from_y) - far_y[:, None], (z[:, None] + from_z) - far_z[:, None]
+        inside = np.zeros((len(y), len(from_y), len(from_z)), dtype=bool)
+        for hole_y, hole_z, cosine, sine in self._bins[1]:
+            some = np.flatnonzero(~np.isnan(hole_y[cell]))
+            at = cell[some, None]
+            beside_y, beside_z = (points_y[some] - hole_y[at])[:, :, None], (points_z[some] - hole_z[at])[:, None]
+            turn = cosine[at, None], sine[at, None]
+            along_y, along_z = turn[0] * beside_y + turn[1] * beside_z, turn[0] * beside_z - turn[1] * beside_y
+            inside[some] |= self._depth(along_y, along_z) >= 0
+        share: Array = inside.mean(axis=(1, 2))
+        return share
+
+    def _homes(self, y: Array, z: Array) -> tuple[tuple[Array, Array], NDArray[np.int64]]:
+        """How far points are from the period about the origin [m], and the bins that they have there."""
+        (period_y, period_z), (count_y, count_z) = self.period, self._bins[0]
+        far_y, far_z = period_y * np.round(y / period_y), period_z * np.round(z / period_z)
+        cell = _bin(y - far_y, period_y, count_y) * count_z + _bin(z - far_z, period_z, count_z)
+        return (far_y, far_z), cell
 
     def _deepest(self, y: Array, z: Array) -> Array:
         """Depth of points inside a hole [m]; negative outside, −inf where no hole is in sight."""
-        (count_y, count_z), near = self._bins
-        period_y, period_z = self.period
-        y, z = y - period_y * np.round(y / period_y), z - period_z * np.round(z / period_z)
-        cell = _bin(y, period_y, count_y) * count_z + _bin(z, period_z, count_z)
-        deepest = np.full(cell.shape, -np.inf)
-        for hole_y, hole_z, cosine, sine in near:
+        (far_y, far_z), cell = self._homes(y, z)
+        y, z, deepest = y - far_y, z - far_z, np.full(cell.shape, -np.inf)
+        for hole_y, hole_z, cosine, sine in self._bins[1]:
             from_y, from_z = y - hole_y[cell], z - hole_z[cell]
             along_y = cosine[cell] * from_y + sine[cell] * from_z
             along_z = cosine[cell] * from_z - sine[cell] * from_y

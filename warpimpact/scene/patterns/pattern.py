@@ -56,6 +56,16 @@ class Pattern(Model, ABC):
         """
         return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
+    def looked_at(self, y: Array, z: Array, reach: float) -> tuple[BoolArray, BoolArray]:
+        """`is_hole` and `has_edge` of the same points."""
+        return self.is_hole(y, z), self.has_edge(y, z, reach)
+
+    def hole_share(self, y: Array, z: Array, from_y: Array, from_z: Array) -> Array:
+        """Share of points that lie in a hole, about middles y, z [m] of shape [middles]: those at all `from_y` and
+        `from_z` from them [m]."""
+        share: Array = self.is_hole(y[:, None, None] + from_y[:, None], z[:, None, None] + from_z).mean(axis=(1, 2))
+        return share
+
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
         inf where there is none. The chords of an outline lie within 0.13 % of the radius of its arcs."""

@@ -31,13 +31,16 @@ def distance(spine: Array, y: Array, z: Array) -> Array:
     Mirrored points have the same distance from a mirrored spine, to the bit.
     """
     ends = list(zip(spine, np.roll(spine, -1, axis=0), strict=True))
-    nearest, within = np.array(np.inf), np.array(len(spine) > 2)
+    nearest, within = np.array(np.inf), np.array(True)
     for start, end in ends[: 1 if len(ends) < 3 else None]:
         half = 0.5 * float(np.hypot(*(end - start)))
         along_y, along_z = (end - start) / (2.0 * half) if half > 0.0 else np.zeros(2)
         from_y, from_z = y - 0.5 * (start[0] + end[0]), z - 0.5 * (start[1] + end[1])
         along = np.clip(from_y * along_y + from_z * along_z, -half, half)
-        nearest = np.minimum(nearest, np.hypot(from_y - along * along_y, from_z - along * along_z))
+        apart = np.hypot(from_y - along * along_y, from_z - along * along_z)
+        if len(spine) < 3:
+            return np.asarray(apart)
+        nearest = np.minimum(nearest, apart)
         within = within & (from_z * along_y - from_y * along_z > 0.0)
     return np.where(within, -nearest, nearest)
 

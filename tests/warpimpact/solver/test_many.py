@@ -1,0 +1,54 @@
+"""Shots at many scenes give the outcomes of each alone."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign, Numerics, Scene, Shots, simulate
+from warpimpact.solver.many import simulate_many
+from warpimpact.solver.worker import Cancel, Cancelled, Worker
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+LEVEL = Numerics(level=0)
+
+
+def scenes_of(*names: str, hits: int) -> list[tuple[Scene, Shots]]:
+    campaigns = [Campaign.from_toml(CAMPAIGNS / f"{name}.toml") for name in names]
+    return [(one.scene, one.sampler().shots(0, hits + k)) for k, one in enumerate(campaigns)]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_outcomes_are_those_of_each_scene_alone(threads: int) -> None:
+    scenes, told = scenes_of("slotted_plate", "round_holes", "layered_target", "slotted_plate", hits=5), []
+    many = simulate_many(scenes, LEVEL, Worker("cpu", threads), lambda *now: told.append(now))
+    for found, (scene, shots) in zip(many, scenes, strict=True):
+        alone = simulate(scene, shots, numerics=LEVEL, device="cpu", threads=1)
+        assert vars(found).keys() == vars(alone).keys()
+        for name, values in vars(alone).items():
+            assert np.array_equal(getattr(found, name), values, equal_nan=values.dtype.kind == "f"), name
+    total = sum(len(shots) for _, shots in scenes)
+    assert told[-1] == (total, total)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+def test_no_scene_needs_no_thread() -> None:
+    assert simulate_many([], LEVEL, Worker("cpu")) == []
+
+
+def test_an_error_of_a_scene_ends_the_others() -> None:
+    scenes = scenes_of("slotted_plate", "round_holes", hits=4)
+    with pytest.raises(ValueError, match="give a level"):
+        simulate_many(scenes, Numerics(), Worker("cpu", 2))
+
+
+def test_a_cancelled_computation_ends() -> None:
+    cancel = Cancel()
+    with pytest.raises(Cancelled):
+        simulate_many(
+            scenes_of("slotted_plate", "round_holes", hits=64),
+            LEVEL,
+            Worker("cpu", 2, cancel),
+            lambda *_: cancel.cancel(),
+        )
+    assert cancel.cancelled

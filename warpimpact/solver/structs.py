@@ -1,0 +1,95 @@
+"""Structs of the kernels that hold a core's surface and a plate, on a device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpimpact.solver.itself import Itself
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Core
+    from warpimpact.solver.grid import Grid, Tile
+    from warpimpact.solver.rings import Rings
+
+Array = NDArray[np.float64]
+
+PROFILE = 128
+"""Parts of a core's length, between which its radius is linear, as its channel has it."""
+
+
+@dataclass(frozen=True)
+class Put:
+    """Puts values on the named device, by default in the floating-point type `real` of the kernels."""
+
+    device: str
+    real: Any
+
+    def __call__(self, values: NDArray[Any], dtype: Any = None) -> Any:
+        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.real, device=self.device)
+
+
+def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
+    """The Surface (kernels/core_surface.py) of a core in rings of patches."""
+    return _surface(struct, Itself(core), rings, azimuths.tobytes(), put)
+
+
+@lru_cache(maxsize=64)
+def _surface(struct: Any, itself: Itself[Core], rings: Rings, azimuth: bytes, put: Put) -> Any:
+    """No kernel changes it, so it is kept for later shots with the same core."""
+    core, azimuths = itself.value, np.frombuffer(azimuth)
+    surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
+    azimuth_of = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
+    values = {name: getattr(rings, name) for name in _OF_A_RING} | {
+        "area": area,
+        "normal_axial": rings.area_axial / area,
+        "normal_radial": rings.area_radial / area,
+        "cosine": np.cos(azimuth_of),
+        "sine": np.sin(azimuth_of),
+    }
+    values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
+    values["profile"] = core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1))
+    for name, array in values.items():
+        setattr(surface, name, put(array))
+    surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
+    surface.rings, surface.around = len(area), around
+    surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
+    return surface
+
+
+_OF_A_PATCH = (
+    "station",
+    "radius",
+    "area",
+    "normal_axial",
+    "normal_radial",
+    "half_axial",
+    "half_radial",
+    "turn_axial",
+    "turn_radial",
+)
+_OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
+
+
+def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
+    """The Plate (kernels/plate_grid.py) of a grid."""
+    plate = struct()
+    plate.tile, plate.clear = _on_device(grid.tile, put)
+    plate.tile_y, plate.tile_z = grid.tile.material.shape
+    plate.period_y, plate.period_z = grid.period
+    plate.half_y, plate.half_z = grid.half_size
+    plate.spacing = grid.spacing
+    plate.taps, plate.reach = put(grid.taps), grid.reach
+    plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
+    return plate
+
+
+@lru_cache(maxsize=16)
+def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
+    """Material and clearance of a tile. No kernel changes them, so they are kept for later shots at the same plate."""
+    return put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))
