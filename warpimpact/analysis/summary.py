@@ -16,7 +16,7 @@ from warpimpact.analysis.survival import by_draws, draws_note, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
-from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, numerics_of
+from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, shift_of
 from warpimpact.scene.display import STORED
 from warpimpact.solver.pilot_text import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -170,7 +170,7 @@ def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 
             if v.POSTERIOR_DRAW in dataset:
                 values.append(tally.measure.values(part))
     pair = finer_pair(dataset[[name for name in (v.STATUS, *MEASURED, *v.GROUPS["finer"]) if name in dataset]])
-    found = {tally.measure: replace(tally.estimate(), numerics=numerics_of(tally.measure, pair)) for tally in tallies}
+    found = {tally.measure: replace(tally.estimate(), numerics=shift_of(tally.measure, pair)) for tally in tallies}
     if v.POSTERIOR_DRAW not in dataset:
         return found
     return {

@@ -212,7 +212,7 @@ class Tally:
         return self._dealt.estimate().within(self.measure.least)
 
 
-def numerics_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
+def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
     """How far the numerics may shift a measure, by hits of a result at two levels (`finer_pair`); None without them."""
     if levels is None or measure.variable in v.LIMIT_VARIABLES:
         return None

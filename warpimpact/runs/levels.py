@@ -8,7 +8,7 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import to_table
-from warpimpact.results.measures import Measure, numerics_of
+from warpimpact.results.measures import Measure, shift_of
 from warpimpact.results.table import Table
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import HitErrors
@@ -35,7 +35,7 @@ def excess_of_stop(campaign: Campaign) -> Excess | None:
 
     def excess(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
         levels = _table(campaign, shots, coarse), _table(campaign, shots, fine)
-        shift = numerics_of(measure, levels, rule.confidence)
+        shift = shift_of(measure, levels, rule.confidence)
         return math.inf if shift is None or math.isnan(shift) else shift / allowed
 
     return excess
@@ -50,7 +50,7 @@ def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, t
     for at, *outcomes in found.tried:
         levels = [_table(campaign, pilot[: len(one)], one) for one in outcomes]
         assert at.numerics.level is not None
-        found_at[at.numerics.level] = tuple(numerics_of(one, (levels[0], levels[1])) or 0.0 for one in measures)
+        found_at[at.numerics.level] = tuple(shift_of(one, (levels[0], levels[1])) or 0.0 for one in measures)
     return found_at
 
 

@@ -18,9 +18,11 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed, finer_pair, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.interrupts import stop_if_asked
-from warpimpact.results.measures import Measure, Tally, numerics_of
+from warpimpact.results.measures import Measure, Tally, shift_of
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
+from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.foreseen import Cost
 from warpimpact.runs.levels import OF_THE_NUMERICS
 from warpimpact.runs.progress import Follow, RunProgress, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manifest
@@ -28,6 +30,7 @@ from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
 from warpimpact.solver.findings import Found
+from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
 from warpimpact.statistics.intervals import Dealing
 from warpimpact.statistics.stopping import looks
@@ -140,16 +143,19 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
     there = sorted(shards.there())
     for index in there:
         watch.add(index, shards.shard(index))
-    watch.resumed = watch.done
+    watch.resumed, cost = watch.done, Cost(campaign, team.made_by[attr.DEVICE])
     if 0 in there:  # it holds what the pilot found, and its hits at a finer level
         watch.found = computation.found_in(shards.shard(0))
     else:
 
         def tick() -> None:
             team.width()  # tells of a cluster that has lost its workers
-            follow(replace(watch.progress(0), piloting=True, trying=team.trying()))
+            if (trying := team.trying()) is not None:
+                cost.tell(at_level(trying, campaign.numerics))
+            follow(replace(watch.progress(0), piloting=True, trying=trying))
 
         watch.found = awaited(team.pilot(), _REPORT_EVERY, tick)
+    cost.tell(numerics_of(campaign, watch.found))
     tasks = _tasks(shards, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
     waiting: dict[Future[Table], range] = {}
     try:
@@ -264,7 +270,7 @@ class _Watch:
         if self._rule is not None:
             self._stop.add(shard)
             if self._next == 1:
-                self._shift = numerics_of(self._rule.measure, finer_pair(shard), self._rule.confidence)
+                self._shift = shift_of(self._rule.measure, finer_pair(shard), self._rule.confidence)
             stop = self._looked_at()
         if self._next == self._shards or stop:
             self.end = _End(self._next, self._hits, self._time, stop)
