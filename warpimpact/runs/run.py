@@ -21,12 +21,15 @@ from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
+from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.foreseen import Cost
 from warpimpact.runs.progress import Follow, RunProgress, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manifest
 from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
 from warpimpact.solver.pilot import Found
+from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import Cancel
 from warpimpact.statistics.intervals import Dealing
 from warpimpact.statistics.stopping import looks
@@ -139,16 +142,19 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
     there = sorted(shards.there())
     for index in there:
         watch.add(index, shards.shard(index))
-    watch.resumed = watch.done
+    watch.resumed, cost = watch.done, Cost(campaign, team.made_by[attr.DEVICE])
     if there:
         watch.found = computation.found_in(shards.shard(there[0]))
     else:
 
         def tick() -> None:
             team.width()  # tells of a cluster that has lost its workers
-            follow(replace(watch.progress(0), piloting=True, trying=team.trying()))
+            if (trying := team.trying()) is not None:
+                cost.tell(at_level(trying, campaign.numerics))
+            follow(replace(watch.progress(0), piloting=True, trying=trying))
 
         watch.found = awaited(team.pilot(), _REPORT_EVERY, tick)
+    cost.tell(numerics_of(campaign, watch.found))
     tasks = _tasks(shards, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
     waiting: dict[Future[Table], range] = {}
     try:

@@ -3,7 +3,6 @@ computed at a time, and what the kernels fill."""
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from functools import partial
@@ -21,7 +20,7 @@ from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, plate_of, surface_of
-from warpimpact.solver.windows import Cells, windows_behind
+from warpimpact.solver.windows import Cells
 
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
@@ -127,30 +126,9 @@ class Memory:
         """Room for the outcomes of all shots."""
         return self.empty(self.stage.Outcomes, (len(self.prepared.shots),))
 
-    def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
-        counts = self._behind(np.array(cells[:1])).max(axis=1)
-        return [(int(count), int(count)) for count in counts]
-
-    def _behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
-        """`windows_behind` of what was prepared."""
-        prepared = self.prepared
-        core, shots, materials, grids = prepared.scene.core, prepared.shots, prepared.materials, prepared.grids
-        return windows_behind(core, shots, materials, grids, plate, burst=self.variant.burst)
-
-    def nodes(self, cells: Cells) -> list[int]:
-        """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""
-        prepared = self.prepared
-        return [
-            grid.planes.number * math.prod(own) if material.laminate == k else 0
-            for k, (material, grid, own) in enumerate(
-                zip(prepared.materials, prepared.grids, self.windows(cells), strict=True)
-            )
-        ]
-
     def firsts(self, cells: Cells) -> NDArray[np.int64]:
         """The first node of every layer's field among those of its slot."""
-        before = np.cumsum([0, *self.nodes(cells)[:-1]])
+        before = np.cumsum([0, *self.prepared.nodes(cells)[:-1]])
         return np.asarray(before[[material.laminate for material in self.prepared.materials]])
 
     @property
@@ -171,7 +149,7 @@ class Memory:
 
     def slots(self, cells: Cells, threads: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
-        count, nodes = self.at_a_plate, max(sum(self.nodes(cells)), self._pierced(cells))
+        count, nodes = self.at_a_plate, max(sum(self.prepared.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
         return min(
             wanted, int(MEMORY_SHARE * self._free / self.slot_bytes(cells)), (2**31 - 1) // (count * max(nodes, 1))
@@ -179,15 +157,16 @@ class Memory:
 
     def too_large(self, cells: Cells) -> str:
         """Why there is no slot, if the plate's window has so many cells."""
+        prepared = self.prepared
         windows = [
             f"{place}: {y} × {z} nodes" + (f" in {grid.planes.number} planes" if grid.planes.number > 1 else "")
             for (place, _), grid, (y, z) in zip(
-                self.prepared.scene.target.named, self.prepared.grids, self.windows(cells), strict=True
+                prepared.scene.target.named, prepared.grids, prepared.windows(cells), strict=True
             )
         ]
         return (
-            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its "
-            f"way through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
+            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(prepared.nodes(cells)):.3g} nodes about "
+            f"its way through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
             "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
         )
 
@@ -198,11 +177,11 @@ class Memory:
 
     def _pierced(self, cells: Cells) -> int:
         """Nodes of a slot in the channels of earlier hits."""
-        return sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
+        return sum(earlier_hits.channel_nodes(self.prepared, self.prepared.windows(cells)))
 
     def slot_bytes(self, cells: Cells) -> int:
         """Memory of a slot of scratch [bytes]."""
-        count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
+        count, nodes, layers = self.at_a_plate, sum(self.prepared.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         earlier = 0
@@ -215,11 +194,11 @@ class Memory:
 
     def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
-        stage, put, nodes = self.stage, self.put, self.nodes(cells)
+        stage, put, nodes = self.stage, self.put, self.prepared.nodes(cells)
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         fields, touches = stage.Fields(), stage.Touches()
         fields.nodes, fields.first = sum(nodes), put(self.firsts(cells), wp.int32)
-        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.windows(cells)).T)
+        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.prepared.windows(cells)).T)
         for name in self.fields:
             setattr(fields, name, empty(slots * fields.nodes))
         patches, rings = slots * self._patches, slots * self.surface.rings
@@ -234,11 +213,11 @@ class Memory:
             touches.total_area = empty(rings)
         earlier = stage.Earlier()
         if self.variant.burst:
-            windows = self.windows(cells)
+            windows = self.prepared.windows(cells)
             earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
         stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
         if self.variant.layered:
-            stack.own_cells = put(self._behind(self.prepared.first_cells), wp.int32)
+            stack.own_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
         return fields, touches, stack, earlier
 
     def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:

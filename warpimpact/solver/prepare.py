@@ -3,6 +3,7 @@ made, for those who build, march or describe."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,9 +14,9 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
 from warpimpact.solver.grid import Grid, grids_of
 from warpimpact.solver.materials import Materials, materials_of
-from warpimpact.solver.resolution import Resolution, conditions_of, resolve
+from warpimpact.solver.resolution import Resolution, conditions_of, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
-from warpimpact.solver.windows import block_window, first_windows
+from warpimpact.solver.windows import Cells, block_window, first_windows, windows_behind
 
 if TYPE_CHECKING:
     from warpimpact.scene import Numerics, Scene, Shots
@@ -37,6 +38,7 @@ class Prepared:
         grids: the plate, and the layers behind it.
         materials: of the plate, and of the layers behind it.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
+        steps: of a passage that nothing hinders, at most.
         first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
             [shots].
         rows: of the trace of each shot; 0 for none.
@@ -52,6 +54,7 @@ class Prepared:
     grids: list[Grid]
     materials: list[Materials]
     conditions: dict[str, Array]
+    steps: int
     first_cells: NDArray[np.int64]
     rows: int = 0
 
@@ -65,6 +68,24 @@ class Prepared:
         """Nodes of a first window of the plate, in each direction, that serves all shots."""
         return int(self.first_cells.max())
 
+    def windows(self, cells: Cells) -> list[Cells]:
+        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        counts = self.windows_behind(np.array(cells[:1])).max(axis=1)
+        return [(int(count), int(count)) for count in counts]
+
+    def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
+        """`windows.windows_behind` of what was prepared."""
+        core, burst = self.scene.core, self.variant.burst
+        return windows_behind(core, self.shots, self.materials, self.grids, plate, burst=burst)
+
+    def nodes(self, cells: Cells) -> list[int]:
+        """Nodes that a shot has in the windows of all layers, likewise; those of a laminate are those of its first
+        layer."""
+        return [
+            grid.planes.number * math.prod(own) if material.laminate == k else 0
+            for k, (material, grid, own) in enumerate(zip(self.materials, self.grids, self.windows(cells), strict=True))
+        ]
+
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     """Make every choice for some shots.
@@ -75,6 +96,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
             several shots at one plate or layers; or the block layout does not compute the scene.
+        TooManySteps: a shot would take months.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
     core, target, record, interaction = scene.core, scene.target, scene.record, scene.interaction
@@ -84,6 +106,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     weakening = [one.weakens for one in materials]
     resolution = resolve(scene, numerics, weakening)
     conditions = conditions_of(core, target, shots, materials, resolution)
+    steps = int(steps_of(shots, resolution, conditions).max())
     deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
     exclusions.check_together(
@@ -128,5 +151,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         grids=grids,
         materials=materials,
         conditions=conditions,
+        steps=steps,
         first_cells=first_cells,
     )

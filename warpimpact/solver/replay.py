@@ -151,7 +151,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     device = find_device("cpu")
     first = March(Memory(prepared, device))
     steps = int(first.march().steps.numpy().max())
-    cells = sum(math.prod(own) for own in first.memory.windows(first.cells))
+    cells = sum(math.prod(own) for own in first.memory.prepared.windows(first.cells))
     of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
     needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells + first.memory.slot_bytes(first.cells)
     if needed > (free := free_memory()):
@@ -227,7 +227,7 @@ def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int,
     prepared, (fields, _, stack, _), hit = memory.prepared, scratch, _hit(memory.prepared)
     is_open, homes = stack.open.numpy(), stack.home.numpy()
     found = {}
-    for k, (cells, material) in enumerate(zip(memory.windows(plate), prepared.materials, strict=True)):
+    for k, (cells, material) in enumerate(zip(memory.prepared.windows(plate), prepared.materials, strict=True)):
         if k > 0 and cells != (0, 0) and is_open[k]:
             spacing, place = prepared.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
             y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), cells, spacing)
@@ -244,7 +244,7 @@ def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
         fields: of one slot.
         plate: cells of the plate's window.
     """
-    material, cells = memory.prepared.materials[layer], memory.windows(plate)[layer]
+    material, cells = memory.prepared.materials[layer], memory.prepared.windows(plate)[layer]
     through, total = (np.arange(THROUGH) + 0.5) / THROUGH, np.zeros(cells)
     if material.weakens:
         planes = memory.prepared.grids[layer].planes if material.deep[-1] else WHOLE
@@ -253,7 +253,7 @@ def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
         depth = depth + material.thickness[-1] * through
         weakened = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
     if memory.variant.burst:
-        firsts = np.cumsum([0, *channel_nodes(memory.prepared, memory.windows(plate))])
+        firsts = np.cumsum([0, *channel_nodes(memory.prepared, memory.prepared.windows(plate))])
         number = planes_of(memory.prepared, layer, float(material.thickness[-1]))
         channel, pierced = _planes_of(fields.channel, firsts[layer], number, cells), through * (number - 1)
     for k in range(THROUGH):  # all depths at once would take tens of gigabytes of a wide window
