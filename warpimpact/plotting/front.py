@@ -43,7 +43,7 @@ def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
     leaders = front_leaders(dataset)
     drawn = leaders[np.unique(np.round(np.linspace(0, len(leaders) - 1, min(DRAWN, len(leaders)))).astype(int))]
     names = {int(place): _LETTERS[number] for number, place in enumerate(drawn)}
-    figure = Figure(figsize=(12.0, 8.6 if names else 5.6), layout="constrained")
+    figure = Figure(figsize=(12.0, 8.0 if names else 5.6), layout="constrained")
     rows = figure.subfigures(2 if names else 1, 1, height_ratios=(1.0, 2.4) if names else None, squeeze=False)[:, 0]
     if names:
         _draw_plates(rows[0], dataset, names, folder)
@@ -136,14 +136,14 @@ def _bars(dataset: xarray.Dataset, names: tuple[str, str, str], asked: int) -> n
 
 
 def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, leaders: Any) -> None:
-    """Values of the variables over the first objective."""
-    names, count = dataset[f.NAME].values, dataset.sizes["variable"]
-    if not count or not len(leaders):
+    """Values of the variables over the first objective; not of those that count nowhere on the front."""
+    names, values = dataset[f.NAME].values, dataset[f.VALUE].values[dataset[f.NUMBER].values[leaders]]
+    shown = np.flatnonzero(np.isfinite(values).any(axis=0))
+    if not len(shown):
         return
-    panels = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-    values = dataset[f.VALUE].values[dataset[f.NUMBER].values[leaders]]
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     over = dataset[f.FRESH].values[leaders, 0]
-    for place, axes in enumerate(panels):
+    for place, axes in zip(shown, panels, strict=True):
         axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
         every = dataset[f.VALUE].values[:, place]
         if np.isfinite(every).any() and np.nanmin(every) < np.nanmax(every):
