@@ -210,6 +210,20 @@ class FiringReference(CampaignReference):
             yield from self.of_table(name, part)
 
 
+class DesignReference(CampaignReference):
+    """Every key of a design file beside those of a campaign, table by table, from its JSON schema."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.optimisation.schema import asking_schema
+
+        self.schema = asking_schema()
+        yield from ["## Tables of the file", ""]
+        yield from self.keys(self.schema)
+        for name, part in self.schema["properties"].items():
+            if name != "variables":
+                yield from self.of_table(name, part)
+
+
 # --- Commands ---
 
 
@@ -263,6 +277,8 @@ class VariableReference(FromTheCode):
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
             "With bursts": variables.BURST_VARIABLES,
             **{group.title: (*group, *group.beside) for group in RECORDS},
+            "At the solid plate (group `solid`)": (*variables.SOLID_VARIABLES, *variables.SOLID_LIMIT_VARIABLES),
+            "At a finer level (group `finer`)": (*variables.FINER_COORDINATES, *variables.FINER_VARIABLES),
         }
         for title, group in groups.items():
             yield from [f"## {title}", ""]
@@ -362,6 +378,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     for name, directive in {
         "campaign-reference": CampaignReference,
         "firing-reference": FiringReference,
+        "design-reference": DesignReference,
         "exclusion-reference": ExclusionReference,
         "command-reference": CommandReference,
         "variable-reference": VariableReference,

@@ -48,6 +48,8 @@ class Effect:
         higher_is_better: for whoever is behind the plate.
         kind: "mean" of any numbers, or "share" of numbers 0 and 1.
         values: of a hit map with the variables of EFFECT_VARIABLES, NaN where a shot does not count.
+        margin: of a share: numbers that are positive where the value is 1, NaN where a shot does not count; None where
+            there are none.
     """
 
     name: str
@@ -58,6 +60,11 @@ class Effect:
     higher_is_better: bool
     kind: str
     values: Callable[[Result], Array]
+    margin: Callable[[Result], Array] | None = None
+
+    def judged(self, dataset: Result) -> Array:
+        """The margins of all shots where there are such, else their values; shape [hits]."""
+        return (self.margin or self.values)(dataset)
 
     def over(self, dataset: xarray.Dataset) -> Array:
         """Values of all shots, shape [hits]; of an open file a slice is in memory at a time."""
@@ -161,6 +168,7 @@ def _at_a_standoff(dataset: Result, degrees: float, standoff: float) -> Iterator
         higher_is_better=True,
         kind="share",
         values=_is_tilted(degrees, standoff),
+        margin=_beyond(degrees, standoff),
     )
 
 
@@ -320,8 +328,15 @@ def _energy_density(core: Core, standoff: float) -> Callable[[Result], Array]:
 
 
 def _is_tilted(degrees: float, standoff: float) -> Callable[[Result], Array]:
+    beyond = _beyond(degrees, standoff)
+
     def values(part: Result) -> Array:
-        inclination = _inclination(part, standoff)
-        return _of_passed(part, np.where(np.isnan(inclination), np.nan, inclination > degrees), 1.0)
+        margin = beyond(part)
+        return np.where(np.isnan(margin), np.nan, margin > 0.0)
 
     return values
+
+
+def _beyond(degrees: float, standoff: float) -> Callable[[Result], Array]:
+    """How much a core is inclined beyond so many degrees; infinite of one that does not get there."""
+    return lambda part: _of_passed(part, _inclination(part, standoff) - degrees, math.inf)

@@ -22,8 +22,9 @@ from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid, outcomes_in
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.units import Radians
+from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.many import simulate_many
-from warpimpact.solver.pilot import HitErrors, pilot_size
+from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
 

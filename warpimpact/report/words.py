@@ -108,7 +108,7 @@ def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, An
     told = []
     for result in results:
         first = next(iter(result["measures"]))
-        interval = intervals_text(first.low, first.high, first.parameters)
+        interval = intervals_text(first.ends)
         told.append(
             f"{result['name']}: {result['passed']} of {result['hits']} cores pass. {first.label}"
             f"{SHOWN_UNITS[first.units]} {number_text(first.value)}"
@@ -196,14 +196,14 @@ def _plain(value: object) -> str:
 
 def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
     for status, share in status_shares(dataset).items():
-        yield Row(words(status), f"{share.value:.2%}", intervals_text(*ends_of(share), "{:.2%}".format))
+        yield Row(words(status), f"{share.value:.2%}", intervals_text(ends_of(share), "{:.2%}".format))
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
     means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
-            interval = intervals_text(*ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
+            interval = intervals_text(ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
             yield Row(
                 f"mean {words(measure.variable)}{measure.place}", measure.display.text(estimate.value, ".2f"), interval
             )

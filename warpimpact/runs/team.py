@@ -18,7 +18,7 @@ from warpimpact.runs.compute import HitMap
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.task import Computation, Task
 from warpimpact.solver.device import DeviceError, find_device
-from warpimpact.solver.pilot import Found
+from warpimpact.solver.findings import Found
 from warpimpact.solver.worker import Cancel, Worker
 
 CUDA_SHOTS = 2**17
