@@ -220,8 +220,7 @@ def probe_of(variant: Variant) -> Any:
 
 def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
     """Loads of random poses, and the exposure of their plates."""
-    kernel, *structs = probe_of(variant)
-    Surface, Plate_, Fields, Law, Load, Touches = structs
+    kernel, Surface, Plate_, Fields, Law, Load, Touches = probe_of(variant)
     put = structs.Put("cpu", variant.real)
     around = 36  # so that a round of the lanes spans two rings
     surface = structs.surface_of(Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)
