@@ -131,13 +131,15 @@ def build(variant: Variant) -> SimpleNamespace:
         return clearance_at(plate, window, y, z) > reach
 
     @wp.func
-    def is_beside(window: Window, found: Footprint):
-        """Whether a window holds none of the nodes around the rings in the slab: a core that comes back elsewhere."""
+    def is_beside(window: Window, found: Footprint, cells: wp.int32):
+        """Whether a window would hold none of the nodes around the rings in the slab, if it had so many in each
+        direction: a core that comes back elsewhere."""
+        first_y, first_z = window.cells_y // 2 - cells // 2, window.cells_z // 2 - cells // 2
         return (
-            found.box.y_high < 0
-            or found.box.z_high < 0
-            or found.box.y_low >= window.cells_y
-            or found.box.z_low >= window.cells_z
+            found.box.y_high < first_y
+            or found.box.z_high < first_z
+            or found.box.y_low >= first_y + cells
+            or found.box.z_low >= first_z + cells
         )
 
     return SimpleNamespace(**locals())

@@ -35,13 +35,16 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     class Stack:
         """Scratch of all slots, shape [slots × layers]: what a step can touch of each layer, the layer's window, the
         place of the window's home relative to the hit [m], whether the window is open, and whether the core was near
-        the layer in the last step."""
+        the layer in the last step. `own_cells` are the nodes in each direction of the first window that a shot has by
+        itself, shape [layers, 1] or [layers, shots]: what becomes of it must not depend on how wide the windows of
+        those are that are computed with it."""
 
         found: wp.array(dtype=Footprint)
         window: wp.array(dtype=Window)
         home: wp.array(dtype=vec3)
         open: wp.array(dtype=wp.bool)
         near: wp.array(dtype=wp.bool)
+        own_cells: wp.array2d(dtype=wp.int32)
 
     @wp.struct
     class Reached:
@@ -160,9 +163,9 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         seen = in_layer(target, stack, slot, layer, shot, pose)
         touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
         if (
-            not touch.inside
+            touch.last_ring >= 0
             and not was_near(target, stack, slot, layer)
-            and use.footprint.is_beside(stack.window[here], touch)
+            and use.footprint.is_beside(stack.window[here], touch, own_of(stack.own_cells, layer, shot))
         ):
             open_layer(target, stack, earlier, fields, shots, slot, layer, shot, pose, vec3())
             seen = in_layer(target, stack, slot, layer, shot, pose)

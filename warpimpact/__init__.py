@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .campaign.stop import Stop
     from .campaign.text import CampaignError
     from .export.table import to_dataframe
+    from .optimisation.optimise import optimise, optimise_to_file
     from .records.outcomes import Outcomes
     from .results.files import OutputError, ResultError, open_result
     from .runs.cluster import cluster_team
@@ -105,6 +106,8 @@ __all__ = [
     "limit_velocity",
     "make_shots",
     "open_result",
+    "optimise",
+    "optimise_to_file",
     "read_plates",
     "replay",
     "run",
@@ -131,6 +134,8 @@ _HOMES = {
     "open_result": ".results.files",
     "read_plates": ".campaign.plates",
     "replay": ".runs.replay",
+    "optimise": ".optimisation.optimise",
+    "optimise_to_file": ".optimisation.optimise",
     "hit_map": ".analysis.hit_map",
     "Inspection": ".analysis.inspection",
     "inspect": ".analysis.inspection",

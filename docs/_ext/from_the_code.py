@@ -263,6 +263,8 @@ class VariableReference(FromTheCode):
             "Plate and core, where they scatter": variables.SCATTER_VARIABLES,
             "With bursts": variables.BURST_VARIABLES,
             **{group.title: (*group, *group.beside) for group in RECORDS},
+            "At the solid plate (group `solid`)": (*variables.SOLID_VARIABLES, *variables.SOLID_LIMIT_VARIABLES),
+            "At a finer level (group `finer`)": (*variables.FINER_COORDINATES, *variables.FINER_VARIABLES),
         }
         for title, group in groups.items():
             yield from [f"## {title}", ""]

@@ -39,7 +39,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.solver import grid, replay, simulate
+from warpimpact.solver import replay, simulate, structs, windows
 from warpimpact.solver.rings import azimuths_of, rings_of
 
 from .probes import astride, plate_of, poisoned, poisoned_fields
@@ -140,7 +140,7 @@ def test_order_of_the_lanes_changes_no_outcome(order: str, in_blocks: pytest.Mon
     scene, shots = scene_of("slots", 12)
     first = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     in_blocks.setattr(lanes, "LANE", ORDERS[order])
-    in_blocks.setattr(grid, "SIZES", (2080 + 32 * list(ORDERS).index(order),))  # so that kernels are built anew
+    in_blocks.setattr(windows, "SIZES", (2080 + 32 * list(ORDERS).index(order),))  # so that kernels are built anew
     assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)
 
 
@@ -148,7 +148,7 @@ def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None
     scene, shots = scene_of("slots", 12)
     simple = simulate.simulate(scene, shots, numerics=SIMPLE, device="cpu")
     in_blocks.setattr(lanes, "WAIT", "")
-    in_blocks.setattr(grid, "SIZES", (2144,))
+    in_blocks.setattr(windows, "SIZES", (2144,))
     without = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     with pytest.raises(AssertionError):
         assert_same(without, simple)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Layer, Numerics, Plate, Record, Scene, Shots, Target
-from warpimpact.solver import grid, marching, replay
+from warpimpact.solver import marching, replay, windows
 from warpimpact.solver import simulate as simulation
 from warpimpact.solver.marching import March
 from warpimpact.solver.memory import Memory
@@ -177,7 +177,7 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
 def test_any_thread_and_chunk(behind: Any, threads: int, chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
     shots = near_bursts()
     expected = simulate(paper_plate(), shots, behind)
-    monkeypatch.setattr(marching, "cores", lambda: threads)
+    monkeypatch.setattr(marching, "launching", lambda _: threads)
     monkeypatch.setattr(marching, "CPU_CHUNK", chunk)
     assert_identical(simulate(paper_plate(), shots, behind), expected)
 
@@ -211,7 +211,7 @@ def test_the_order_of_a_device_with_many_slots(behind: Any, slots: int) -> None:
 def test_a_shot_that_leaves_its_window_is_repeated_with_its_burst(monkeypatch: pytest.MonkeyPatch) -> None:
     shots = near_bursts()
     expected = simulate(paper_plate(), shots)
-    monkeypatch.setattr(grid, "WINDOW_SLACK", 0.9)
+    monkeypatch.setattr(windows, "SLACK", 0.9)
     repeated, march_some = [], March._march_some
 
     def counted(self: March, pending: Any, *rest: Any) -> None:

@@ -64,7 +64,7 @@ def test_any_split(shots: Shots, numerics: dict[str, Any], size: int, device: st
 @pytest.mark.parametrize("threads", [1, 3, 8])
 def test_any_number_of_threads(shots: Shots, threads: int, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = outcomes_of(shots, "cpu", {})
-    monkeypatch.setattr(marching, "cores", lambda: threads)
+    monkeypatch.setattr(marching, "launching", lambda _: threads)
     assert_identical(outcomes_of(shots, "cpu", {}), expected)
 
 

@@ -1,5 +1,6 @@
 """Results made by hand: shots and outcomes whose values a test knows."""
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -172,3 +173,63 @@ def small_shards() -> Iterator[None]:
 def assert_same_bits() -> Callable[[Path, Path], None]:
     """A function of two result files."""
     return _assert_same_bits
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator["Browser"]:
+    programs = shutil.which("chromium"), shutil.which("chromedriver")
+    if None in programs:
+        pytest.skip("needs the programs chromium and chromedriver (Debian: chromium, chromium-driver)")
+    browser = Browser(*programs)
+    yield browser
+    browser.driver.quit()
+
+
+class Browser:
+    """A headless Chromium."""
+
+    def __init__(self, chromium: str, chromedriver: str) -> None:
+        from selenium import webdriver
+
+        options = webdriver.ChromeOptions()
+        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+            options.add_argument(argument)
+        options.binary_location = chromium
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(chromedriver))
+
+    def open(self, address: str, width: int = 1280) -> None:
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600},
+        )
+        self.driver.get(address)
+
+    def find(self, selector: str) -> list:
+        return self.driver.find_elements("css selector", selector)
+
+    def text(self, selector: str) -> str:
+        return "\n".join(element.text for element in self.find(selector))
+
+    def values(self, selector: str) -> list[str]:
+        """Of form fields."""
+        return [element.get_property("value") for element in self.find(selector)]
+
+    def wait(self, condition: Callable[[], object], seconds: float = 30.0) -> None:
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        WebDriverWait(self.driver, seconds, poll_frequency=0.05).until(lambda _: condition())
+
+    def point_at(self, selector: str, right: float, down: float, *, click: bool = False) -> None:
+        """Move to a place of an element, from its middle in shares of its width and height."""
+        from selenium.webdriver.common.action_chains import ActionChains
+
+        (place,) = self.find(selector)
+        self.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", place)
+        offset = round(right * place.size["width"]) - 2, round(down * place.size["height"])
+        action = ActionChains(self.driver).move_to_element_with_offset(place, *offset)
+        action = action.pause(0.2).move_by_offset(2, 0).pause(0.2)
+        (action.click() if click else action).perform()
+
+    def errors(self) -> list[str]:
+        return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]

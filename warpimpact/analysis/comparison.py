@@ -8,7 +8,8 @@ plates that were hit by other shots are compared as independent (statistics/comp
 Plates of different weight are compared by their ratios to the solid plate of the same areal density.
 
 The intervals of all pairs of plates hold together, for each measure on its own: each has its share of the error
-(Bonferroni). Two plates are told apart where the interval of their difference leaves out 0.
+(Bonferroni). The numerics may shift both plates, which their intervals hold, too. Two plates are told apart where the
+interval of their difference leaves out 0.
 """
 
 from __future__ import annotations
@@ -98,7 +99,9 @@ def compare(
         for (i, j), pair in zip(pairs, used, strict=True):
             dealt: list[Estimating] = [{**dealing(datasets[k]), "confidence": each} for k in (i, j)]
             sides = [_side(evidences[k], of, by_ratio=name in by_ratio) for k, of in zip((i, j), dealt, strict=True)]
-            interval = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
+            value, low, high = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
+            shift = sum(np.nan_to_num(side.estimate.numerics or 0.0) for side in sides)
+            interval = value, low - shift, high + shift
             drawn = sides[0].drawn, sides[1].drawn
             why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=name in by_ratio)
             both = datasets[i], datasets[j]
@@ -160,7 +163,8 @@ def _used(one: xarray.Dataset, name: str, other: xarray.Dataset, other_name: str
 
 class _Side(NamedTuple):
     """What of a plate is compared: whether it is a share or made of one, whether it is a ratio to the solid plate,
-    numbers whose mean it is, those whose mean over the shots of a draw is that of the draw, and its estimate."""
+    numbers whose mean it is, those whose mean over the shots of a draw is that of the draw, and its estimate, with how
+    far the numerics may shift it."""
 
     is_share: bool
     by_ratio: bool
@@ -172,7 +176,7 @@ class _Side(NamedTuple):
 def _side(evidence: Evidence, dealt: Estimating, *, by_ratio: bool) -> _Side:
     assert evidence.numbers is not None
     assert evidence.drawn is not None
-    estimate = estimate_of(evidence.kind, evidence.numbers, **dealt)
+    estimate = replace(estimate_of(evidence.kind, evidence.numbers, **dealt), numerics=evidence.measure.numerics)
     if math.isnan(evidence.measure.low):  # as of a worst tenth of few hits
         estimate = replace(estimate, low=math.nan, high=math.nan)
     if not by_ratio:
@@ -182,7 +186,8 @@ def _side(evidence: Evidence, dealt: Estimating, *, by_ratio: bool) -> _Side:
     ratio = Ratio.of(estimate, evidence.numbers, evidence.solid, dealt)
     numbers = ratio_numbers(evidence.numbers, evidence.solid, ratio.value)
     drawn = ratio_of_draws(evidence.drawn, evidence.solid_drawn)
-    estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high)
+    shift = estimate.numerics and estimate.numerics / ratio.reference
+    estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high, numerics=shift)
     return _Side(evidence.kind == "share", True, numbers, drawn, estimate)
 
 

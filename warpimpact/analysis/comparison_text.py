@@ -10,7 +10,7 @@ from html import escape
 from typing import NamedTuple
 
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, EffectMeasure
-from warpimpact.analysis.numbers import intervals_text, of_each
+from warpimpact.analysis.numbers import Ends, intervals_text, of_each
 from warpimpact.analysis.numbers import number_text as number
 from warpimpact.analysis.survival import Survival, survival_text
 
@@ -245,7 +245,7 @@ def _ranking(comparison: Comparison, measure: EffectMeasure) -> Ranking:
     rows: list[tuple[str, ...]] = []
     for plate in (plates[name] for name in ranks):
         told = plate.measures[place]
-        value = (f"{plate.areal_density:.2f}", number(told.value), intervals_text(told.low, told.high, told.parameters))
+        value = (f"{plate.areal_density:.2f}", number(told.value), intervals_text(told.ends))
         rank = str(ranks[plate.name]) if is_ranked(comparison, measure.name) else "-"
         rows.append((rank, plate.name, *value, number(told.ratio), told.ratio_text))
     what = " in the ratio to the solid plate" if by_ratio else ""
@@ -280,13 +280,13 @@ def _in_words(pair: Difference, measure: EffectMeasure, what: str) -> str:
         told = f"difference{what} {number(pair.value)}"
         return f"{pair.one} and {pair.other}: {told}, of which these hits give no interval"
     if not pair.told_apart:
-        interval = f"({intervals_text(pair.low, pair.high, pair.parameters)})"
+        interval = f"({intervals_text(Ends(pair.low, pair.high, pair.parameters))})"
         return f"{pair.one} and {pair.other} cannot be told apart: difference{what} {number(pair.value)} {interval}"
     names = [pair.one, pair.other] if (pair.value > 0.0) == measure.higher_is_better else [pair.other, pair.one]
     by_hits, by_parameters = (pair.low, pair.high), pair.parameters
     if pair.value < 0.0:
         by_hits, by_parameters = _negative(by_hits), by_parameters and _negative(by_parameters)
-    interval = intervals_text(*by_hits, by_parameters)
+    interval = intervals_text(Ends(*by_hits, by_parameters))
     verdict = f"{names[0]} better than {names[1]} by {number(abs(pair.value))}{what} ({interval})"
     return verdict + survival_text(pair.survival)
 

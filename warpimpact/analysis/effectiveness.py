@@ -18,17 +18,18 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.effects import Effect, effects
-from warpimpact.analysis.numbers import intervals_text, number_text
+from warpimpact.analysis.numbers import Ends, intervals_text, number_text
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import solid_reference
+from warpimpact.results.dataset import finer_pair, solid_reference
 from warpimpact.results.limits import solid_limits
 from warpimpact.results.measures import dealing
 from warpimpact.scene.units import Radians
 from warpimpact.statistics.comparisons import Ratio, ratio_numbers
 from warpimpact.statistics.intervals import Estimate, Estimating, estimate_of
 from warpimpact.statistics.of_groups import of_worst_tenth
+from warpimpact.statistics.shifts import shift_of_mean, shift_of_share, shift_of_yes
 from warpimpact.statistics.worst_tenth import has_interval, worst_tenth
 
 Array = NDArray[np.float64]
@@ -50,6 +51,7 @@ class EffectMeasure:
         hit: number of the hit that is the worst point; None of anything else.
         parameters: its interval by the parameters as of an `Estimate`.
         ratio_parameters: that of the ratio.
+        numerics: how far the numerics may shift the value; None or NaN where that is not known.
     """
 
     name: str
@@ -68,13 +70,20 @@ class EffectMeasure:
     hit: int | None = None
     parameters: tuple[float, float] | None = None
     ratio_parameters: tuple[float, float] | None = None
+    numerics: float | None = None
+
+    @property
+    def ends(self) -> Ends:
+        """Its intervals."""
+        return Ends(self.low, self.high, self.parameters, self.numerics)
 
     @property
     def ratio_text(self) -> str:
         """The interval of the ratio, or both; empty where there is none."""
         if math.isnan(self.ratio) or (self.ratio_parameters is None and math.isnan(self.ratio_low)):
             return ""
-        return intervals_text(self.ratio_low, self.ratio_high, self.ratio_parameters)
+        numerics = None if self.numerics is None else self.numerics / self.solid
+        return intervals_text(Ends(self.ratio_low, self.ratio_high, self.ratio_parameters, numerics))
 
 
 @dataclass(frozen=True)
@@ -150,15 +159,17 @@ def gather(
     `only`, by their names."""
     dealt: Estimating = {**dealing(dataset), "confidence": confidence}
     reference = solid_limits(dataset) if attr.LIMIT in dataset.attrs else solid_reference(dataset)
+    pair = finer_pair(dataset)
     for effect in effects(dataset, angle=angle, standoff=standoff):
         if only is not None and effect.name not in only:
             continue
         values, solid = effect.over(dataset), None if reference is None else effect.over(reference)
+        levels = None if pair is None else (effect.judged(pair[0]), effect.judged(pair[1]))
         if effect.kind == "share":
-            yield _averaged(effect, _SHARE, values, solid, dealt, dataset)
+            yield _averaged(effect, _SHARE, values, solid, levels, dealt, dataset)
         else:
-            yield _averaged(effect, _MEAN, values, solid, dealt, dataset)
-            yield _averaged(effect, _WORST_TENTH, values, solid, dealt, dataset)
+            yield _averaged(effect, _MEAN, values, solid, levels, dealt, dataset)
+            yield _averaged(effect, _WORST_TENTH, values, solid, levels, dealt, dataset)
             yield _worst_point(effect, values, solid, dataset)
 
 
@@ -167,10 +178,12 @@ def _averaged(
     statistic: _Statistic,
     values: Array,
     solid: Array | None,
+    levels: tuple[Array, Array] | None,
     dealt: Estimating,
     dataset: xarray.Dataset,
 ) -> Evidence:
-    """The measure that is a mean of what the shots say, or of numbers made of that."""
+    """The measure that is a mean of what the shots say, or of numbers made of that; `levels` are those of some hits at
+    two levels of resolution."""
     numbers = drawn = values
     of_solid = solid_drawn = solid
     if statistic is _WORST_TENTH:
@@ -182,6 +195,8 @@ def _averaged(
     estimate = estimate_of(effect.kind, numbers, **dealt)
     if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
         estimate = _without_interval(estimate.value)
+    if levels is not None:
+        estimate = replace(estimate, numerics=_shift(effect, statistic, levels, dealt))
     estimate = over_draws(dataset, estimate, drawn).within(0.0, 1.0 if effect.units == "1" else math.inf)
     against = Ratio.of(estimate, numbers, of_solid, dealt)
     measure = _measure(effect, statistic, estimate, against)
@@ -192,6 +207,17 @@ def _averaged(
             by_parameters = over_draws(dataset, ends, ratio_of_draws(drawn, solid_drawn)).within(0.0)
         measure = replace(measure, ratio_parameters=by_parameters.parameters or (math.nan, math.nan))
     return Evidence(measure, effect.kind, numbers, of_solid, drawn, solid_drawn)
+
+
+def _shift(effect: Effect, statistic: _Statistic, levels: tuple[Array, Array], dealt: Estimating) -> float:
+    """How far the numerics may shift a measure, by what some hits say at two levels."""
+    dealt = {**dealt, "replicates": 1}
+    if effect.kind == "share":
+        return (shift_of_yes if effect.margin is None else shift_of_share)(*levels, **dealt)
+    if statistic is _WORST_TENTH:
+        sign = -1.0 if effect.higher_is_better else 1.0
+        levels = worst_tenth(sign * levels[0]), worst_tenth(sign * levels[1])
+    return shift_of_mean(*levels, **dealt)
 
 
 def ratio_of_draws(drawn: Array, solid: Array) -> Array:
@@ -234,6 +260,7 @@ def _measure(
         ratio_high=against.high,
         hit=hit,
         parameters=estimate.parameters,
+        numerics=estimate.numerics,
     )
 
 
@@ -288,11 +315,7 @@ def plate_text(dataset: xarray.Dataset) -> str:
 
 
 def _second(measure: EffectMeasure) -> str:
-    return (
-        f"at hit {measure.hit}"
-        if measure.hit is not None
-        else intervals_text(measure.low, measure.high, measure.parameters)
-    )
+    return f"at hit {measure.hit}" if measure.hit is not None else intervals_text(measure.ends)
 
 
 def _against_text(measure: EffectMeasure) -> str:

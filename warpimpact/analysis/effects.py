@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
@@ -23,11 +22,17 @@ from warpimpact.results.measures import place_of_standoff
 from warpimpact.scene import AnyCore, Core
 from warpimpact.scene.units import Length, Obliquity
 
+if TYPE_CHECKING:
+    import xarray
+
+    from warpimpact.results.table import Result
+
 Array = NDArray[np.float64]
 
 _THICKNESS, _VELOCITY = (v.LIMITS[quantity].value for quantity in ("thickness", "velocity"))
 _OF_A_HIT = (v.IMPACT_VELOCITY, v.RESIDUAL_VELOCITY, v.TILT, v.MASS, v.BROKEN)
-_NEEDED = (*_OF_A_HIT, _THICKNESS, _VELOCITY, *base.NEEDED)
+EFFECT_VARIABLES = (*_OF_A_HIT, _THICKNESS, _VELOCITY, *base.NEEDED)
+"""All that effects are made of, beside coordinates and attributes."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,9 @@ class Effect:
         source: where it comes from.
         higher_is_better: for whoever is behind the plate.
         kind: "mean" of any numbers, or "share" of numbers 0 and 1.
-        values: of a hit map, NaN where a shot does not count.
+        values: of a hit map with the variables of EFFECT_VARIABLES, NaN where a shot does not count.
+        margin: of a share: numbers that are positive where the value is 1, NaN where a shot does not count; None where
+            there are none.
     """
 
     name: str
@@ -52,15 +59,20 @@ class Effect:
     source: str
     higher_is_better: bool
     kind: str
-    values: Callable[[xarray.Dataset], Array]
+    values: Callable[[Result], Array]
+    margin: Callable[[Result], Array] | None = None
+
+    def judged(self, dataset: Result) -> Array:
+        """The margins of all shots where there are such, else their values; shape [hits]."""
+        return (self.margin or self.values)(dataset)
 
     def over(self, dataset: xarray.Dataset) -> Array:
         """Values of all shots, shape [hits]; of an open file a slice is in memory at a time."""
-        needed = [name for name in _NEEDED if name in dataset]
+        needed = [name for name in EFFECT_VARIABLES if name in dataset]
         return np.concatenate([self.values(part) for part in slices(dataset[needed].drop_vars(v.HIT, errors="ignore"))])
 
 
-def effects(dataset: xarray.Dataset, *, angle: float | str, standoff: float | str | None) -> Iterator[Effect]:
+def effects(dataset: Result, *, angle: float | str, standoff: float | str | None) -> Iterator[Effect]:
     """All there are for a result: of the base first, if there is one; of a search of limits, those alone.
 
     Args:
@@ -126,7 +138,7 @@ def effects(dataset: xarray.Dataset, *, angle: float | str, standoff: float | st
     )
 
 
-def _at_a_standoff(dataset: xarray.Dataset, degrees: float, standoff: float) -> Iterator[Effect]:
+def _at_a_standoff(dataset: Result, degrees: float, standoff: float) -> Iterator[Effect]:
     """Of where and how the core is at a stand-off [m]; it is tilted beyond so many degrees."""
     at = f"{standoff * 1e3:g} mm"
     if attr.CORE in dataset.attrs:
@@ -156,6 +168,7 @@ def _at_a_standoff(dataset: xarray.Dataset, degrees: float, standoff: float) -> 
         higher_is_better=True,
         kind="share",
         values=_is_tilted(degrees, standoff),
+        margin=_beyond(degrees, standoff),
     )
 
 
@@ -198,13 +211,13 @@ def _of_base() -> Iterator[Effect]:
     )
 
 
-def _of_limits(dataset: xarray.Dataset) -> Iterator[Effect]:
+def _of_limits(dataset: Result) -> Iterator[Effect]:
     """Of the thickness that a layer needs to stop every core."""
     told = dataset.attrs
     layer, highest = int(told[attr.LIMIT_LAYER]), float(told[attr.LIMIT_HIGHEST])
     whose = f"layer {layer}" if layer else "the plate"
 
-    def of_layer(part: xarray.Dataset) -> Array:
+    def of_layer(part: Result) -> Array:
         is_this = all(part.attrs.get(name) == told.get(name) for name in (attr.LIMIT_LAYER, attr.LIMIT_ELSEWHERE))
         values = 1e3 * _limits(part, _THICKNESS)
         return values if is_this else np.full_like(values, np.nan)  # a solid plate for the whole has no such layer
@@ -235,7 +248,7 @@ def _of_limits(dataset: xarray.Dataset) -> Iterator[Effect]:
     )
 
 
-def _of_limit_velocity(dataset: xarray.Dataset) -> Effect:
+def _of_limit_velocity(dataset: Result) -> Effect:
     highest = float(dataset.attrs[attr.LIMIT_HIGHEST])
     return Effect(
         name="limit_velocity",
@@ -250,17 +263,17 @@ def _of_limit_velocity(dataset: xarray.Dataset) -> Effect:
     )
 
 
-def _limits(part: xarray.Dataset, name: str) -> Array:
+def _limits(part: Result, name: str) -> Array:
     """Limits of a result, at most the largest value tried; NaN where the computation failed."""
     return np.where(failed(part), np.nan, np.minimum(part[name].values, float(part.attrs[attr.LIMIT_HIGHEST])))
 
 
-def _needed_density(part: xarray.Dataset) -> Array:
+def _needed_density(part: Result) -> Array:
     elsewhere, density = float(part.attrs[attr.LIMIT_ELSEWHERE]), float(part.attrs[attr.LIMIT_DENSITY])
     return np.asarray(elsewhere + density * _limits(part, _THICKNESS))
 
 
-def _is_broken(part: xarray.Dataset) -> Array:
+def _is_broken(part: Result) -> Array:
     """1 for a broken core, NaN where that was not computed: of a failed shot, and of the solid reference."""
     if v.BROKEN not in part:
         return np.full(part.sizes["hit"], np.nan)
@@ -274,7 +287,7 @@ def _read(name: str, kind: Any, value: float | str) -> float:
         raise ResultError(f"{name}: {complaint(error.errors()[0])}") from None
 
 
-def _at_standoff(dataset: xarray.Dataset, standoff: float | str | None) -> float:
+def _at_standoff(dataset: Result, standoff: float | str | None) -> float:
     """The stand-off of a result that is meant [m]."""
     distances = dataset[v.STANDOFF].values
     if standoff is None:
@@ -285,28 +298,28 @@ def _at_standoff(dataset: xarray.Dataset, standoff: float | str | None) -> float
         raise ResultError(f"standoff: {error}") from None
 
 
-def _of_passed(part: xarray.Dataset, values: Array, otherwise: float) -> Array:
+def _of_passed(part: Result, values: Array, otherwise: float) -> Array:
     """Values of the cores that passed the plate, something else of those that did not, NaN of failed computations."""
     return np.where(failed(part), np.nan, np.where(passed(part), values, otherwise))
 
 
-def _energy_fraction(part: xarray.Dataset) -> Array:
+def _energy_fraction(part: Result) -> Array:
     fraction = (part[v.RESIDUAL_VELOCITY].values.astype(float) / part[v.IMPACT_VELOCITY].values) ** 2
     return _of_passed(part, fraction, 0.0)
 
 
-def _inclination(part: xarray.Dataset, standoff: float) -> Array:
+def _inclination(part: Result, standoff: float) -> Array:
     """Between axis and line of fire, nose or base first alike [degree], shape [hits]."""
-    tilt = part[v.TILT].sel(standoff=standoff, method="nearest").values.astype(float)
+    tilt = part[v.TILT].values[:, place_of_standoff(part[v.STANDOFF].values, standoff)].astype(float)
     return np.asarray(np.minimum(tilt, 180.0 - tilt))
 
 
-def _energy_density(core: Core, standoff: float) -> Callable[[xarray.Dataset], Array]:
+def _energy_density(core: Core, standoff: float) -> Callable[[Result], Array]:
     """Of a core, whose silhouette is tabulated: a quarter of a degree errs by 1e-5."""
     table = np.linspace(0.0, 90.0, 361)
     silhouette = core.presented_area(np.radians(table)) * 1e6
 
-    def values(part: xarray.Dataset) -> Array:
+    def values(part: Result) -> Array:
         mass = part[v.MASS].values if v.MASS in part else core.mass_properties.mass
         energy = 0.5 * mass * part[v.RESIDUAL_VELOCITY].values.astype(float) ** 2
         return _of_passed(part, energy / np.interp(_inclination(part, standoff), table, silhouette), 0.0)
@@ -314,9 +327,16 @@ def _energy_density(core: Core, standoff: float) -> Callable[[xarray.Dataset], A
     return values
 
 
-def _is_tilted(degrees: float, standoff: float) -> Callable[[xarray.Dataset], Array]:
-    def values(part: xarray.Dataset) -> Array:
-        inclination = _inclination(part, standoff)
-        return _of_passed(part, np.where(np.isnan(inclination), np.nan, inclination > degrees), 1.0)
+def _is_tilted(degrees: float, standoff: float) -> Callable[[Result], Array]:
+    beyond = _beyond(degrees, standoff)
+
+    def values(part: Result) -> Array:
+        margin = beyond(part)
+        return np.where(np.isnan(margin), np.nan, margin > 0.0)
 
     return values
+
+
+def _beyond(degrees: float, standoff: float) -> Callable[[Result], Array]:
+    """How much a core is inclined beyond so many degrees; infinite of one that does not get there."""
+    return lambda part: _of_passed(part, _inclination(part, standoff) - degrees, math.inf)

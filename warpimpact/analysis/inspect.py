@@ -13,8 +13,8 @@ from warpimpact.analysis.effectiveness import effectiveness_text
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.plate import plate_numbers
 from warpimpact.analysis.summary import (
-    Spread,
     estimated,
+    levels_note,
     means_of,
     numerics_note,
     promise_text,
@@ -80,7 +80,7 @@ def _statuses(dataset: xarray.Dataset) -> Iterator[str]:
     """Shares of the shots that ended, with intervals."""
     yield f"{'status':<22}{'share':>10}   95 % interval"
     for status, share in status_shares(dataset).items():
-        yield f"{status:<22}{share.value:>10.2%}   {intervals_text(*ends_of(share), '{:.2%}'.format)}"
+        yield f"{status:<22}{share.value:>10.2%}   {intervals_text(ends_of(share), '{:.2%}'.format)}"
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
@@ -98,10 +98,7 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[str]:
         for measure, estimate in estimated(dataset, [mean, *quantiles]).items():
             if estimate.count:
                 yield _row(measure, estimate)
-    velocity = Spread.of(
-        estimated(dataset, means_of([v.RESIDUAL_VELOCITY], []))[Measure.parse("mean(residual_velocity)")]
-    )
-    yield from filter(None, (sampling_note(dataset), numerics_note(dataset, velocity), draws_note(dataset)))
+    yield from filter(None, (sampling_note(dataset), numerics_note(dataset), levels_note(dataset), draws_note(dataset)))
     yield from stop_lines(dataset)
 
 
@@ -110,7 +107,7 @@ def _row(measure: Measure, estimate: Estimate) -> str:
     unit, factor = measure.display.shown, measure.display.factor
     if measure.kind == "mean":
         name, what = f"{measure.variable.replace('_', ' ')}{measure.place}, {unit}", "mean"
-    interval = intervals_text(*ends_of(estimate), lambda end: f"{factor * end:.2f}")
+    interval = intervals_text(ends_of(estimate), lambda end: f"{factor * end:.2f}")
     row = f"{name:<29}{what:<14}{factor * estimate.value:>10.2f}   {interval}"
     return f"{row:<78} spread {factor * estimate.spread:.2f}" if measure.kind == "mean" else row
 

@@ -55,7 +55,7 @@ def inspect(dataset: xarray.Dataset) -> Inspection:
 def verdict(dataset: xarray.Dataset) -> str:
     """How many cores pass, the first measure of protection, and how exact the numerics are."""
     hits, first = dataset.sizes["hit"], effectiveness(dataset)[0]
-    interval = intervals_text(first.low, first.high, first.parameters)
+    interval = intervals_text(first.ends)
     told = f"{int(passed(dataset).sum())} of {hits} cores pass. {first.label}{SHOWN_UNITS[first.units]} "
     told += number_text(first.value) + ("" if interval == "-" else f" ({interval})")
     told += "" if np.isnan(first.ratio) else f", {number_text(first.ratio)} of the solid plate's"

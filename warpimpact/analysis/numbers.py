@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 from warpimpact.statistics.intervals import Estimate
 
@@ -22,20 +23,32 @@ def interval_text(low: float, high: float, text: Callable[[float], str] = number
     return f"at least {text(low)}" if math.isnan(high) else f"{text(low)} to {text(high)}"
 
 
-def intervals_text(
-    low: float, high: float, parameters: tuple[float, float] | None, text: Callable[[float], str] = number_text
-) -> str:
-    """An interval by the hits, and beside it one by the parameters where shots draw these from a posterior."""
-    by_hits = interval_text(low, high, text)
-    if parameters is None:
-        return by_hits
-    by_parameters = "not known" if math.isnan(parameters[0]) else interval_text(*parameters, text)
-    return f"by hits {by_hits}, by parameters {by_parameters}"
+class Ends(NamedTuple):
+    """Intervals of a number: by the hits, by the parameters where shots draw these from a posterior, and how far the
+    numerics may shift it, None or NaN where that is not known."""
+
+    low: float
+    high: float
+    parameters: tuple[float, float] | None = None
+    numerics: float | None = None
 
 
-def ends_of(estimate: Estimate) -> tuple[float, float, tuple[float, float] | None]:
-    """The ends of its intervals, as `intervals_text` takes them."""
-    return estimate.low, estimate.high, estimate.parameters
+def ends_of(estimate: Estimate) -> Ends:
+    """Those of an estimate."""
+    return Ends(estimate.low, estimate.high, estimate.parameters, estimate.numerics)
+
+
+def intervals_text(ends: Ends, text: Callable[[float], str] | None = None) -> str:
+    """The intervals of a number; without a format of its ends four digits, and two of what the numerics may shift."""
+    shift = text or "{:.2g}".format
+    text = text or number_text
+    told = interval_text(ends.low, ends.high, text)
+    if ends.parameters is not None:
+        unknown = math.isnan(ends.parameters[0])
+        told = f"by hits {told}, by parameters {'not known' if unknown else interval_text(*ends.parameters, text)}"
+    if ends.numerics is None or math.isnan(ends.numerics) or told == "-":
+        return told
+    return f"{told}, numerics ± {shift(ends.numerics)}"
 
 
 def plus_minus(estimate: Estimate, number: str, half_width: str) -> str:

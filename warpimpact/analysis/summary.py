@@ -4,23 +4,24 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from warpimpact.analysis import base
-from warpimpact.analysis.numbers import interval_text, intervals_text
+from warpimpact.analysis.numbers import Ends, interval_text, intervals_text
 from warpimpact.analysis.survival import by_draws, draws_note, over_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import is_choice, status_codes
-from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing
+from warpimpact.results.dataset import finer_pair, is_choice, status_codes
+from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, shift_of
 from warpimpact.scene.display import STORED
-from warpimpact.solver.pilot_text import accuracy_text, errors_text, hits_text
+from warpimpact.solver.pilot_text import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
+from warpimpact.statistics.shifts import shift_of_mean
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -33,7 +34,8 @@ SLICE = 2**18
 class Spread:
     """Mean and standard deviation over the ``count`` hits that have a quantity; NaN when there are none.
 
-    ``interval`` holds the mean at 95 %, and is NaN if the hits give none.
+    ``interval`` holds the mean at 95 %, and is NaN if the hits give none; ``parameters`` and ``numerics`` are those of
+    the mean's `Estimate`.
     """
 
     count: int
@@ -41,11 +43,18 @@ class Spread:
     standard_deviation: float
     interval: tuple[float, float] = (math.nan, math.nan)
     parameters: tuple[float, float] | None = None
+    numerics: float | None = None
 
     @classmethod
     def of(cls, estimate: Estimate) -> Spread:
         """Of the values that exist; the standard deviation is that of the hits themselves (ddof = 0)."""
-        return cls(estimate.count, estimate.value, estimate.spread, (estimate.low, estimate.high), estimate.parameters)
+        interval = estimate.low, estimate.high
+        return cls(estimate.count, estimate.value, estimate.spread, interval, estimate.parameters, estimate.numerics)
+
+    def times(self, factor: float) -> Spread:
+        """The same in another unit."""
+        ends = Estimate(self.mean, *self.interval, self.count, self.standard_deviation, self.parameters, self.numerics)
+        return Spread.of(ends.times(factor))
 
 
 @dataclass(frozen=True)
@@ -75,6 +84,8 @@ def promise_text(dataset: Result) -> str | None:
         fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
         name = next((name for name in fixed if given.get(name) is not None), "scheme")
         return f"promises nothing, as numerics.{name} is given"
+    if attr.LEVEL_FOR in told:
+        return _level_for(told)
     asked = json.loads(told[attr.ACCURACY])
     stated = accuracy_text(asked, layered=attr.STATUS_ERROR in told)
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
@@ -84,6 +95,19 @@ def promise_text(dataset: Result) -> str | None:
     if told[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {found}"
     return f"{name} does not keep its promise ({stated}) at the level that it may use; {found}"
+
+
+def _level_for(told: Mapping[str, Any]) -> str:
+    """What the level of a run with a stop rule was found for."""
+    velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
+    depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
+    errors = f"single hits may err by {errors_text(velocity, tilt, depth, status)}"
+    which = "found" if told[attr.PROMISE_KEPT] else "not exact enough"
+    return f"{_level(told)} {which} for {told[attr.LEVEL_FOR]}; {errors}"
+
+
+def _level(told: Mapping[str, Any]) -> str:
+    return f"level {json.loads(told[attr.RESOLUTION])['level']}"
 
 
 def breaks_promise(dataset: Result) -> bool:
@@ -112,9 +136,13 @@ def summary(dataset: Result) -> Summary:
 def _base_depth(dataset: Result) -> Spread | None:
     if not base.has_base(dataset):
         return None
-    needed = dataset[[name for name in base.NEEDED if name in dataset]]
+    needed = dataset[[name for name in (*base.NEEDED, *v.GROUPS["finer"]) if name in dataset]]
     depths = np.concatenate([base.base_depth(part) for part in slices(needed)])
-    return Spread.of(over_draws(dataset, estimate_of("mean", depths, **dealing(dataset)), depths))
+    estimate, dealt = estimate_of("mean", depths, **dealing(dataset)), dealing(dataset)
+    if (pair := finer_pair(needed)) is not None:
+        levels = base.base_depth(pair[0]), base.base_depth(pair[1])
+        estimate = replace(estimate, numerics=shift_of_mean(*levels, images=dealt["images"]))
+    return Spread.of(over_draws(dataset, estimate, depths))
 
 
 def _broken(dataset: Result) -> int | None:
@@ -141,7 +169,8 @@ def estimated(dataset: Result, measures: Sequence[Measure], confidence: float = 
             tally.add(part)
             if v.POSTERIOR_DRAW in dataset:
                 values.append(tally.measure.values(part))
-    found = {tally.measure: tally.estimate() for tally in tallies}
+    pair = finer_pair(dataset[[name for name in (v.STATUS, *MEASURED, *v.GROUPS["finer"]) if name in dataset]])
+    found = {tally.measure: replace(tally.estimate(), numerics=shift_of(tally.measure, pair)) for tally in tallies}
     if v.POSTERIOR_DRAW not in dataset:
         return found
     return {
@@ -193,27 +222,58 @@ def summary_text(dataset: Result) -> str:
     rows = [_count_row(meaning, count, hits) for meaning, count in result.counts.items() if count]
     if result.broken is not None:
         rows.append(_count_row("broken", result.broken, hits))
-    rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<18}  spread")
-    rows += [
-        _spread_row("residual velocity", result.residual_velocity, "m/s", hits),
-        _spread_row("deflection", result.deflection, "°", hits),
+    means = [
+        ("residual velocity", result.residual_velocity, "m/s"),
+        ("deflection", result.deflection, "°"),
+        *((f"tilt at {standoff * 1e3:g} mm", tilt, "°") for standoff, tilt in result.tilt.items()),
     ]
-    rows += [_spread_row(f"tilt at {standoff * 1e3:g} mm", tilt, "°", hits) for standoff, tilt in result.tilt.items()]
     if (depth := result.base_depth) is not None and depth.count:
-        shown = replace(depth, mean=1e3 * depth.mean, standard_deviation=1e3 * depth.standard_deviation)
-        low, high = depth.interval
-        rows.append(_spread_row("depth in the base", replace(shown, interval=(1e3 * low, 1e3 * high)), "mm", hits))
-    notes = (numerics_note(dataset, result.residual_velocity), draws_note(dataset))
+        means.append(("depth in the base", depth.times(1e3), "mm"))
+    wide = max(18, *(len(_intervals(spread)) for _, spread, _ in means))
+    rows.append(f"{'':<20}{'mean':>8}   {'95 % interval':<{wide}}  spread")
+    rows += [_spread_row(name, spread, unit, hits, wide) for name, spread, unit in means]
+    notes = (numerics_note(dataset), levels_note(dataset), draws_note(dataset))
     return "\n".join([*rows, *stop_lines(dataset), *filter(None, notes)])
 
 
-def numerics_note(dataset: Result, velocity: Spread) -> str:
-    """That an interval is narrower than what the numerics may be off by; empty where it is not."""
-    error, (low, high) = dataset.attrs.get(attr.RESIDUAL_VELOCITY_ERROR, 0.0), velocity.interval
-    if not 0.5 * (high - low) < error:
+def numerics_note(dataset: Result) -> str:
+    """What tells how far the numerics may shift the numbers of a result; empty where nothing does."""
+    if v.FINER_HIT not in dataset:
         return ""
-    hits = hits_text(json.loads(dataset.attrs[attr.ACCURACY])["share"])
-    return f"Intervals are by the hits alone; the numerics may be off by more: {error:.2g} m/s for {hits}."
+    return f"numerics ±: from {dataset.sizes['finer']} of the hits, which were computed at a finer level, too."
+
+
+def levels_note(dataset: Result) -> str:
+    """Whether the means of a result ask for another level than its single hits do; empty where they do not."""
+    told = dataset.attrs
+    if attr.LEVEL_SHIFTS not in told or attr.RESOLUTION not in told or attr.LEVEL_FOR in told:
+        return ""
+    standoffs = dataset[v.STANDOFF].values.tolist()[-1:]
+    means = estimated(dataset, means_of((v.RESIDUAL_VELOCITY, v.TILT), standoffs)).values()
+    open_by = [estimate.half_width for estimate in means]
+    level, shifts = json.loads(told[attr.RESOLUTION])["level"], json.loads(told[attr.LEVEL_SHIFTS])
+    enough = [int(at) for at, by in shifts.items() if all(a <= 0.5 * b for a, b in zip(by, open_by, strict=False))]
+    if enough and min(enough) < level:
+        by = _shifts_text(shifts[str(min(enough))])
+        return f"For the means alone level {min(enough)} is enough (numerics.level): it shifts them by at most {by}."
+    if any(a > b for a, b in zip(shifts.get(str(level), ()), open_by, strict=False)):
+        by = _shifts_text(shifts[str(level)])
+        return (
+            f"The numerics may shift the means by more than the hits leave open, by {by}: a stricter numerics.accuracy "
+            "tells more of them than more hits."
+        )
+    return ""
+
+
+def _shifts_text(shifts: Sequence[float]) -> str:
+    return " and ".join(f"{shift:.2g}{unit}" for shift, unit in zip(shifts, (" m/s", "°"), strict=False))
+
+
+_STOPPED = {
+    "half_width": "its half width is met",
+    "numerics": "more hits are of no use, as the numerics may shift it by more than half of that half width",
+    "max_count": "max_count ended it",
+}
 
 
 def stop_lines(dataset: Result) -> list[str]:
@@ -223,10 +283,11 @@ def stop_lines(dataset: Result) -> list[str]:
         return []
     (low, high), unit = told[attr.ESTIMATE_INTERVAL], STORED[told[attr.ESTIMATE_UNITS]]
     interval = interval_text(unit.factor * low, unit.factor * high, "{:.6g}".format)
-    reason = {"half_width": "its half width is met", "max_count": "max_count ended it"}[told[attr.STOP_REASON]]
+    shift = told.get(attr.ESTIMATE_NUMERICS, 0.0)
+    numerics = f", numerics ± {unit.factor * shift:.2g}{unit.suffix}" if shift > 0.0 else ""
     return [
         f"{told[attr.STOP_QUANTITY]} = {unit.text(told[attr.ESTIMATE], '.6g')}, {told[attr.CONFIDENCE]:.4g} interval "
-        f"{interval}{unit.suffix}; {reason}"
+        f"{interval}{unit.suffix}{numerics}; {_STOPPED[told[attr.STOP_REASON]]}"
     ]
 
 
@@ -242,9 +303,13 @@ def _count_row(meaning: str, count: int, hits: int) -> str:
     return f"{meaning.replace('_', ' '):<20}{count:>8d}   {count / hits:.1%}"
 
 
-def _spread_row(name: str, spread: Spread, unit: str, hits: int) -> str:
+def _spread_row(name: str, spread: Spread, unit: str, hits: int, wide: int) -> str:
     if spread.count == 0:
         return f"{name:<20}{'-':>8}   no core behind the plate"
-    interval = intervals_text(*spread.interval, spread.parameters, "{:.2f}".format)
     some = f"   of {spread.count} hits" if spread.count < hits else ""
-    return f"{name:<20}{spread.mean:>8.2f}   {interval:<18}  {spread.standard_deviation:.1f} {unit}{some}"
+    interval = f"{_intervals(spread):<{wide}}"
+    return f"{name:<20}{spread.mean:>8.2f}   {interval}  {spread.standard_deviation:.1f} {unit}{some}"
+
+
+def _intervals(spread: Spread) -> str:
+    return intervals_text(Ends(*spread.interval, spread.parameters, spread.numerics), "{:.2f}".format)

@@ -24,10 +24,15 @@ _OF_A_PLATE = (
 
 def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
     """Warn (`Implausible`) of every value of a campaign that is possible, but far from what such campaigns have."""
+    for sentence in doubted(scene, impact, hits):
+        warnings.warn(sentence, Implausible, stacklevel=2)
+
+
+def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
+    """The sentences of `warn_of`."""
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
-    for sentence in implausible(_values(scene, impact, hits), usual):
-        warnings.warn(sentence, Implausible, stacklevel=2)
+    yield from implausible(_values(scene, impact, hits), usual)
 
 
 def _values(scene: Scene, impact: Impact, hits: Hits) -> Iterator[tuple[str, str, float]]:

@@ -17,11 +17,13 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 from .accuracy import add_study, add_validate
 from .catalogue import add_catalogue
 from .compare import add_compare
+from .design import add_design
 from .export import add_export, add_report
 from .firing import add_test
 from .identify import add_identify
 from .limit import add_limit
 from .mistakes import bug_report, implausible_told, message_of
+from .optimise import add_optimise
 from .plain import Plain, say
 from .progress import verbosity
 from .replay import add_replay
@@ -41,12 +43,14 @@ _COMMANDS = (
     add_plot,
     add_compare,
     add_plate,
+    add_design,
     add_replay,
     add_export,
     add_report,
     add_study,
     add_validate,
     add_identify,
+    add_optimise,
     add_test,
     add_schema,
     add_completion,

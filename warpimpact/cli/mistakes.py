@@ -49,18 +49,19 @@ def mistakes() -> tuple[type[Exception], ...]:
     from warpimpact.results.files import OutputError, ResultError
     from warpimpact.runs.team import ClusterError
     from warpimpact.solver.device import DeviceError
+    from warpimpact.solver.resolution import TooManySteps
 
-    return CampaignError, ClusterError, OutputError, ResultError, DeviceError
+    return CampaignError, ClusterError, OutputError, ResultError, DeviceError, TooManySteps
 
 
 @contextmanager
 def implausible_told() -> Iterator[None]:
-    """A value that is probably not what was meant gets a line on stderr, once."""
+    """A value that is probably not what was meant, and a computation that takes long, get a line on stderr, once."""
     with warnings.catch_warnings():
         show, told = warnings.showwarning, set[str]()
 
         def show_once(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
-            if category.__name__ != "Implausible":  # its module takes a while to import
+            if category.__name__ not in ("Implausible", "Costly"):  # their modules take a while to import
                 show(message, category, *place, **more)
             elif str(message) not in told:
                 told.add(str(message))
@@ -72,12 +73,13 @@ def implausible_told() -> Iterator[None]:
 
 @contextmanager
 def memory_told(campaign: Path) -> Iterator[None]:
-    """Report a lack of memory as an error of the campaign that needs it."""
+    """Report a lack of memory, or of time, as an error of the campaign that needs it."""
     from warpimpact.campaign.text import CampaignError
+    from warpimpact.solver.resolution import TooManySteps
 
     try:
         yield
-    except MemoryError as error:
+    except (MemoryError, TooManySteps) as error:
         raise CampaignError(f"{campaign}: {error}") from None
 
 

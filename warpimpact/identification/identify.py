@@ -14,12 +14,12 @@ from warpimpact.identification.fit import Fit, Sampling
 from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
-from warpimpact.identification.store import Store
 from warpimpact.results import posterior_file
 from warpimpact.results.files import OutputError
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.run import Interrupted
 from warpimpact.runs.shards import claimed
+from warpimpact.runs.store import Store
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def identify_to_file(
     """
     made = made_by(device)
     with claimed(output):
-        store = Store(output, {"fit": fit.text, **made})
+        store = Store(output, {"fit": fit.text, **made}, "fit")
         store.begin(resume=resume, overwrite=overwrite)
         try:
             sampled = sample(fit, device=device, store=store, progress=progress)

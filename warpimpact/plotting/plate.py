@@ -47,7 +47,7 @@ def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "
     """
     target = plate if isinstance(plate, Target) else Target(layers=(plate,))
     plate, layered = target.layers[0], len(target.layers) > 1
-    figure, axes = _sheet(_extent(plate, core) * _MM, beside=_SECTION if layered else 0.0)
+    figure, axes = _sheet(drawn_extent(plate, core) * _MM, beside=_SECTION if layered else 0.0)
     if layered:
         _draw_section(figure, axes, target)
     patches = [*_holes(plate, axes), *_frames(plate), *([] if core is None else [_section(core)])]
@@ -72,7 +72,7 @@ def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "
     return figure
 
 
-def _extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
+def drawn_extent(plate: Plate, core: Core | None) -> NDArray[np.float64]:
     """Drawn extent along y and z [m]; that of an unbounded plate is at least twice the core's diameter."""
     if plate.size is not None:
         return np.array(plate.size)

@@ -46,15 +46,36 @@ def write_report(
     """Write the report of some results, whole or not at all.
 
     Args:
-        datasets: results by the names to show; of an open file only the needed parts are read.
         path: the HTML file; an existing one is replaced.
+        datasets, folders, trajectories, study, progress: as in `report_page`.
+
+    Raises:
+        OutputError: the file cannot be written.
+        ResultError, CampaignError: a hit cannot be replayed.
+    """
+    page = report_page(datasets, folders=folders, trajectories=trajectories, study=study, progress=progress)
+    with aside(path) as file:
+        file.write_text(page, encoding="utf-8")
+
+
+def report_page(
+    datasets: Mapping[str, xarray.Dataset],
+    *,
+    folders: Mapping[str, Path],
+    trajectories: int = 32,
+    study: xarray.Dataset | None = None,
+    progress: Progress | None = None,
+) -> str:
+    """The report of some results as HTML.
+
+    Args:
+        datasets: results by the names to show; of an open file only the needed parts are read.
         folders: for each result, the folder of the files that its campaign names.
         trajectories: number of hits of each result to replay on the CPU.
         study: error and speed of the numerics on a similar scene (`analysis.study.study`).
         progress: called with (hits replayed, hits to replay).
 
     Raises:
-        OutputError: the file cannot be written.
         ResultError, CampaignError: a hit cannot be replayed.
     """
     results = [result_content(name, dataset) for name, dataset in datasets.items()]
@@ -74,15 +95,13 @@ def write_report(
         }
         drawn["first"] = telling(datasets[name], hits)
     comparison = compared(datasets) if len(datasets) > 1 else None
-    page = _page(
+    return _page(
         data=data,
         results=[result | {"shown": few.sizes["hit"]} for result, few in zip(results, shown, strict=True)],
         comparison=comparison,
         conclusion=conclusion(results, comparison),
         study=None if study is None else study_table(study),
     )
-    with aside(path) as file:
-        file.write_text(page, encoding="utf-8")
 
 
 def _followed(total: int, progress: Progress | None) -> Callable[[Sequence[int]], Iterator[int]]:
@@ -132,6 +151,11 @@ def _page(*, results: Sequence[dict[str, Any]], data: dict[str, Any], **content:
         variables=data["variables"],
         made=f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         version=warpimpact.__version__,
-        texts={"number": number_text, "interval": interval_text, "intervals": intervals_text, "units": SHOWN_UNITS},
+        texts=texts(),
         **content,
     )
+
+
+def texts() -> dict[str, Any]:
+    """How tables.html writes numbers, intervals and units."""
+    return {"number": number_text, "interval": interval_text, "intervals": intervals_text, "units": SHOWN_UNITS}

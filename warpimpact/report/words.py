@@ -6,16 +6,17 @@ import json
 import math
 import tomllib
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
-from warpimpact.analysis.comparison_text import RANKING_HEAD, best_rows, conditions, rankings
+from warpimpact.analysis.comparison_text import RANKING_HEAD, Comparison, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effectiveness
 from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
 from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note, slices, status_shares
@@ -80,21 +81,27 @@ def result_content(name: str, dataset: xarray.Dataset) -> dict[str, Any]:
     }
 
 
-def compared(datasets: Mapping[str, xarray.Dataset]) -> dict[str, Any]:
-    """The comparison of plates as sentences, tables and a picture; if there is none, a sentence gives the reason."""
+def compared(datasets: Mapping[str, xarray.Dataset], *, picture: bool = True) -> dict[str, Any]:
+    """The comparison of plates as sentences, tables and a picture, if one is wanted; if there is no comparison, a
+    sentence gives the reason."""
     try:
         comparison = compare(list(datasets.values()), list(datasets))
     except ResultError as error:
         return {"conditions": [str(error)], "best": [], "rankings": [], "head": RANKING_HEAD, "picture": ""}
-    picture = BytesIO()
-    comparison_figure(comparison).savefig(picture, dpi=100)
     return {
         "conditions": conditions(comparison),
         "best": best_rows(comparison),
         "rankings": rankings(comparison),
         "head": RANKING_HEAD,
-        "picture": b64encode(picture.getvalue()).decode(),
+        "picture": _picture(comparison) if picture else "",
     }
+
+
+def _picture(comparison: Comparison) -> str:
+    """The figure of a comparison as base64."""
+    buffer = BytesIO()
+    comparison_figure(comparison).savefig(buffer, dpi=100)
+    return b64encode(buffer.getvalue()).decode()
 
 
 def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, Any] | None) -> list[str]:
@@ -102,7 +109,7 @@ def conclusion(results: Sequence[Mapping[str, Any]], comparison: Mapping[str, An
     told = []
     for result in results:
         first = next(iter(result["measures"]))
-        interval = intervals_text(first.low, first.high, first.parameters)
+        interval = intervals_text(first.ends)
         told.append(
             f"{result['name']}: {result['passed']} of {result['hits']} cores pass. {first.label}"
             f"{SHOWN_UNITS[first.units]} {number_text(first.value)}"
@@ -190,14 +197,14 @@ def _plain(value: object) -> str:
 
 def _statuses(dataset: xarray.Dataset) -> Iterator[Row]:
     for status, share in status_shares(dataset).items():
-        yield Row(words(status), f"{share.value:.2%}", intervals_text(*ends_of(share), "{:.2%}".format))
+        yield Row(words(status), f"{share.value:.2%}", intervals_text(ends_of(share), "{:.2%}".format))
 
 
 def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
     means = means_of([name for name in v.shown_by("report") if name in dataset], dataset[v.STANDOFF].values.tolist())
     for measure, estimate in estimated(dataset, means).items():
         if estimate.count:
-            interval = intervals_text(*ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
+            interval = intervals_text(ends_of(estimate.times(measure.display.factor)), "{:.2f}".format)
             yield Row(
                 f"mean {words(measure.variable)}{measure.place}", measure.display.text(estimate.value, ".2f"), interval
             )
@@ -206,9 +213,13 @@ def _numbers(dataset: xarray.Dataset) -> Iterator[Row]:
 def _plate(dataset: xarray.Dataset) -> dict[str, Any]:
     """The cell of the hits, with its holes as an SVG path: lengths in mm, y to the right, z up."""
     holes = outlines(dataset)
-    vertices = np.stack([holes["y"], -holes["z"]], axis=-1) * _MM
+    vertices = np.stack([holes["y"], holes["z"]], axis=-1)
     gaps = np.flatnonzero(np.isnan(vertices[:, 0]))
     rings = [ring[~np.isnan(ring[:, 0])] for ring in np.split(vertices, gaps)]
-    path = " ".join("M" + "L".join(f"{y:.3f},{z:.3f}" for y, z in ring) + "Z" for ring in rings if len(ring))
     y, z = (float(length) * _MM for length in dataset.attrs[attr.PLATE_PERIOD])
-    return {"path": path, "y": y, "z": z}
+    return {"path": svg_path(rings), "y": y, "z": z}
+
+
+def svg_path(rings: Iterable[NDArray[np.float64]]) -> str:
+    """Closed outlines [m], each of shape [vertices, 2], as an SVG path: lengths in mm, y to the right, z up."""
+    return " ".join("M" + "L".join(f"{y:.3f},{-z:.3f}" for y, z in ring * _MM) + "Z" for ring in rings if len(ring))

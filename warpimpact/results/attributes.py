@@ -70,6 +70,11 @@ DEPTH_ERROR = _declared("depth_error", "number", "m")
 """Only where some shots of the pilot stop in a layer."""
 STATUS_ERROR = _declared("status_error", "number")
 """Share of the hits; only of targets with several layers."""
+LEVEL_FOR = _declared("level_for")
+"""The quantity of a stop rule, where the pilot found the level for it and not for single hits."""
+LEVEL_SHIFTS = _declared("level_shifts", "table")
+"""JSON of what the numerics may shift the mean residual velocity [m s-1] and the mean last tilt [degree] by, at every
+level that the pilot tried."""
 FINGERPRINT = _declared("fingerprint")
 COMPUTE_TIME = _declared("compute_time", "number", "s")
 HITS_PER_SECOND = _declared("hits_per_second", "number", "s-1")
@@ -120,6 +125,8 @@ STOP_QUANTITY = _declared("stop_quantity")
 STOP_REASON = _declared("stop_reason")
 ESTIMATE = _declared("estimate", "number")
 ESTIMATE_INTERVAL = _declared("estimate_interval", "pair")
+ESTIMATE_NUMERICS = _declared("estimate_numerics", "number")
+"""How far the numerics may shift the estimate; only with a pilot."""
 ESTIMATE_UNITS = _declared("estimate_units")
 CONFIDENCE = _declared("confidence", "number")
 

@@ -52,7 +52,7 @@ def to_table(
     period: tuple[float, float],
     attributes: Mapping[str, Any],
     double: bool = False,
-    solid: Mapping[str, Any] | None = None,
+    beside: Mapping[str, Any] | None = None,
     left_out: Collection[str] = (),
 ) -> Table:
     """Gather shots and outcomes into the columns of the hit map.
@@ -67,7 +67,8 @@ def to_table(
         attributes: Global attributes of the run: title, history, campaign, versions, device, seed, ...
         double: Whether the outcomes were computed in double precision. If not, they are stored in single precision;
             shots are always double.
-        solid: Columns of the solid plate (v.SOLID_VARIABLES, v.SOLID_LIMITS), SI and radians.
+        beside: Columns of other shots: those of the solid plate (v.SOLID_VARIABLES, v.SOLID_LIMITS), and those at a
+            finer level (`finer_columns`); SI and radians.
         left_out: Variables that are not stored.
     """
     coordinates: dict[str, Any] = {
@@ -79,9 +80,9 @@ def to_table(
     }
     if v.LAYER_STANDOFF_TILT in outcomes:
         coordinates[v.LAYER_STANDOFF] = np.array(scene.record.layer_standoffs)
-    coordinates |= solid or {}
+    coordinates |= beside or {}
     coordinates |= outlines_in(scene.target.layers[0], *((-0.5 * side, 0.5 * side) for side in period))
-    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES, *v.GROUPS["solid"])
+    along = (*v.COORDINATES, *v.OUTLINE_VARIABLES, *v.LAYER_COORDINATES, *v.GROUPS["solid"], *v.GROUPS["finer"])
     values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
     own = own_columns(scene.target, shots)
     values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
@@ -90,12 +91,25 @@ def to_table(
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     variables = (name for name in v.hit_variables() if name in values and name not in left_out)
-    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES}
+    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES, *v.FINER_VARIABLES}
     return Table.of(
         stored_columns(variables, values, single),
         stored_columns((name for name in along if name in coordinates), coordinates, single),
         _ATTRIBUTES | attr.with_units(dict(attributes) | {attr.PLATE_PERIOD: np.array(period)}),
     )
+
+
+def narrow_table(scene: Scene, shots: Shots, outcomes: Outcomes, names: Collection[str]) -> Table:
+    """Only some columns of `to_table`, as far as the outcomes have them, with stand-offs and the core: for who computes
+    with many small results at once."""
+    own = own_columns(scene.target, shots)
+    values: dict[str, Any] = {variable: getattr(shots, variable.field) for variable in v.SHOT_VARIABLES}
+    values |= {name: own[name] for name in v.OPTIONAL_SHOT_VARIABLES if name in own}
+    values |= vars(outcomes) | faces(scene.target)
+    kept = [name for name in (*v.hit_variables(), *v.LAYER_FACES) if name in names and name in values]
+    coordinates: dict[Any, Any] = {v.HIT: np.arange(len(shots)), v.STANDOFF: np.array(scene.record.standoffs)}
+    attributes = {attr.CORE: scene.core.model_dump_json()}
+    return Table.of(stored_columns(kept, values), stored_columns(coordinates, coordinates), attributes)
 
 
 def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any) -> xarray.Dataset:
@@ -106,6 +120,33 @@ def to_dataset(scene: Scene, shots: Shots, outcomes: Outcomes, **arguments: Any)
 def solid_columns(outcomes: Outcomes) -> dict[str, Any]:
     """What is stored of the first shots at the solid plate of equal areal density, SI and radians."""
     return {name: getattr(outcomes, of_hits) for name, of_hits in v.SOLID_VARIABLES.items()}
+
+
+def finer_columns(outcomes: Outcomes, numbers: NDArray[np.int64]) -> dict[str, Any]:
+    """What is stored of the hits with some numbers that were computed at a finer level, too; SI and radians."""
+    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in outcomes}
+    return {v.FINER_HIT: numbers.astype(np.int32)} | {name: getattr(outcomes, stored[name]) for name in stored}
+
+
+def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
+    """The hits of a result that were computed at a finer level, too, in memory: as they are in the result, and at that
+    level. None if there are none."""
+    if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
+        return None
+    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if name in dataset and of_hits in dataset}
+    if any(dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
+        return None  # results that were joined have several
+    numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
+    found, places, those = np.intersect1d(hits, numbers, return_indices=True)
+    if not len(found) or v.STATUS not in stored.values() or np.isin(hits, found).sum() > len(found):
+        return None
+    order = np.argsort(those)
+    coarse = dataset.isel(hit=places[order]).load()
+    at_finer: dict[str, Any] = {
+        of_hits: (of_hits.dims, dataset[name].values[those[order]], dict(dataset[of_hits].attrs))
+        for name, of_hits in stored.items()
+    }
+    return coarse, coarse.assign(at_finer)
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import numpy as np
@@ -18,6 +18,7 @@ from warpimpact.results.dataset import failed, images, is_choice, passed, shots_
 from warpimpact.scene.display import STORED, Unit
 from warpimpact.scene.units import Angle, Energy, Length, Moment, Number, Speed, Stress, Time, quantity, quoted
 from warpimpact.statistics.intervals import Dealing, Dealt, Estimate, Estimating
+from warpimpact.statistics.shifts import shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -159,8 +160,17 @@ class Measure:
             return np.where(np.isinf(values), np.nan, values)  # a limit beyond the largest value tried
         if self.kind != "probability":
             return values
-        beyond = values > self.limit if self.above else values < self.limit
-        return np.where(np.isnan(values), np.nan, beyond)
+        return np.where(np.isnan(values), np.nan, self._beyond(values) > 0.0)
+
+    def _beyond(self, values: Array) -> Array:
+        """How far values are on the side of the limit that counts."""
+        return values - self.limit if self.above else self.limit - values
+
+    def numbers(self, dataset: Result) -> Array:
+        """As `values`; of a probability how far each shot is on the side that counts."""
+        if self.kind != "probability":
+            return self.values(dataset)
+        return self._beyond(replace(self, kind="quantile").values(dataset))
 
 
 def place_of_standoff(distances: Sequence[float] | Array, standoff: float) -> int:
@@ -200,6 +210,22 @@ class Tally:
     def estimate(self) -> Estimate:
         """The estimate from the shots so far."""
         return self._dealt.estimate().within(self.measure.least)
+
+
+def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
+    """How far the numerics may shift a measure, by hits of a result at two levels (`finer_pair`); None without them."""
+    if levels is None or measure.variable in v.LIMIT_VARIABLES:
+        return None
+    dealt: Estimating = {**dealing(levels[0]), "replicates": 1, "confidence": confidence}
+    coarse, fine = (measure.numbers(level) for level in levels)
+    match measure.kind:
+        case "quantile":
+            return shift_of_quantile(coarse, fine, measure.share, **dealt)
+        case "probability":
+            return shift_of_share(coarse, fine, **dealt)
+        case "share":
+            return shift_of_yes(coarse, fine, **dealt)
+    return shift_of_mean(coarse, fine, **dealt)
 
 
 def dealing(dataset: Result) -> Dealing:

@@ -52,10 +52,12 @@ class Column:
         """The values, in memory."""
         return np.asarray(self.data[self.first : self.stop] if _HIT in self.dims else self.data[...])
 
-    def part(self, hits: slice) -> Column:
+    def part(self, hits: slice | NDArray[np.int64]) -> Column:
         """The column of some of the hits."""
         if _HIT not in self.dims:
             return self
+        if not isinstance(hits, slice):
+            return Column(self.dims, self.values[hits], self.attrs)
         first, stop, _ = hits.indices(self.shape[0])
         return replace(self, first=self.first + first, stop=self.first + stop)
 
@@ -108,7 +110,7 @@ class Table:
         kept = {*name, *self.coords}
         return replace(self, variables={key: one for key, one in self.variables.items() if key in kept})
 
-    def isel(self, *, hit: slice) -> Table:
+    def isel(self, *, hit: slice | NDArray[np.int64]) -> Table:
         """Some of the hits."""
         return replace(self, variables={name: one.part(hit) for name, one in self.variables.items()})
 

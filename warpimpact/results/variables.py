@@ -68,14 +68,15 @@ BURST_VARIABLES = (SAMPLE, BURST_ORDER, NEAREST_EARLIER_HIT)
 OPTIONAL_SHOT_VARIABLES = (*SCATTER_VARIABLES, *BURST_VARIABLES, *POSTERIOR_VARIABLES)
 
 
+def _beside(variable: Variable, kind: str, along: str, what: str) -> Variable:
+    """The same variable of other shots than the hits, along a dimension of their own."""
+    dims = tuple(along if dim == "hit" else dim for dim in variable.dims)
+    return Variable(f"{kind}_{variable}", dims, variable.units, f"{variable.long_name}, {what}")
+
+
 def _solid(variable: Variable) -> Variable:
     """The same variable for the solid plate of equal areal density."""
-    return Variable(
-        f"solid_{variable}",
-        tuple("solid_hit" if dim == "hit" else dim for dim in variable.dims),
-        variable.units,
-        f"{variable.long_name}, solid plate of equal areal density",
-    )
+    return _beside(variable, "solid", "solid_hit", "solid plate of equal areal density")
 
 
 SOLID_VARIABLES = {_solid(variable): variable for variable in (STATUS, RESIDUAL_VELOCITY, TILT)}
@@ -88,14 +89,29 @@ SOLID_LIMITS = {quantity: _solid(limit.value) for quantity, limit in LIMITS.item
 are alike. Present only in a result of `warpimpact limit` with `output.solid_reference`."""
 SOLID_LIMIT_VARIABLES = tuple(SOLID_LIMITS.values())
 
+_RECORDED = dict.fromkeys(one for group in registry.RECORDS if group.measured and not group.exact for one in group)
+FINER_HIT = Variable("finer_hit", ("finer",), "1", "number of a hit that was computed at a finer level, too")
+FINER_COORDINATES = (FINER_HIT,)
+FINER_VARIABLES = {
+    _beside(one, "finer", "finer", "at a finer level"): one
+    for one in (*_RECORDED, STOPPED_IN, DEPTH)
+    if one.is_number_of_hit or one in (STATUS, STOPPED_IN, BROKEN)
+}
+"""Outcomes of some hits at a finer level of resolution, each with the variable of the hits that it corresponds to.
+Present where a pilot found the resolution; not in a campaign with a posterior, nor in a search of limits."""
+
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")
 
 OUTLINE_VARIABLES = (OUTLINE_Y, OUTLINE_Z)
 
-GROUPS = {"plate": OUTLINE_VARIABLES, "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES)}
-"""What is not along "hit" stands in groups of the file. In memory the solid plate's are coordinates, which no choice of
-hits spreads over the hits; outlines.py says what becomes of the outlines."""
+GROUPS = {
+    "plate": OUTLINE_VARIABLES,
+    "solid": (*SOLID_VARIABLES, *SOLID_LIMIT_VARIABLES),
+    "finer": (*FINER_COORDINATES, *FINER_VARIABLES),
+}
+"""What is not along "hit" stands in groups of the file. In memory those of other shots are coordinates, which no choice
+of hits spreads over the hits; outlines.py says what becomes of the outlines."""
 
 VARIABLES = (*SHOT_VARIABLES, *OUTCOME_VARIABLES)
 """Present in every hit map."""

@@ -17,7 +17,7 @@ from warpimpact.runs.describe import made_by
 from warpimpact.runs.task import Computation, Task
 from warpimpact.runs.team import HIT_MAP, ClusterError, Team, awaited, task_size
 from warpimpact.solver.device import DeviceError, cores
-from warpimpact.solver.pilot import Found
+from warpimpact.solver.findings import Found
 from warpimpact.solver.worker import Worker
 
 LONELY = 120.0

@@ -10,20 +10,23 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
-from warpimpact.results.dataset import solid_columns
+from warpimpact.results.dataset import finer_columns, solid_columns
 from warpimpact.results.table import Table
 from warpimpact.runs.describe import computed_by, described, found_attributes
+from warpimpact.runs.levels import excess_of_stop, seeks_measure, shifts_of
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.device import find_device
+from warpimpact.solver.findings import Found, HitErrors
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import Found, HitErrors, pilot_size
+from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import marched, pilot_of, spread_places
 from warpimpact.solver.worker import Worker
@@ -53,9 +56,9 @@ class HitMap:
         """What a pilot of the campaign's own hits finds; None if the campaign fixes the resolution itself."""
         if campaign.numerics.explicit is not None:
             return None
-        computed = len(campaign.sampler()) // len(campaign.symmetries)
-        pilot = pilot_shots(campaign, pilot_size(campaign.numerics.asked, computed))
-        return pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying)
+        pilot = pilot_shots(campaign, pilot_most(campaign))
+        found = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, excess_of_stop(campaign))
+        return replace(found, shifts=shifts_of(campaign, pilot, found), tried=())
 
     def found_in(self, result: Result) -> HitErrors | None:
         """What the pilot of a result found; None if its campaign fixed the resolution."""
@@ -68,6 +71,7 @@ class HitMap:
             tilt_error=math.radians(float(told[attr.TILT_ERROR])),
             depth_error=float(told.get(attr.DEPTH_ERROR, math.nan)),
             status_error=float(told.get(attr.STATUS_ERROR, math.nan)),
+            shifts={int(level): tuple(at) for level, at in json.loads(told.get(attr.LEVEL_SHIFTS, "{}")).items()},
         )
 
 
@@ -86,12 +90,24 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     images, numerics = len(campaign.symmetries), numerics_of(campaign, task.found)
     progress = of_images(progress, images)
     outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, progress)
-    solid = None
+    beside = _finer(campaign, task.found)
     if task.solid is not None:
-        solid = solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
+        beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
-    return described(campaign, task.shots, outcomes, numerics, attributes, solid)
+    attributes |= {attr.LEVEL_FOR: campaign.stop.quantity} if campaign.stop and seeks_measure(campaign) else {}
+    return described(campaign, task.shots, outcomes, numerics, attributes, beside)
+
+
+def _finer(campaign: Campaign, found: Found | None) -> dict[str, Any]:
+    """Columns of the hits that a pilot computed at a finer level. The pilot knows the scene of the campaign, not the
+    draws of a posterior."""
+    if not isinstance(found, HitErrors) or found.finer is None or campaign.drawn is not None:
+        return {}
+    group = len(campaign.symmetries) * campaign.at_a_plate
+    groups = len(found.finer) // campaign.at_a_plate
+    numbers = _pilot_places(campaign, pilot_most(campaign))[:groups, None] * group + np.arange(group)
+    return finer_columns(found.finer.unfolded(campaign.symmetries), numbers.reshape(-1))
 
 
 def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
@@ -111,7 +127,7 @@ def found_in(result: Result) -> tuple[Numerics, bool, float]:
     return numerics, bool(told[attr.PROMISE_KEPT]), float(json.loads(told[attr.ACCURACY])["share"])
 
 
-def _errors(found: Found | None) -> dict[str, float]:
+def _errors(found: Found | None) -> dict[str, Any]:
     """The errors that a pilot of a hit map found, as attributes."""
     if not isinstance(found, HitErrors):
         return {}
@@ -121,7 +137,8 @@ def _errors(found: Found | None) -> dict[str, float]:
         attr.DEPTH_ERROR: found.depth_error,
         attr.STATUS_ERROR: found.status_error,
     }
-    return {name: error for name, error in told.items() if not math.isnan(error)}
+    shifts = {attr.LEVEL_SHIFTS: json.dumps(found.shifts)} if found.shifts else {}
+    return {name: error for name, error in told.items() if not math.isnan(error)} | shifts
 
 
 def at_solid(campaign: Campaign, shots: Shots) -> tuple[Scene, Shots]:
@@ -144,14 +161,24 @@ def pilot_shots(campaign: Campaign, most: int) -> Shots:
     They depend on the campaign alone: the first hits of a Sobol or random sampling, hits at even distances of a grid or
     a list. Bursts are whole, as a later hit meets what the earlier ones left.
     """
-    sampler, images, at_a_plate = campaign.sampler(), len(campaign.symmetries), campaign.at_a_plate
-    group = images * at_a_plate
-    groups = len(sampler) // group
-    count = min(most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS), groups)
+    sampler, images = campaign.sampler(), len(campaign.symmetries)
+    group, places = images * campaign.at_a_plate, _pilot_places(campaign, most)
     if campaign.hits.sampling in ("sobol", "random"):
-        return sampler.shots(0, count * group)[::images]
-    places = spread_places(groups, count)
+        return sampler.shots(0, len(places) * group)[::images]
     return Shots.joined([sampler.shots(int(place) * group, group)[::images] for place in places])
+
+
+def pilot_most(campaign: Campaign) -> int:
+    """Shots of a pilot of a campaign, at most."""
+    return pilot_size(campaign.numerics.asked, len(campaign.sampler()) // len(campaign.symmetries))
+
+
+def _pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
+    """Which groups of images, or bursts with their images, `pilot_shots` takes."""
+    at_a_plate = campaign.at_a_plate
+    groups = len(campaign.sampler()) // (len(campaign.symmetries) * at_a_plate)
+    count = min(most if at_a_plate == 1 else max(-(-most // at_a_plate), _FEWEST_BURSTS), groups)
+    return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
 
 
 def _outcomes(

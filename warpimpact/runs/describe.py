@@ -18,8 +18,8 @@ from warpimpact.results.table import Table
 from warpimpact.scene import Accuracy, Burst, Numerics, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.device import find_device
+from warpimpact.solver.findings import Found
 from warpimpact.solver.materials import weakens
-from warpimpact.solver.pilot import Found
 from warpimpact.solver.resolution import Resolution, resolve
 
 
@@ -29,7 +29,7 @@ def described(
     outcomes: Outcomes,
     numerics: Numerics,
     attributes: Mapping[str, Any],
-    solid: Mapping[str, Any] | None = None,
+    beside: Mapping[str, Any] | None = None,
 ) -> Table:
     """The columns of some shots of a campaign.
 
@@ -38,7 +38,7 @@ def described(
         outcomes: of the first shot of every group.
         numerics: with which they were computed.
         attributes: those of how they were computed (`computed_by`), and of what is not the same in any campaign.
-        solid: columns of the first shots at the solid plate of equal areal density, SI and radians.
+        beside: columns of other shots, as in `to_table`.
     """
     told = _campaign(campaign)
     told |= _numerics(campaign, resolve(campaign.scene, numerics, weakens(campaign.target, shots)))
@@ -50,7 +50,7 @@ def described(
         period=campaign.hits.covered(campaign.plate),
         attributes={**told, **attributes},
         double=is_double(campaign),
-        solid=solid,
+        beside=beside,
         left_out=() if campaign.output.exit_state else v.EXIT_VARIABLES,
     )
 

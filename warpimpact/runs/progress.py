@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from warpimpact.results.measures import Measure
-from warpimpact.solver.pilot import Found
+from warpimpact.solver.findings import Found
 from warpimpact.statistics.intervals import Estimate
 
 

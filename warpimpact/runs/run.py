@@ -15,18 +15,23 @@ import numpy as np
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed, images, numbered
+from warpimpact.results.dataset import failed, finer_pair, images, numbered
 from warpimpact.results.files import OutputError
 from warpimpact.results.interrupts import stop_if_asked
-from warpimpact.results.measures import Measure, Tally
+from warpimpact.results.measures import Measure, Tally, shift_of
 from warpimpact.results.outlines import in_memory
 from warpimpact.results.table import Table, joined
+from warpimpact.runs.compute import numerics_of
+from warpimpact.runs.foreseen import Cost
+from warpimpact.runs.levels import OF_THE_NUMERICS
 from warpimpact.runs.progress import Follow, RunProgress, followed
 from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manifest
 from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
-from warpimpact.solver.pilot import Found
+from warpimpact.solver.findings import Found
+from warpimpact.solver.resolution import at_level
+from warpimpact.solver.worker import Cancel
 from warpimpact.statistics.intervals import Dealing
 from warpimpact.statistics.stopping import looks
 
@@ -41,21 +46,25 @@ class Interrupted(KeyboardInterrupt):
     """A run was interrupted; the message says what is saved."""
 
 
-def run(campaign: Campaign, *, device: str = "auto", progress: Follow | None = None) -> xarray.Dataset:
+def run(
+    campaign: Campaign, *, device: str = "auto", progress: Follow | None = None, cancel: Cancel | None = None
+) -> xarray.Dataset:
     """Compute every hit of a campaign, in memory.
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), "cpu", "cuda:0", "cuda:0,cuda:1", …
         progress: called several times a second; without it a notebook shows a bar.
+        cancel: ends the run from another thread.
 
     Returns:
         The Dataset of results/dataset.py, one entry per hit.
 
     Raises:
         DeviceError: the device is absent.
+        Cancelled: by `cancel`.
     """
     total = len(campaign.sampler())
-    with local_team(campaign, device) as team, followed(progress) as follow:
+    with local_team(campaign, device, cancel=cancel) as team, followed(progress) as follow:
         shards = Shards(extent(total, campaign.at_a_plate))
         end = _fill(campaign, shards, team, follow)
     table = joined(shards.shard(index) for index in range(end.shards))
@@ -134,16 +143,19 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
     there = sorted(shards.there())
     for index in there:
         watch.add(index, shards.shard(index))
-    watch.resumed = watch.done
-    if there:
-        watch.found = computation.found_in(shards.shard(there[0]))
+    watch.resumed, cost = watch.done, Cost(campaign, team.made_by[attr.DEVICE])
+    if 0 in there:  # it holds what the pilot found, and its hits at a finer level
+        watch.found = computation.found_in(shards.shard(0))
     else:
 
         def tick() -> None:
             team.width()  # tells of a cluster that has lost its workers
-            follow(replace(watch.progress(0), piloting=True, trying=team.trying()))
+            if (trying := team.trying()) is not None:
+                cost.tell(at_level(trying, campaign.numerics))
+            follow(replace(watch.progress(0), piloting=True, trying=trying))
 
         watch.found = awaited(team.pilot(), _REPORT_EVERY, tick)
+    cost.tell(numerics_of(campaign, watch.found))
     tasks = _tasks(shards, len(sampler), lambda: team.task(0.0 if campaign.stop else watch.rate))
     waiting: dict[Future[Table], range] = {}
     try:
@@ -153,7 +165,8 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
                 shots = sampler.shots(task.start * shards.extent, len(task) * shards.extent)
                 first = shots[: shards.extent] if task.start == 0 else None
                 solid = None if first is None else _solid_shots(campaign, first, computation.most_solid)
-                waiting[team.submit(Task(shots, solid, watch.found))] = task
+                found = watch.found if task.start == 0 or watch.found is None else watch.found.told
+                waiting[team.submit(Task(shots, solid, found))] = task
             finished, _ = wait(waiting, timeout=_REPORT_EVERY, return_when=FIRST_COMPLETED)
             stop_if_asked()
             for future in finished:
@@ -226,6 +239,7 @@ class _Watch:
             self._stop = Tally(rule.measure, **dealt, confidence=rule.confidence)
             self._looks = looks(campaign.hits.sampling, self._shards)
             self._look = next(self._looks)
+        self._shift: float | None = None
         self._early: set[int] = set()
         self._next, self._hits, self._time = 0, 0, 0.0
         self.done, self.resumed, self.failed = 0, 0, 0
@@ -255,6 +269,8 @@ class _Watch:
         stop: dict[str, Any] = {}
         if self._rule is not None:
             self._stop.add(shard)
+            if self._next == 1:
+                self._shift = shift_of(self._rule.measure, finer_pair(shard), self._rule.confidence)
             stop = self._looked_at()
         if self._next == self._shards or stop:
             self.end = _End(self._next, self._hits, self._time, stop)
@@ -266,13 +282,15 @@ class _Watch:
         if self._next != self._look:
             return {}
         self._look = next(self._looks, self._shards)
-        estimate = self._stop.estimate()
-        met = estimate.half_width <= rule.measure.shown(rule.half_width)
-        if not met and self._next != self._shards:
+        estimate, asked, shift = self._stop.estimate(), rule.measure.shown(rule.half_width), self._shift or 0.0
+        met = estimate.half_width + shift <= asked
+        no_use = not met and shift > OF_THE_NUMERICS * asked and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
+        if not met and not no_use and self._next != self._shards:
             return {}
         return {
             attr.STOP_QUANTITY: rule.quantity,
-            attr.STOP_REASON: "half_width" if met else "max_count",
+            attr.STOP_REASON: "half_width" if met else "numerics" if no_use else "max_count",
+            **({} if self._shift is None else {attr.ESTIMATE_NUMERICS: shift}),
             attr.ESTIMATE: estimate.value,
             attr.ESTIMATE_INTERVAL: [estimate.low, estimate.high],
             attr.ESTIMATE_UNITS: rule.measure.units,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Protocol
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.table import Table
 from warpimpact.scene import Shots
+from warpimpact.solver.findings import Found
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.pilot import Found
 from warpimpact.solver.worker import Worker
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from warpimpact.runs.compute import HitMap
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.task import Computation, Task
 from warpimpact.solver.device import DeviceError, find_device
-from warpimpact.solver.pilot import Found
+from warpimpact.solver.findings import Found
 from warpimpact.solver.worker import Cancel, Worker
 
 CUDA_SHOTS = 2**17
@@ -73,18 +73,21 @@ def awaited(future: Future[Result], every: float, tick: Callable[[], object]) ->
 
 
 @contextmanager
-def local_team(campaign: Campaign, device: str, computation: Computation = HIT_MAP) -> Iterator[Team]:
+def local_team(
+    campaign: Campaign, device: str, computation: Computation = HIT_MAP, *, cancel: Cancel | None = None
+) -> Iterator[Team]:
     """The devices of this machine, each computing one task at a time.
 
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), or names with commas between them.
         computation: of every hit.
+        cancel: ends what they compute, whose futures then raise Cancelled; it is cancelled when the team breaks up.
 
     Raises:
         DeviceError: a device is absent, or they are of different kinds, which compute different bits.
     """
     devices = _devices(device)
-    idle, done, stop = SimpleQueue[Worker](), dict[int, int](), Cancel()
+    idle, done, stop = SimpleQueue[Worker](), dict[int, int](), cancel or Cancel()
     tried, begun = list[int](), list[Future[Any]]()
     for chosen in devices:
         idle.put(Worker(str(chosen), cancel=stop))

@@ -1,5 +1,4 @@
-"""Plates as the kernels see them: one period of material fractions, the grid of the exposure with its filter, and the
-first window about a hit."""
+"""Plates as the kernels see them: one period of material fractions, and the grid of the exposure with its filter."""
 
 from __future__ import annotations
 
@@ -17,7 +16,7 @@ from warpimpact.solver.itself import Itself
 from warpimpact.solver.materials import ROUNDING
 
 if TYPE_CHECKING:
-    from warpimpact.scene import Core, Pattern, Plate, Shots
+    from warpimpact.scene import Pattern, Plate
     from warpimpact.solver.materials import Materials
     from warpimpact.solver.resolution import Resolution
 
@@ -48,12 +47,6 @@ FEWEST_PLANES, PLANES = 3, 1.6
 distance and steps by the second of theirs. Twice as many change no answer by a tenth of its error (oblique, slots)."""
 SPARE = 4
 """Planes beyond those within a laminate: one on each side, the one behind the last whole spacing, and its neighbour."""
-SIZES = (1024, 2048, 3072, 4096, 6144)
-"""Windows that blocks have [nodes]; each is compiled by itself. Two fields of float32 of the largest fill the 48 KiB of
-shared memory that a block of every CUDA device has."""
-WINDOW_SLACK, NODAL_SLACK = 1.6, 1.2
-"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
-its fine grid, large windows cost more time than the repetition of some shots."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,25 +182,6 @@ def _planes(depth: float, material: Materials, resolution: Resolution) -> Planes
     reach = max(FEWEST_PLANES, math.ceil(PLANES * math.sqrt(depth / way)))
     most = float(material.together.max()) / depth if material.weakens else 0.0
     return Planes(math.floor(most * reach + ROUNDING) + SPARE, depth / reach, reach)
-
-
-def first_window(core: Core, shots: Shots, material: Materials, grids: Sequence[Grid], *, nodal: bool) -> int:
-    """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
-    plate, or the laminate that it begins. Layers farther away have windows of their own.
-
-    Args:
-        material, grids: of the plate; the window holds it in each of the grids.
-    """
-    slack = NODAL_SLACK if nodal else WINDOW_SLACK
-    steepest, thickness = float(shots.obliquity.max()), float(material.together.max())
-    turned = min(1.0, float(np.sin(np.hypot(shots.pitch, shots.yaw)).max()))
-    half = slack * core.max_radius / math.cos(steepest) + thickness * math.tan(steepest) + core.bounding_radius * turned
-    return max(2 * (math.ceil(half / grid.spacing) + 2 * grid.reach + 3) for grid in grids)
-
-
-def block_window(cells: int) -> int:
-    """Nodes of the window of a block that holds so many in each direction; 0 if none does."""
-    return next((size for size in SIZES if size >= cells**2), 0)
 
 
 def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
+from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit_search import Search
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.pilot import LimitErrors, limits_pilot_size, pilot_limits
+from warpimpact.solver.pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
 from warpimpact.solver.simulate import computed, spread

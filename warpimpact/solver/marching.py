@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
 from warpimpact.solver.device import halving, launching, load
-from warpimpact.solver.memory import Cells, Memory
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.windows import Cells
 from warpimpact.solver.worker import NEVER, Cancel
 
 Array = NDArray[np.float64]
@@ -68,12 +69,12 @@ class March:
             wider = 2 * self.cells[0], 2 * self.cells[1]
             if not len(pending) or not self._fits(wider):
                 break
-            self._widen(wider)
+            self.widen(wider)
         outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))
         reached(count)
         return outcomes
 
-    def _widen(self, cells: Cells) -> None:
+    def widen(self, cells: Cells) -> None:
         """Have wider windows; those that do not fit a block are for the simple layout."""
         self.cells, prepared = cells, self.memory.prepared
         if 0 < prepared.variant.window < math.prod(cells):
@@ -147,6 +148,15 @@ class March:
                 progress(done)
         finally:  # whoever interrupts does not wait for a shot that takes a minute
             pool.shutdown(wait=False, cancel_futures=True)
+
+
+def apart(function: Callable[..., int], *arguments: Any) -> int:
+    """Call what computes without the interpreter lock on a thread of its own, so that a signal need not wait for it."""
+    pool = ThreadPoolExecutor(1)
+    try:
+        return pool.submit(function, *arguments).result()
+    finally:
+        pool.shutdown(wait=False)
 
 
 class _Here(Executor):

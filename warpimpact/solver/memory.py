@@ -3,7 +3,6 @@ computed at a time, and what the kernels fill."""
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from functools import partial
@@ -21,21 +20,15 @@ from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, plate_of, plates_of, surface_of, table_of
+from warpimpact.solver.windows import Cells
 
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
 
 Array = NDArray[np.float64]
-Cells = tuple[int, int]
-"""Of a window, along y and z."""
 
 LARGEST_ONSET = 0.02
 """Bound of the onset speed, as a share of the impact velocity."""
-
-
-DEEP = 0.6
-"""Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
-the core's surface from its centre of mass: the core arrives turned."""
 CUDA_CHUNK = 65536
 MEMORY_SHARE = 0.5
 """Share of the free memory that scratch may take."""
@@ -140,31 +133,9 @@ class Memory:
         """Room for the outcomes of all shots."""
         return self.empty(self.stage.Outcomes, (len(self.prepared.shots),))
 
-    def windows(self, cells: Cells) -> list[Cells]:
-        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field. A
-        layer that earlier hits pierce keeps their channels."""
-        materials, scene = self.prepared.materials, self.prepared.scene
-        steepest, own = math.tan(float(self.prepared.shots.obliquity.max())), [cells]
-        for k, material in enumerate(materials[1:], start=1):
-            thicker = max(0.0, float(material.together.max() - materials[0].together.max()))
-            spare, count = DEEP * scene.core.bounding_radius + thicker * steepest, 0
-            for grids in self.prepared.plates if material.weakens or self.variant.burst else ():
-                half = 0.5 * cells[0] * grids[0].spacing + spare
-                count = max(count, 2 * (math.ceil(half / grids[k].spacing) + 2 * len(grids[k].taps) + 3))
-            own.append((count, count))
-        return [own[material.laminate] for material in materials]
-
-    def nodes(self, cells: Cells) -> list[int]:
-        """Nodes of a slot in the windows of all layers; those of a laminate are those of its first layer."""
-        prepared = self.prepared
-        return [
-            max(grids[k].planes.number for grids in prepared.plates) * math.prod(own) if material.laminate == k else 0
-            for k, (material, own) in enumerate(zip(prepared.materials, self.windows(cells), strict=True))
-        ]
-
     def firsts(self, cells: Cells) -> NDArray[np.int64]:
         """The first node of every layer's field among those of its slot."""
-        before = np.cumsum([0, *self.nodes(cells)[:-1]])
+        before = np.cumsum([0, *self.prepared.nodes(cells)[:-1]])
         return np.asarray(before[[material.laminate for material in self.prepared.materials]])
 
     @property
@@ -185,22 +156,25 @@ class Memory:
 
     def slots(self, cells: Cells, threads: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
-        count, nodes = self.at_a_plate, max(sum(self.nodes(cells)), self._pierced(cells))
+        count, nodes = self.at_a_plate, max(sum(self.prepared.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
-        return min(wanted, int(MEMORY_SHARE * self._free / self._slot(cells)), (2**31 - 1) // (count * max(nodes, 1)))
+        return min(
+            wanted, int(MEMORY_SHARE * self._free / self.slot_bytes(cells)), (2**31 - 1) // (count * max(nodes, 1))
+        )
 
     def too_large(self, cells: Cells) -> str:
         """Why there is no slot, if the plate's window has so many cells."""
+        prepared = self.prepared
         windows = [
             f"{place}: {y} × {z} nodes" + (f" in {grid.planes.number} planes" if grid.planes.number > 1 else "")
             for (place, _), grid, (y, z) in zip(
-                self.prepared.scene.target.named, self.prepared.grids, self.windows(cells), strict=True
+                prepared.scene.target.named, prepared.grids, prepared.windows(cells), strict=True
             )
         ]
         return (
-            f"a shot needs {self._slot(cells) / 2**30:.3g} GiB in {sum(self.nodes(cells)):.3g} nodes about its way "
-            f"through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and 2.15e+09 "
-            "nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
+            f"a shot needs {self.slot_bytes(cells) / 2**30:.3g} GiB in {sum(prepared.nodes(cells)):.3g} nodes about "
+            f"its way through the target ({', '.join(windows)}), but {MEMORY_SHARE * self._free / 2**30:.3g} GiB and "
+            "2.15e+09 nodes are allowed; give a lower level or a longer degradation_length or degradation_depth"
         )
 
     @property
@@ -210,11 +184,11 @@ class Memory:
 
     def _pierced(self, cells: Cells) -> int:
         """Nodes of a slot in the channels of earlier hits."""
-        return sum(earlier_hits.channel_nodes(self.prepared, self.windows(cells)))
+        return sum(earlier_hits.channel_nodes(self.prepared, self.prepared.windows(cells)))
 
-    def _slot(self, cells: Cells) -> int:
-        """Bytes of a slot."""
-        count, nodes, layers = self.at_a_plate, sum(self.nodes(cells)), len(self.prepared.grids)
+    def slot_bytes(self, cells: Cells) -> int:
+        """Memory of a slot of scratch [bytes]."""
+        count, nodes, layers = self.at_a_plate, sum(self.prepared.nodes(cells)), len(self.prepared.grids)
         size = 8 if self.variant.double else 4
         per_ring: int = size + (wp.types.type_size_in_bytes(self.stage.Sums) if self.variant.bends else 0)
         earlier = 0
@@ -227,11 +201,11 @@ class Memory:
 
     def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
-        stage, put, nodes = self.stage, self.put, self.nodes(cells)
+        stage, put, nodes = self.stage, self.put, self.prepared.nodes(cells)
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         fields, touches = stage.Fields(), stage.Touches()
         fields.nodes, fields.first = sum(nodes), put(self.firsts(cells), wp.int32)
-        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.windows(cells)).T)
+        fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.prepared.windows(cells)).T)
         for name in self.fields:
             setattr(fields, name, empty(slots * fields.nodes))
         patches, rings = slots * self._patches, slots * self.rings
@@ -246,9 +220,11 @@ class Memory:
             touches.total_area = empty(rings)
         earlier = stage.Earlier()
         if self.variant.burst:
-            windows = self.windows(cells)
+            windows = self.prepared.windows(cells)
             earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
-        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,))
+        stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
+        if self.variant.layered:
+            stack.own_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
         return fields, touches, stack, earlier
 
     def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:

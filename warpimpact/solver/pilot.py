@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import logging
 import math
-from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TypeVar
+from dataclasses import replace
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
 from warpimpact.solver.changes import ended_otherwise, limit_changes, upper_errors
-from warpimpact.solver.pilot_text import errors_text, hits_text, limit_error_text
+from warpimpact.solver.findings import Found, HitErrors, LimitErrors, Tried
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
 Array = NDArray[np.float64]
@@ -63,71 +62,6 @@ about halve from level to level, the others are off by more than four times as m
 those at which the outcome jumps, or that come and go, have no bounded error, and finer levels are of little use."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """What a pilot found.
-
-    Attributes:
-        numerics: the level to compute all shots with.
-        kept: whether the errors are within what was asked for.
-        share: of the shots that are within the errors.
-    """
-
-    numerics: Numerics
-    kept: bool
-    share: float
-
-    @property
-    @abstractmethod
-    def errors(self) -> str:
-        """Upper estimates of the errors, with units."""
-
-    @property
-    def phrase(self) -> str:
-        """The errors, for a line of progress."""
-        return f"accuracy {self.errors} for {hits_text(self.share)}{'' if self.kept else ', not as promised'}"
-
-
-@dataclass(frozen=True)
-class HitErrors(Found):
-    """Upper estimates of the errors of what becomes of the shots; infinite where the pilot could not tell.
-
-    Attributes:
-        residual_velocity_error: [m/s]; the residual velocities behind all layers count.
-        tilt_error: at the last stand-off [rad].
-        depth_error: of the shots that stop in a layer [m]; NaN where none does.
-        status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
-    """
-
-    residual_velocity_error: float
-    tilt_error: float
-    depth_error: float = math.nan
-    status_error: float = math.nan
-
-    @property
-    def errors(self) -> str:
-        return errors_text(
-            self.residual_velocity_error, math.degrees(self.tilt_error), self.depth_error, self.status_error
-        )
-
-
-@dataclass(frozen=True)
-class LimitErrors(Found):
-    """Upper estimate of the errors of limits.
-
-    Attributes:
-        error: of velocities [m/s] or of thicknesses [m]; infinite where the pilot could not tell.
-        quantity: "velocity" or "thickness".
-    """
-
-    error: float
-    quantity: str
-
-    @property
-    def errors(self) -> str:
-        return limit_error_text(self.error, self.quantity)
-
-
 def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
     """Shots of a pilot, at most; of a run of so many hits."""
     return max(_first(accuracy), min(MORE, hits // PART))
@@ -148,8 +82,16 @@ def _fewest(share: float) -> int:
     return math.ceil(FEWEST / (1.0 - share) - 1e-9)
 
 
+Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
+"""What outcomes of some shots at a level are off by over what is allowed, from those at a finer level."""
+
+
 def pilot_hits(
-    outcomes_at: Callable[[int, Shots], Outcomes], pilot: Shots, numerics: Numerics, layers: int = 1
+    outcomes_at: Callable[[int, Shots], Outcomes],
+    pilot: Shots,
+    numerics: Numerics,
+    layers: int = 1,
+    excess_of: Excess | None = None,
 ) -> HitErrors:
     """Find the coarsest level whose outcomes have the accuracy that is asked for.
 
@@ -159,6 +101,7 @@ def pilot_hits(
             rest is computed where the first leave the choice between two levels open.
         numerics: their accuracy, precision and layout count; other settings would promise nothing.
         layers: of the target.
+        excess_of: in place of the accuracy, from the coarsest level on.
 
     Returns:
         The level that keeps the promise. If none does: the coarsest one that keeps it with errors weighed by the energy
@@ -171,10 +114,11 @@ def pilot_hits(
     accuracy, at_a_plate = numerics.asked, pilot.at_a_plate
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
-    level = coarsest_level(accuracy.strictness)
+    level = coarsest_level(accuracy.strictness) if excess_of is None else 0
     count = min(len(pilot), -(-_first(accuracy) // at_a_plate) * at_a_plate)
     some, rest = pilot[:count], pilot[count:]
     known: dict[tuple[int, bool], Outcomes] = {}
+    tried: dict[int, Tried] = {}
 
     def computed(index: int, whole: bool) -> Outcomes:
         if (index, whole) not in known:
@@ -185,21 +129,26 @@ def pilot_hits(
     def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
         for whole in (False, True) if len(rest) else (False,):
             shots = pilot if whole else some
-            found, excess, nearly = _judged(
-                computed(index, whole), computed(finer, whole), shots, at_level(index, numerics), accuracy, margin
-            )
+            pair = computed(index, whole), computed(finer, whole)
+            found, excess, nearly = _judged(*pair, shots, at_level(index, numerics), accuracy, margin)
+            if excess_of is not None:
+                excess, nearly = excess_of(*pair, shots), False
+                found = replace(found, kept=excess <= 1.0)
             _logger.info(
                 "pilot of %d hits at level %d: errors of %s, the promise is %skept",
                 len(shots), index, found.errors, "" if found.kept else "not ",
             )  # fmt: skip
             if not OPEN[0] < excess < OPEN[1]:
                 break
+        tried[index] = found, *pair
         return found, excess, nearly
 
     further = FURTHER if layers == 1 else FURTHER_LAYERED
     levels = range(level, min(level + further, len(LADDER) - 2) + 1)
     found = _coarsest(judge, levels, len(LADDER) - 1, BEYOND)
-    return found or HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
+    if found is None:
+        return HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
+    return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
 
 
 def _judged(
@@ -221,7 +170,7 @@ def _judged(
     excess = _excess(accuracy, counted, layered)
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in told)
-    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status)
+    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
     return found, excess, _excess(accuracy, weighed, layered) <= 1.0
 
 

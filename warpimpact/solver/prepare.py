@@ -3,6 +3,7 @@ made, for those who build, march or describe."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
-from warpimpact.solver.grid import Grid, Lengths, block_window, first_window, grids_of
+from warpimpact.solver.grid import Grid, Lengths, grids_of
 from warpimpact.solver.materials import OWN_LENGTHS, Materials, materials_of
-from warpimpact.solver.resolution import Resolution, conditions_of, resolve
+from warpimpact.solver.resolution import Resolution, conditions_of, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
+from warpimpact.solver.windows import Cells, block_window, first_windows, windows_behind
 
 if TYPE_CHECKING:
     from warpimpact.scene import Numerics, Plate, Scene, Shots
@@ -44,7 +46,9 @@ class Prepared:
         plates: the plate, and the layers behind it; likewise several where shots have degradation lengths of their own.
         materials: of the plate, and of the layers behind it.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
-        cells: nodes of a first window, in each direction.
+        steps: of a passage that nothing hinders, at most.
+        first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
+            [shots].
         rows: of the trace of each shot; 0 for none.
     """
 
@@ -56,7 +60,8 @@ class Prepared:
     plates: list[list[Grid]]
     materials: list[Materials]
     conditions: dict[str, NDArray[Any]]
-    cells: int
+    steps: int
+    first_cells: NDArray[np.int64]
     rows: int = 0
 
     @property
@@ -69,6 +74,31 @@ class Prepared:
         """The plate."""
         return self.grids[0]
 
+    @property
+    def cells(self) -> int:
+        """Nodes of a first window of the plate, in each direction, that serves all shots."""
+        return int(self.first_cells.max())
+
+    def windows(self, cells: Cells) -> list[Cells]:
+        """Cells of the windows of all layers, if the plate's has so many; 0 where a layer keeps no field."""
+        counts = self.windows_behind(np.array(cells[:1])).max(axis=1)
+        return [(int(count), int(count)) for count in counts]
+
+    def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
+        """`windows.windows_behind` of what was prepared."""
+        core, burst = self.scene.core, self.variant.burst
+        return windows_behind(
+            core, self.shots, self.materials, self.plates, self.conditions["plates"], plate, burst=burst
+        )
+
+    def nodes(self, cells: Cells) -> list[int]:
+        """Nodes that a shot has in the windows of all layers, likewise; those of a laminate are those of its first
+        layer."""
+        return [
+            max(grids[k].planes.number for grids in self.plates) * math.prod(own) if material.laminate == k else 0
+            for k, (material, own) in enumerate(zip(self.materials, self.windows(cells), strict=True))
+        ]
+
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     """Make every choice for some shots.
@@ -79,6 +109,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     Raises:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
             several shots at one plate or layers; or the block layout does not compute the scene.
+        TooManySteps: a shot would take months.
         MemoryError: the plate's period does not fit at the grid spacing.
     """
     core, target, record, interaction = scene.core, scene.target, scene.record, scene.interaction
@@ -91,6 +122,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     shared = "degradation_length" in shots.columns
     resolution, tabled = resolutions[0], any(name in shots.columns for name in OWN_LENGTHS)
     conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, resolution)
+    steps = int(steps_of(shots, resolution, conditions).max())
     deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
     exclusions.check_together(
@@ -112,7 +144,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         grids_of(target.layers, materials, one, own, deep=deep, shared=shared)
         for own, one in zip(lengths, resolutions, strict=True)
     ]
-    cells = first_window(core, shots, materials[0], [own[0] for own in grids], nodal=resolution.nodal)
+    first_cells = first_windows(core, shots, materials[0], grids, which, nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,
         nodal=resolution.nodal,
@@ -127,7 +159,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         deep=deep,
         tabled=tabled,
         burst=burst,  # also of one shot, as a replay of the first one of several is
-        window=block_window(cells) if resolution.block else 0,
+        window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
     rings = [
         rings_of(core, one.patches_axial, one.patches_around, one.patch_width, discs=not one.nodal)
@@ -151,7 +183,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         plates=grids,
         materials=materials,
         conditions=conditions,
-        cells=cells,
+        steps=steps,
+        first_cells=first_cells,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,15 +19,17 @@ from warpimpact.solver.device import find_device, free_memory
 from warpimpact.solver.earlier import CLOSED, channel_nodes, planes_of
 from warpimpact.solver.grid import WHOLE
 from warpimpact.solver.history import History
-from warpimpact.solver.marching import March
-from warpimpact.solver.memory import Cells, Memory
+from warpimpact.solver.marching import March, apart
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.simulate import outcomes_of
+from warpimpact.solver.windows import Cells
 
 if TYPE_CHECKING:
     from warpimpact.scene import Plate
 
 Array = NDArray[np.float64]
+_logger = logging.getLogger(__name__)
 
 HISTORY_BYTES = 1000
 """That a step of a history takes until it is written [bytes]: its trace, and twice the columns of its Dataset."""
@@ -109,7 +112,10 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
     cell_y, cell_z = nodes_about(home, march.cells, spacing)
     material = material_about(scene.target.layers[0], cell_y, cell_z, spacing) if len(steps) else np.empty((0, 0))
-    left = [_left_after(memory, march.cells, count, time_step, material) for count in steps]
+    scratch = memory.scratch(1, march.cells) if len(steps) else ()
+    if scratch and memory.variant.layered and memory.variant.degrades:  # the window of a layer opens with a step
+        scratch[0].exposure.zero_()
+    left = [_left_after(memory, march.cells, scratch, count, time_step, material) for count in steps]
     return Replay(
         outcomes=outcomes,
         history=History.from_trace(trace, _body(memory.prepared)),
@@ -145,15 +151,21 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     device = find_device("cpu")
     first = March(Memory(prepared, device))
     steps = int(first.march().steps.numpy().max())
-    cells = sum(math.prod(own) for own in first.memory.windows(first.cells))
+    cells = sum(math.prod(own) for own in first.memory.prepared.windows(first.cells))
     of_a_cell = 8 * (SNAPSHOT_COPIES * snapshots + OTHER_COPIES) if snapshots else 0
-    needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells
+    needed = HISTORY_BYTES * len(shots) * steps + of_a_cell * cells + first.memory.slot_bytes(first.cells)
     if needed > (free := free_memory()):
+        fewer = "; fewer snapshots need less" if snapshots else ""
         raise MemoryError(
             f"the history of {steps} steps with {snapshots} snapshots of {cells} cells needs {needed / 2**30:.3g} GiB, "
-            f"and {free / 2**30:.3g} GiB are free"
+            f"and {free / 2**30:.3g} GiB are free{fewer}"
         )
+    _logger.info(
+        "a history of %d steps and %d snapshots of %d cells, %.3g GiB", steps, snapshots, cells, needed / 2**30
+    )
     march = March(Memory(replace(prepared, rows=steps + 1), device))
+    if len(shots) == march.at_a_plate:  # others would all be in the window that the widest one needs
+        march.widen(first.cells)
     return march, march.march()
 
 
@@ -177,30 +189,29 @@ def _body(prepared: Prepared) -> MassProperties:
 
 
 def _left_after(
-    memory: Memory, cells: Cells, steps: int, time_step: float, material: Array
+    memory: Memory, cells: Cells, scratch: tuple[Any, ...], steps: int, time_step: float, material: Array
 ) -> tuple[Array, dict[int, Weakened]]:
     """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of its
     march, and what is left of the layers behind it by their numbers. All shots hit one plate.
 
     Args:
         cells: of the plate's window.
+        scratch: of one slot.
         material: share of material about every node of it.
     """
     prepared, variant = memory.prepared, memory.variant
-    scratch, before, outcomes = memory.scratch(1, cells), len(prepared.shots) - 1, memory.outcomes()
+    before, outcomes = len(prepared.shots) - 1, memory.outcomes()
     order = memory.put(np.arange(before + 1), wp.int32)
     if variant.layered and before:
         steps = max(1, steps)  # the window of a layer opens with the first step
     memory.give_up_after((steps - 0.5) * time_step * prepared.shots.velocity[-1])
     if before:
-        memory.launch(order, outcomes, scratch, 1, 0, before)
-    for name in memory.fields:  # the window of a layer that is not reached stays closed
-        getattr(scratch[0], name).zero_()
+        apart(memory.launch, order, outcomes, scratch, 1, 0, before)
     if variant.burst:  # a shot that meets no channel leaves what the one before knew of channels
         scratch[0].channel.fill_(CLOSED)
-    memory.launch(order, outcomes, scratch, 1, before, 1)
+    apart(memory.launch, order, outcomes, scratch, 1, before, 1)
     if variant.nodal:
-        return np.asarray(scratch[0].share.numpy().astype(np.float64).reshape(cells)), {}
+        return np.array(scratch[0].share.numpy().reshape(cells), dtype=np.float64), {}
     behind = _behind(memory, scratch, cells) if variant.layered and (variant.degrades or variant.burst) else {}
     return np.asarray(material * _share_left(memory, 0, scratch[0], cells)), behind
 
@@ -216,7 +227,7 @@ def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int,
     prepared, (fields, _, stack, _), hit = memory.prepared, scratch, _hit(memory.prepared)
     is_open, homes = stack.open.numpy(), stack.home.numpy()
     found = {}
-    for k, (cells, material) in enumerate(zip(memory.windows(plate), prepared.materials, strict=True)):
+    for k, (cells, material) in enumerate(zip(memory.prepared.windows(plate), prepared.materials, strict=True)):
         if k > 0 and cells != (0, 0) and is_open[k]:
             spacing, place = prepared.grids[k].spacing, (float(homes[k][1]), float(homes[k][2]))
             y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), cells, spacing)
@@ -233,34 +244,40 @@ def _share_left(memory: Memory, layer: int, fields: Any, plate: Cells) -> Array:
         fields: of one slot.
         plate: cells of the plate's window.
     """
-    material, cells = memory.prepared.materials[layer], memory.windows(plate)[layer]
-    through, share = (np.arange(THROUGH) + 0.5) / THROUGH, np.ones((THROUGH, *cells))
+    material, cells = memory.prepared.materials[layer], memory.prepared.windows(plate)[layer]
+    through, total = (np.arange(THROUGH) + 0.5) / THROUGH, np.zeros(cells)
     if material.weakens:
         planes = memory.prepared.grids[layer].planes if material.deep[-1] else WHOLE
         field = _planes_of(fields.exposure, memory.firsts(plate)[layer], planes.number, cells)
         depth = material.front[-1] - memory.prepared.materials[material.laminate].front[-1]
         depth = depth + material.thickness[-1] * through
-        place = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
-        share *= np.exp(material.decay_rate[-1] * np.maximum(_between(field, place), 0.0))
+        weakened = depth / planes.spacing + (planes.number > 1)  # a plane to spare before the first face
     if memory.variant.burst:
-        firsts = np.cumsum([0, *channel_nodes(memory.prepared, memory.windows(plate))])
+        firsts = np.cumsum([0, *channel_nodes(memory.prepared, memory.prepared.windows(plate))])
         number = planes_of(memory.prepared, layer, float(material.thickness[-1]))
-        inside = _between(_planes_of(fields.channel, firsts[layer], number, cells), through * (number - 1))
-        share *= np.clip(0.5 - inside / memory.prepared.grids[layer].spacing, 0.0, 1.0)
-    return np.asarray(share.mean(axis=0))
+        channel, pierced = _planes_of(fields.channel, firsts[layer], number, cells), through * (number - 1)
+    for k in range(THROUGH):  # all depths at once would take tens of gigabytes of a wide window
+        share = np.ones(cells)
+        if material.weakens:
+            share *= np.exp(material.decay_rate[-1] * np.maximum(_between(field, weakened[k]), 0.0))
+        if memory.variant.burst:
+            inside = _between(channel, pierced[k])
+            share *= np.clip(0.5 - inside / memory.prepared.grids[layer].spacing, 0.0, 1.0)
+        total += share
+    return total / THROUGH
 
 
-def _planes_of(field: Any, first: int, number: int, cells: Cells) -> Array:
-    """Planes of a window from its first node on, shape [number, cells_y, cells_z]."""
+def _planes_of(field: Any, first: int, number: int, cells: Cells) -> NDArray[Any]:
+    """Planes of a window from its first node on, shape [number, cells_y, cells_z]; a view of memory on the CPU."""
     values = field.numpy()[first : first + number * cells[0] * cells[1]]
-    return np.asarray(values.reshape(number, *cells), dtype=np.float64)
+    return np.asarray(values.reshape(number, *cells))
 
 
-def _between(planes: Array, place: Array) -> Array:
-    """Linear interpolation between planes; places count in planes."""
-    low = np.floor(place).astype(int)
-    at = (place - low)[:, None, None]
-    return np.asarray((1.0 - at) * planes[low] + at * planes[np.minimum(low + 1, len(planes) - 1)])
+def _between(planes: NDArray[Any], place: float) -> Array:
+    """Linear interpolation between planes at a place that counts in planes."""
+    low = math.floor(place)
+    at, high = place - low, min(low + 1, len(planes) - 1)
+    return np.asarray((1.0 - at) * planes[low].astype(np.float64) + at * planes[high].astype(np.float64))
 
 
 def nodes_about(home: tuple[float, float], cells: Sequence[int], spacing: float) -> tuple[Array, Array]:

@@ -18,6 +18,10 @@ from warpimpact.solver.materials import Materials, decay_rate
 Array = NDArray[np.float64]
 
 
+class TooManySteps(ValueError):
+    """A shot would take months; the message is for the user."""
+
+
 @dataclass(frozen=True)
 class Level:
     """Settings that go together; lengths scale with the scene (docs/model.md §4's table)."""
@@ -61,6 +65,8 @@ SMALLEST_STRESS = 1.0
 
 STEP_ALLOWANCE = 200
 """How many times the way of an unhindered passage a shot may take, at impact velocity, before it is given up."""
+MOST_STEPS = 10**7
+"""Of an unhindered passage: a shot may take STEP_ALLOWANCE times as many, and they are counted in 32 bits."""
 UNBREAKABLE = 1.0e30
 """Strength of a core that has none [Pa], beyond any stress."""
 
@@ -241,6 +247,26 @@ def conditions_of(
         "longest_step": passage,
         "longest_way": STEP_ALLOWANCE * (depth - gaps + 2.0 * len(materials) * core.bounding_radius) + gaps,
     }
+
+
+def steps_of(shots: Shots, resolution: Resolution, conditions: dict[str, Array]) -> Array:
+    """Steps of passages that nothing hinders, shape [shots].
+
+    Args:
+        conditions: as `conditions_of` gives them.
+
+    Raises:
+        TooManySteps: a passage takes more than MOST_STEPS.
+    """
+    step = resolution.step_at(shots.velocity, shots.obliquity, conditions["longest_step"], conditions["longest_time"])
+    steps = conditions["longest_way"] / STEP_ALLOWANCE / (step * shots.velocity)
+    if (most := float(steps.max())) > MOST_STEPS:
+        raise TooManySteps(
+            f"a passage through the target takes {most:.3g} steps of {1e9 * float(step.min()):.3g} ns, but at most "
+            f"{MOST_STEPS:.0e} are computed; the thinnest layer, the shortest degradation_depth and numerics.time_step "
+            "set the step"
+        )
+    return np.asarray(steps)
 
 
 def _least(values: Iterable[Array]) -> Array:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +13,10 @@ from numpy.typing import NDArray
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
+from warpimpact.solver.findings import Cost, HitErrors
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import HitErrors, pilot_hits, pilot_size
+from warpimpact.solver.pilot import Excess, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
@@ -72,20 +75,39 @@ def marched(memory: Memory, worker: Worker, progress: Progress | None = None) ->
 
 
 def pilot_of(
-    scene: Scene, pilot: Shots, numerics: Numerics, worker: Worker, trying: Callable[[int], object] = lambda level: None
+    scene: Scene,
+    pilot: Shots,
+    numerics: Numerics,
+    worker: Worker,
+    trying: Callable[[int], object] = lambda level: None,
+    excess_of: Excess | None = None,
 ) -> HitErrors:
     """Find the level of resolution for an accuracy (solver/pilot.py).
 
     Args:
         pilot: some of the shots.
         trying: called with every level that is computed.
+        excess_of: as in `pilot_hits`.
     """
+
+    seconds: dict[int, float] = {}
 
     def outcomes_at(level: int, some: Shots) -> Outcomes:
         trying(level)
-        return computed(prepare(scene, some, at_level(level, numerics)), worker)
+        memory = Memory(prepare(scene, some, at_level(level, numerics)), find_device(worker.device))
+        memory.build()
+        begin = time.perf_counter()
+        outcomes = marched(memory, worker)
+        seconds[level] = (time.perf_counter() - begin) / len(some)
+        return outcomes
 
-    return pilot_hits(outcomes_at, pilot, numerics, len(scene.target.layers))
+    found = pilot_hits(outcomes_at, pilot, numerics, len(scene.target.layers), excess_of)
+    if not found.tried or found.numerics.level is None:
+        return found
+    first = found.tried[0][0]
+    assert first.numerics.level is not None
+    cost = Cost(seconds[found.numerics.level], seconds[first.numerics.level], first.numerics.level, first.errors)
+    return replace(found, cost=cost)
 
 
 def spread(shots: Shots, most: int) -> Shots:

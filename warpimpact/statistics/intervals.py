@@ -32,6 +32,7 @@ class Estimate:
         spread: standard deviation over these shots.
         parameters: interval of the number for the true parameters, which are one draw of a posterior; None where shots
             draw none, NaN where the hits do not tell it. `low` and `high` are by the drawn hits alone.
+        numerics: how far the numerics may shift the number, to either side; None or NaN where that is not known.
     """
 
     value: float
@@ -40,6 +41,7 @@ class Estimate:
     count: int
     spread: float
     parameters: tuple[float, float] | None = None
+    numerics: float | None = None
 
     @property
     def half_width(self) -> float:
@@ -50,7 +52,8 @@ class Estimate:
         """The estimate in another unit."""
         value, low, high, spread = (factor * one for one in (self.value, self.low, self.high, self.spread))
         parameters = self.parameters and (factor * self.parameters[0], factor * self.parameters[1])
-        return replace(self, value=value, low=low, high=high, spread=spread, parameters=parameters)
+        numerics = None if self.numerics is None else factor * self.numerics
+        return replace(self, value=value, low=low, high=high, spread=spread, parameters=parameters, numerics=numerics)
 
     def within(self, least: float, most: float = math.inf) -> Self:
         """The estimate of a number that lies between two others: no end of its interval is beyond them."""

@@ -24,6 +24,7 @@ from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, 
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Shots, Target, exclusions
+from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
     THICKNESS_TOLERANCE,
@@ -40,7 +41,7 @@ from warpimpact.solver.limit import (
 )
 from warpimpact.solver.limit_near import velocities_from_neighbours
 from warpimpact.solver.marching import Progress
-from warpimpact.solver.pilot import LimitErrors, limits_pilot_size
+from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile

@@ -44,7 +44,7 @@ def limits_text(dataset: xarray.Dataset) -> str:
         rows += _proxy_lines(dataset)
     else:
         for name, estimate in quantiles(dataset).items():
-            ends = intervals_text(*ends_of(estimate), lambda end: f"{factor * end:.5g}")
+            ends = intervals_text(ends_of(estimate), lambda end: f"{factor * end:.5g}")
             what = "perforate" if quantity == "velocity" else "have a smaller limit"
             share = f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"
             rows.append(f"{name} = {factor * estimate.value:.5g} {unit}   95 % interval {ends}   ({share})")

@@ -16,19 +16,14 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.places import is_table, put, resolved, type_at, value_at
 from warpimpact.campaign.text import CampaignError, parsed, read_text
 from warpimpact.results import attributes as attr
 from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.runs.run import run_to_file
-from warpimpact.scene import Impact, Interaction, Plate
-from warpimpact.scene.units import PositiveArealDensity, quoted, reader_in, typed
+from warpimpact.scene.units import quoted, reader_in
 
-_TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
-"""Tables whose keys need no table in front of them, as there is no other key of that name."""
-_WHOLE = ("core", "plate", "plate.pattern", "interaction")
-_WHOLE_OF_A_LAYER = re.compile(r"layer\.\d+(\.pattern)?")
-"""Tables that may be swept as a whole."""
 _IN_GROUPS = {str(name) for group in v.GROUPS.values() for name in group}
 """Holes and shots at the solid plate, which only the results of the points hold."""
 _MOST = 10_000
@@ -37,6 +32,7 @@ _OF_A_POINT = (
     *(attr.CAMPAIGN, attr.HISTORY, attr.FINGERPRINT, attr.COMPUTE_TIME, attr.HITS_PER_SECOND, attr.TITLE),
     *(attr.RESOLUTION, attr.PROMISE_KEPT, attr.RESIDUAL_VELOCITY_ERROR, attr.TILT_ERROR, attr.NUMERICS_GIVEN),
     *(attr.STOP_QUANTITY, attr.STOP_REASON, attr.ESTIMATE, attr.ESTIMATE_INTERVAL, attr.ESTIMATE_UNITS),
+    *(attr.LEVEL_FOR, attr.LEVEL_SHIFTS, attr.ESTIMATE_NUMERICS),
     *(attr.DEPTH_ERROR, attr.STATUS_ERROR, attr.CONFIDENCE, attr.SYMMETRIES, attr.COMPUTED_HITS),
 )
 """Attributes of the result of a single point."""
@@ -118,7 +114,7 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
     for number, combination in enumerate(every):
         data, labels = json.loads(json.dumps(shared, default=str)), [label for label, _ in combination]
         for one, (_, value) in zip(inputs, combination, strict=True):
-            _place(data, one.key, value, str(path))
+            put(data, one.key, value, f"{path}: sweep")
         inputs_text = ", ".join(f"{one.name} = {label}" for one, label in zip(inputs, labels, strict=True))
         if isinstance(data.get("title"), str):
             data["title"] = f"{data['title']}: {inputs_text}"[:200]
@@ -129,10 +125,10 @@ def read_sweep(path: str | Path, *, count: int | None = None) -> Sweep:
 
 
 def _input(key: str, values: Any, path: str) -> Input:
-    place = _resolved(key, path)
+    place = resolved(key, f"{path}: sweep")
     if not isinstance(values, list) or not values:
         raise CampaignError(f"{path}: sweep.{key}: got {quoted(values)}, but it must be a list of values")
-    if place not in _WHOLE and not _WHOLE_OF_A_LAYER.fullmatch(place):
+    if not is_table(place):
         labels = tuple(value if isinstance(value, str) else json.dumps(value, default=str) for value in values)
         given = tuple(values)
     else:
@@ -143,41 +139,6 @@ def _input(key: str, values: Any, path: str) -> Input:
     if len(set(labels)) < len(labels):
         raise CampaignError(f"{path}: sweep.{key}: got a value twice, but each must differ")
     return Input(place, labels, given)
-
-
-def _resolved(key: str, path: str) -> str:
-    """The dotted place of a key."""
-    if "." in key or key in _WHOLE:
-        return key
-    for table, model in _TABLES.items():
-        if key in model._keys():
-            return f"{table}.{key}"
-    known = ", ".join(name for model in _TABLES.values() for name in model._keys())
-    raise CampaignError(
-        f"{path}: sweep: got the unknown input {quoted(key)}; give one of {', '.join(_WHOLE)}, {known}, or a dotted "
-        'place such as "core.mass"'
-    )
-
-
-def _place(data: dict[str, Any], key: str, value: Any, path: str) -> None:
-    """Put a value at its place in a campaign."""
-    *tables, last = _parts(key)
-    if tables[:1] == ["layer"] and "layer" not in data:
-        raise CampaignError(f"{path}: sweep: got {quoted(key)}, but the campaign has no [[layer]]")
-    inside: Any = data
-    for part in tables:
-        entries: dict[Any, Any] = dict(enumerate(inside)) if isinstance(inside, list) else inside
-        inside = entries.setdefault(part, {} if entries is inside else None)
-        if not isinstance(inside, dict | list):
-            raise CampaignError(f"{path}: sweep: {key} leads through {part}, which is no table")
-    if isinstance(inside, list) and last not in range(len(inside)):
-        raise CampaignError(f"{path}: sweep: {key} leads to {last}, but its list has {len(inside)} entries")
-    inside[last] = value
-
-
-def _parts(key: str) -> list[str | int]:
-    """The parts of a dotted place; a number is that of an entry of a list."""
-    return [int(part) if part.isdecimal() else part for part in key.split(".")]
 
 
 def folder_of(output: Path) -> Path:
@@ -276,31 +237,15 @@ def _equal(one: xarray.Variable, other: xarray.Variable) -> bool:
 
 def _coordinate(one: Input, sweep: Sweep) -> tuple[Any, ...]:
     """Values of an input: a number with its unit where it is a quantity, else its label."""
-    kind = _type(one.key, next(iter(sweep.campaigns.values())))
+    kind = type_at(one.key, next(iter(sweep.campaigns.values())))
     stride = math.prod(sweep.shape[sweep.inputs.index(one) + 1 :])
     campaigns = list(sweep.campaigns.values())[:: max(1, stride)][: len(one.values)]
-    numbers = [_value(one.key, campaign) for campaign in campaigns]
+    numbers = [value_at(one.key, campaign) for campaign in campaigns]
     if kind is None or not all(isinstance(number, int | float) for number in numbers):
         return one.name, np.array(one.labels), {"long_name": one.key}
     reader, values = reader_in(kind), np.array(numbers, dtype=float)
     units = reader.display.stored if reader else "1"
     return one.name, np.degrees(values) if units == "degree" else values, {"units": units, "long_name": one.key}
-
-
-def _type(key: str, campaign: Campaign) -> Any:
-    """The type of an input, with its marks; None where it is in no model."""
-    table, _, last = key.rpartition(".")
-    if last == "areal_density":  # which a plate reads and has, but not as a field
-        return PositiveArealDensity
-    found = getattr(type(_value(table, campaign)), "model_fields", {}).get(last)
-    return None if found is None else typed(found)
-
-
-def _value(key: str, campaign: Campaign) -> Any:
-    value: Any = campaign
-    for part in _parts(key) if key else ():
-        value = value[part] if isinstance(part, int) and isinstance(value, tuple) else getattr(value, str(part), None)
-    return value
 
 
 def _attributes(sweep: Sweep, points: Sequence[xarray.Dataset]) -> dict[str, Any]:

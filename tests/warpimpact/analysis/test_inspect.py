@@ -39,7 +39,7 @@ def test_it_tells_origin_and_numbers_with_intervals(result: Path, capsys: pytest
     half = 2.364624 * means.std(ddof=1) / np.sqrt(8)  # t of 7 degrees of freedom, 97.5 %
     row = next(line for line in lines if line[:4] == ["residual", "velocity,", "m/s", "mean"])
     assert row[4] == f"{means.mean():.2f}"
-    assert (row[5], row[7]) == (f"{means.mean() - half:.2f}", f"{means.mean() + half:.2f}")
+    assert (row[5], row[7]) == (f"{means.mean() - half:.2f}", f"{means.mean() + half:.2f},")
     assert lines[-1] == ["0", "of", "512", "shots", "failed"]
 
 

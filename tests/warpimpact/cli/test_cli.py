@@ -29,6 +29,7 @@ SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
         ["identify"],
         ["catalogue"],
         ["test"],
+        ["optimise"],
     ],
 )
 def test_help_shows_how(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:

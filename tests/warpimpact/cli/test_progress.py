@@ -11,7 +11,7 @@ from warpimpact.cli.progress import show_run
 from warpimpact.results.measures import Estimate, Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.scene import Numerics
-from warpimpact.solver.pilot import HitErrors
+from warpimpact.solver.findings import HitErrors
 
 
 def standing(done: int, *, failed: int = 0, resumed: int = 100) -> RunProgress:

@@ -12,12 +12,12 @@ from warpimpact.identification import identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
 from warpimpact.identification.posterior import learnt, parameters_of
-from warpimpact.identification.store import Store
 from warpimpact.identification.text import posterior_text
 from warpimpact.plotting.posterior import hits_figure, measured_figure, pairs_figure
 from warpimpact.results import posterior_file
 from warpimpact.results.files import OutputError, ResultError
 from warpimpact.runs.run import Interrupted
+from warpimpact.runs.store import Store
 
 FitMaker = Callable[..., Fit]
 
@@ -96,7 +96,7 @@ def test_a_resumed_fit_equals_an_undisturbed_one(
 
 
 def test_a_batch_with_a_flipped_bit_is_whole_or_none(tmp_path: Path) -> None:
-    store, arrays = Store(tmp_path / "a.nc", {"fit": "a"}), {"points": np.arange(3.0), "misfit_0": np.ones(2)}
+    store, arrays = Store(tmp_path / "a.nc", {"fit": "a"}, "fit"), {"points": np.arange(3.0), "misfit_0": np.ones(2)}
     store.folder.mkdir()
     store.save(0, arrays)
     path = store.folder / "batch_000000.npz"

@@ -4,10 +4,10 @@ import gzip
 import html
 import json
 import re
-import shutil
 from base64 import b64decode
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -238,73 +238,26 @@ def test_what_is_missing_is_told_and_nothing_written(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator["Browser"]:
-    programs = shutil.which("chromium"), shutil.which("chromedriver")
-    if None in programs:
-        pytest.skip("needs the programs chromium and chromedriver (Debian: chromium, chromium-driver)")
-    browser = Browser(*programs)
-    yield browser
-    browser.driver.quit()
+def open_report(browser: Any, page: Path, width: int) -> None:
+    browser.open(page.as_uri(), width)
+    browser.wait(lambda: browser.find("#map-1 .nsewdrag") and browser.find("#map-0 .nsewdrag"))
 
 
-class Browser:
-    """A headless Chromium."""
-
-    def __init__(self, chromium: str, chromedriver: str) -> None:
-        from selenium import webdriver
-
-        options = webdriver.ChromeOptions()
-        for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
-            options.add_argument(argument)
-        options.binary_location = chromium
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        self.driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(chromedriver))
-
-    def open(self, page: Path, width: int) -> None:
-        self.driver.execute_cdp_cmd(
-            "Emulation.setDeviceMetricsOverride",
-            {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600},
-        )
-        self.driver.get(page.as_uri())
-        self.wait(lambda: self.find("#map-1 .nsewdrag") and self.find("#map-0 .nsewdrag"))
-
-    def find(self, selector: str) -> list:
-        return self.driver.find_elements("css selector", selector)
-
-    def text(self, selector: str) -> str:
-        return "\n".join(element.text for element in self.find(selector))
-
-    def wait(self, condition: Callable[[], object]) -> None:
-        from selenium.webdriver.support.ui import WebDriverWait
-
-        WebDriverWait(self.driver, 30).until(lambda _: condition())
-
-    def point_at(self, y: float, z: float, *, click: bool = False) -> None:
-        """Move to a place [mm] of the first map, 16 mm x 16 mm in size."""
-        from selenium.webdriver.common.action_chains import ActionChains
-
-        (place,) = self.find("#map-0 .nsewdrag")
-        self.driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", place)
-        right, down = y / 16 * place.size["width"], -z / 16 * place.size["height"]
-        action = ActionChains(self.driver).move_to_element_with_offset(place, round(right) - 2, round(down))
-        action = action.pause(0.2).move_by_offset(2, 0).pause(0.2)
-        (action.click() if click else action).perform()
-
-    def errors(self) -> list[str]:
-        return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
+def point_at(browser: Any, y: float, z: float, *, click: bool = False) -> None:
+    """Move to a place [mm] of the first map, 16 mm x 16 mm in size."""
+    browser.point_at("#map-0 .nsewdrag", y / 16, -z / 16, click=click)
 
 
 @pytest.mark.parametrize("width", [1280, 390])
-def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Browser, folder: Path, width: int) -> None:
+def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Any, folder: Path, width: int) -> None:
     dataset = files.read(folder / "narrow.nc")
     points = np.stack([dataset["hit_y"], dataset["hit_z"]], axis=-1)
     place = np.array([-3e-3, 2.5e-3])
     near = np.argsort(np.linalg.norm(points - place, axis=1))[:6].tolist()
-    browser.open(folder / "a.html", width)
+    open_report(browser, folder / "a.html", width)
     assert "Trajectory of hit" in browser.text("#note-0")
 
-    browser.point_at(*place * 1e3)
+    point_at(browser, *place * 1e3)
     browser.wait(lambda: "hit " in browser.text("#map-0 .hovertext"))
     shown = browser.text("#map-0 .hovertext")
     hit = int(re.search(r"hit (\d+): perforated", shown)[1])
@@ -313,7 +266,7 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Brows
     velocity = float(re.search(r"residual velocity: ([\d.]+) m/s", shown)[1])
     assert velocity == pytest.approx(float(dataset["residual_velocity"][hit]), abs=0.06)
 
-    browser.point_at(*place * 1e3, click=True)
+    point_at(browser, *place * 1e3, click=True)
     browser.wait(lambda: browser.text("#told-0").startswith("hit ") and "nearest" in browser.text("#note-0"))
     picked = int(re.match(r"hit (\d+): perforated", browser.text("#told-0"))[1])
     assert picked in near
@@ -333,8 +286,8 @@ def test_browser_shows_a_hit_on_hover_and_its_trajectory_on_click(browser: Brows
     assert page <= width
 
 
-def test_browser_changes_the_map_and_keeps_one_scale(browser: Browser, folder: Path) -> None:
-    browser.open(folder / "a.html", 1280)
+def test_browser_changes_the_map_and_keeps_one_scale(browser: Any, folder: Path) -> None:
+    open_report(browser, folder / "a.html", 1280)
     for key in ("tilt at 130 mm", "pitch at 50 mm", "status"):
         browser.driver.execute_script(
             "const picker = document.getElementById('variable'); picker.value = arguments[0];"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from warpimpact.scene import Impact, Layer, Numerics, Plate, PolynomialCore, Record, Scene, Shots, Target
-from warpimpact.solver import grid, simulate
+from warpimpact.solver import simulate, windows
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
 
@@ -27,8 +27,8 @@ def shots_of(count: int = 3, at_a_plate: int = 1, **columns: float) -> Shots:
 @pytest.mark.parametrize("index", [0, 2, 4])
 def test_a_window_is_in_the_smallest_block_that_holds_it(index: int) -> None:
     prepared = prepare(Scene(core=CORE, target=PLATE), shots_of(), at_level(index, BLOCK))
-    assert prepared.variant.window == min(size for size in grid.SIZES if size >= prepared.cells**2)
-    assert 2 * 4 * max(grid.SIZES) <= 48 * 1024
+    assert prepared.variant.window == min(size for size in windows.SIZES if size >= prepared.cells**2)
+    assert 2 * 4 * max(windows.SIZES) <= 48 * 1024
 
 
 def test_levels_of_a_pilot_keep_the_layout() -> None:
@@ -48,7 +48,7 @@ def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
 def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_layout(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(grid, "WINDOW_SLACK", 1.02)
+    monkeypatch.setattr(windows, "SLACK", 1.02)
     shots = shots_of(pitch=0.03)
     simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.status, simple.status)

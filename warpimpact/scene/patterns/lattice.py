@@ -80,6 +80,13 @@ class LatticePattern(Pattern):
         return area(self.spine, self.rounding)
 
     @property
+    def hole_size(self) -> tuple[float, float]:
+        """Diameter of the largest circle in a hole, about its place, and greatest extent of a hole [m]."""
+        apart = np.linalg.norm(self.spine[:, None] - self.spine[None], axis=-1).max()
+        inside = float(self._depth(np.zeros(1), np.zeros(1))[0])
+        return 2.0 * inside, float(apart) + 2.0 * self.rounding
+
+    @property
     def _marks(self) -> Array:
         """Points, shape [marks, 2] [m]. Two holes of the shape are the same if their marks are the same."""
         return self.spine

@@ -1,8 +1,8 @@
-"""What a fit has computed, on the disk: a folder beside the posterior, from which a later call goes on.
+"""What a fit or a search has computed, on the disk: a folder beside its result, from which a later call goes on.
 
-POSTERIOR.nc.parts holds a manifest, which says what is computed, and a file per batch of sets with a checksum of the
-manifest and of the batch in it. Batches follow from the fit and from earlier batches alone, so a resumed fit equals an
-undisturbed one.
+RESULT.nc.parts holds a manifest, which says what is computed, and a file per batch with a checksum of the manifest and
+of the batch in it. Batches follow from what is computed and from earlier batches alone, so a resumed computation equals
+an undisturbed one.
 """
 
 from __future__ import annotations
@@ -25,15 +25,16 @@ _MANIFEST = "manifest.json"
 
 
 class Store:
-    """Batches of one fit, in a folder that is `claimed`.
+    """Batches of one computation, in a folder that is `claimed`.
 
     Args:
-        output: the file of the posterior.
+        output: the file of the result.
         content: what decides every number of it.
+        kind: what messages call the computation.
     """
 
-    def __init__(self, output: Path, content: Mapping[str, Any]) -> None:
-        self._output, self._content = output, json.loads(json.dumps(content))
+    def __init__(self, output: Path, content: Mapping[str, Any], kind: str) -> None:
+        self._output, self._content, self._kind = output, json.loads(json.dumps(content)), kind
         self.folder = folder_of(output)
         self._seal = fingerprint(self._content)
 
@@ -52,8 +53,8 @@ class Store:
             return
         if begun is not None and not overwrite:
             raise OutputError(
-                f"{self.folder}: contains an unfinished fit ({len(list(self._batches()))} batches); continue it "
-                "with --resume or begin anew with --overwrite"
+                f"{self.folder}: contains an unfinished {self._kind} ({self.count} batches); continue it with --resume "
+                "or begin anew with --overwrite"
             )
         if self._output.exists() and not overwrite:
             raise OutputError(f"{self._output}: exists already; name another file or give --overwrite")
@@ -76,7 +77,7 @@ class Store:
         return self.folder / f"batch_{batch:06d}.npz"
 
     def load(self, batch: int) -> dict[str, NDArray[Any]] | None:
-        """A batch that was computed; None if it is not there, is damaged or is of another fit."""
+        """A batch that was computed; None if it is not there, is damaged or is of another computation."""
         try:
             if not self._path(batch).is_file():  # a pipe would be waited for
                 return None
@@ -87,7 +88,7 @@ class Store:
         return arrays if str(arrays.pop("seal", "")) == self._seal_of(arrays) else None
 
     def _seal_of(self, arrays: Mapping[str, NDArray[Any]]) -> str:
-        """Of a batch of this fit: zipfile leaves out a member whose entry is damaged, without an error."""
+        """Of a batch of this computation: zipfile leaves out a member whose entry is damaged, without an error."""
         seal = hashlib.sha256(self._seal.encode())
         for name, array in sorted(arrays.items()):
             seal.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())

@@ -1,0 +1,48 @@
+"""A page that is served in a thread of the test."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from warpimpact.design.designs import Shelf, shelf_of
+
+TOKEN = "a-token"
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
+
+
+@contextmanager
+def served(shelf: Shelf) -> Iterator[str]:
+    uvicorn = pytest.importorskip("uvicorn", reason="needs the extra design")
+    from warpimpact.design.server import application, bound
+
+    with bound(0) as own:
+        own.listen()
+        port = own.getsockname()[1]
+        app = application(shelf, token=TOKEN, port=port, device="cpu")
+        config = uvicorn.Config(app, log_level="critical", lifespan="off", timeout_graceful_shutdown=1)
+        server = uvicorn.Server(config)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{port}/{TOKEN}/"
+        finally:
+            server.should_exit = True
+            thread.join()
+
+
+@pytest.fixture(scope="module")
+def serve() -> Iterator[Callable[..., str]]:
+    """A function that serves a page for campaign files, and returns its address."""
+    with ExitStack() as stack:
+        yield lambda *paths: stack.enter_context(served(shelf_of(list(paths))))
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The slotted plate with few hits."""
+    path = tmp_path_factory.mktemp("design") / "small.toml"
+    path.write_text((CAMPAIGNS / "slotted_plate.toml").read_text().replace("count = 4096", "count = 1500"))
+    return path

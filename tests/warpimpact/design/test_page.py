@@ -1,0 +1,183 @@
+"""The page in a real browser."""
+
+import json
+import re
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from warpimpact.analysis.comparison import compare
+from warpimpact.analysis.comparison_text import rankings
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.numbers import number_text
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.cli import main
+from warpimpact.results import files
+from warpimpact.runs.run import run
+
+
+def settled(browser: Any) -> None:
+    """Wait for the last stage of a design, after a change."""
+    browser.wait(lambda: "Complete" not in browser.text("#status") or measured(browser), 60.0)
+    browser.wait(lambda: "Complete" in browser.text("#status"), 120.0)
+
+
+def measured(browser: Any) -> list[float]:
+    return browser.driver.execute_script("return performance.getEntriesByName('first map').map((e) => e.duration)")
+
+
+def move(browser: Any, control: str, value: float) -> None:
+    """Move a slider as a hand does."""
+    browser.driver.execute_script(
+        "performance.clearMeasures(); const slider = document.getElementById(arguments[0]); slider.focus();"
+        "slider.value = arguments[1]; slider.dispatchEvent(new Event('input', {bubbles: true}))",
+        control,
+        value,
+    )
+
+
+def toml(browser: Any, tmp_path: Path) -> Path:
+    """What the button "Campaign file" gives."""
+    browser.driver.execute_cdp_cmd(
+        "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path), "eventsEnabled": False}
+    )
+    browser.find("#save")[0].click()
+    browser.wait(lambda: list(tmp_path.glob("*.toml")))
+    (path,) = tmp_path.glob("*.toml")
+    return path
+
+
+@pytest.fixture
+def page(browser: Any, serve: Callable[..., str], small: Path) -> Any:
+    browser.open("about:blank")
+    browser.open(serve(small), 1400)
+    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
+    return browser
+
+
+def test_a_slider_moves_and_the_numbers_are_those_of_run(page: Any, tmp_path: Path) -> None:
+    move(page, "control-plate-pattern-width", 5.2)
+    settled(page)
+    campaign = toml(page, tmp_path)
+    assert tomllib.loads(campaign.read_text())["plate"]["pattern"]["width"] == "5.2 mm"
+    result = tmp_path / "a.nc"
+    assert main(["run", str(campaign), "-o", str(result)]) == 0
+    dataset = files.read(result)
+    shown = page.text("#answer")
+    for measure in effectiveness(dataset):
+        numbers = map(re.escape, map(number_text, (measure.value, measure.solid, measure.ratio)))
+        assert re.search(rf"{re.escape(measure.label)}.*?{'.*?'.join(numbers)}", shown)
+    velocities = page.driver.execute_script("return document.getElementById('map-0').data[0].z.flat()")
+    assert set(velocities) <= {float(f"{value:.5g}") for value in dataset["residual_velocity"].values.tolist()}
+    assert len(set(velocities)) > 500
+    assert page.errors() == []
+
+
+def test_an_impossible_plate_shows_the_sentence(page: Any) -> None:
+    move(page, "control-plate-pattern-width", 14.0)
+    page.wait(lambda: page.text("#sentence"))
+    sentence = "plate.pattern: got length = 12 mm, but the length must be at least the width, 14 mm"
+    assert page.text("#sentence") == sentence
+    move(page, "control-plate-pattern-width", 4.0)
+    page.wait(lambda: not page.text("#sentence"))
+    assert page.errors() == []
+
+
+def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None:
+    thickness = "#control-plate-thickness"
+    before = page.driver.current_url
+    move(page, thickness.removeprefix("#"), 5.0)
+    page.wait(lambda: page.driver.current_url != before)
+    address = page.driver.current_url
+    page.find("#undo")[0].click()
+    page.wait(lambda: page.values(thickness) == ["4"])
+    page.open("about:blank")
+    page.open(address)
+    page.wait(lambda: page.values(thickness) == ["5"])
+    assert page.errors() == []
+
+
+def test_a_click_on_the_map_shows_that_hit(page: Any) -> None:
+    page.point_at("#map-0 .nsewdrag", 0.1, 0.2, click=True)
+    page.wait(lambda: "Trajectory of hit" in page.text("#note"), 60.0)
+    assert re.match(r"hit \d+ at y = ", page.text("#told"))
+    assert "bit-identical" in page.text("#told")
+    assert len(page.find("#passage .scatterlayer .trace")) >= 4
+    page.find("#figures button")[2].click()
+    page.wait(lambda: page.find("#figure")[0].is_displayed(), 60.0)
+    assert page.errors() == []
+
+
+def test_a_pinned_design_is_compared_shot_by_shot(page: Any, small: Path) -> None:
+    page.find("#pin")[0].click()
+    move(page, "control-plate-thickness", 5.0)
+    page.wait(lambda: "better than" in page.text("#answer") and "Complete" in page.text("#status"), 120.0)
+    tables = tomllib.loads(small.read_text())
+    tables["plate"]["thickness"] = "5 mm"
+    thicker = Campaign.from_text(json.dumps(tables), name="thicker", folder=small.parent)
+    results = [run(one, device="cpu") for one in (thicker, Campaign.from_toml(small))]
+    shown = page.text("#answer")
+    for ranking in rankings(compare(results, ["this design", "pin A"])):
+        assert all(sentence in shown for sentence in ranking.differences)
+    scales = page.driver.execute_script(
+        "return [0, 1].map((k) => document.getElementById(`map-${k}`).data[0]).map((t) => [t.zmin, t.zmax])"
+    )
+    assert scales[0] == scales[1]
+    assert page.errors() == []
+
+
+def test_nothing_leaves_this_machine(page: Any) -> None:
+    move(page, "control-impact-obliquity", 10)
+    settled(page)
+    hosts = page.driver.execute_script(
+        "return performance.getEntriesByType('resource').map((e) => new URL(e.name).host)"
+    )
+    assert set(hosts) == {urlsplit(page.driver.current_url).netloc}
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+def test_text_of_others_is_text(
+    browser: Any, serve: Callable[..., str], small: Path, tmp_path: Path, width: int
+) -> None:
+    hostile = '<img src=x onerror="document.title=1">"\'</script>${7*7}'
+    path = tmp_path / "<b>x&.toml"
+    path.write_text(
+        small.read_text().replace('title = "7.62 mm P80 core against a slotted plate"', f"title = '''{hostile}'''")
+    )
+    browser.open(serve(path), width)
+    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
+    assert browser.values("#title") == [hostile]
+    assert browser.driver.title == f"{hostile} · warpimpact design"
+    assert not browser.find("img[src=x]")
+    assert browser.driver.execute_script("return document.documentElement.scrollWidth") <= width
+    assert browser.errors() == []
+
+
+def test_many_changes_leave_no_error(page: Any) -> None:
+    random = np.random.default_rng(1)
+    sliders = page.driver.execute_script(
+        "return [...document.querySelectorAll('#controls input[type=range]')]"
+        ".map((s) => [s.id, +s.min, +s.max, +s.step])"
+    )
+    for _ in range(200):
+        name, low, high, step = sliders[random.integers(len(sliders))]
+        move(page, name, round(low + step * int(random.integers((high - low) / step + 1)), 6))
+        time.sleep(0.05)
+    page.driver.execute_script("document.getElementById('designs').dispatchEvent(new Event('change'))")
+    page.wait(lambda: not page.text("#sentence") and "Complete" in page.text("#status"), 120.0)
+    assert page.errors() == []
+
+
+def test_the_page_holds_what_the_address_says(page: Any) -> None:
+    held = page.driver.execute_async_script(
+        "address.unpacked(location.hash.slice(1)).then((held) => arguments[0](JSON.stringify(held)))"
+    )
+    design = json.loads(held)["design"]
+    text = json.dumps(design)
+    assert Campaign.from_text(text, name="address", folder=Path("/")).plate.thickness == 4e-3

@@ -1,0 +1,219 @@
+"""Whom the page answers, what it reads, and when its work ends."""
+
+import http.client
+import json
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import pytest
+
+from warpimpact.campaign.text import CampaignError
+from warpimpact.catalogue.catalogue import Catalogue
+from warpimpact.catalogue.entries import Threat
+from warpimpact.cli import main
+from warpimpact.design.changes import SHAPES, changed
+from warpimpact.design.designs import FILE_KEYS, Shelf, shelf_of, stages
+from warpimpact.scene.files import input_file
+from warpimpact.scene.model import Model
+from warpimpact.solver.marching import March
+
+
+def asked(
+    address: str, path: str = "", body: Any = None, *, host: str | None = None, origin: str | None = "own"
+) -> tuple[int, str]:
+    """Status and text of an answer."""
+    place = urlsplit(address)
+    connection = http.client.HTTPConnection(place.hostname, place.port, timeout=120)
+    headers = {"Host": host or place.netloc}
+    if origin is not None:
+        headers["Origin"] = f"http://{place.netloc}" if origin == "own" else origin
+    text = None if body is None else body if isinstance(body, str) else json.dumps(body)
+    connection.request("GET" if body is None else "POST", f"{place.path}{path}", text, headers)
+    response = connection.getresponse()
+    return response.status, response.read().decode()
+
+
+def compute(address: str, design: Any) -> list[dict[str, Any]]:
+    status, text = asked(address, "compute", {"design": design})
+    assert status == 200
+    return [json.loads(line) for line in text.splitlines()]
+
+
+def tables_of(path: Path) -> dict[str, Any]:
+    return tomllib.loads(path.read_text())
+
+
+@pytest.fixture(scope="module")
+def address(serve: Callable[..., str], small: Path) -> str:
+    return serve(small)
+
+
+@pytest.mark.parametrize(
+    ("given", "path", "status"),
+    [
+        ({}, "", 200),
+        ({"host": "evil.example"}, "", 403),
+        ({"host": "127.0.0.1"}, "", 403),
+        ({"origin": "http://evil.example", "body": {}}, "compute", 403),
+        ({"origin": None, "body": {}}, "compute", 403),
+        ({"origin": "null", "body": {}}, "compute", 403),
+        ({"body": {}}, "compute", 200),
+        ({}, "files/plotly.js", 200),
+        ({}, "files/../server.py", 404),
+        ({}, "files/server.py", 404),
+    ],
+)
+def test_it_answers_its_own_page_alone(address: str, given: dict[str, Any], path: str, status: int) -> None:
+    assert asked(address, path, **given)[0] == status
+
+
+@pytest.mark.parametrize("token", ["", "another", "a-toke", "a-tokenn"])
+def test_it_asks_for_its_token(address: str, token: str) -> None:
+    assert asked(address.replace("a-token", token), "")[0] == 403
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("nothing", "no JSON object"),
+        ("[" * 100_000, "no JSON object"),
+        ('{"a":' * 5000, "nested more than 16 deep"),
+        ("{" + " " * 2**20 + "}", "more than 1048576 bytes"),
+        ({"design": 3}, "it must be a table"),
+        ({"design": {"title": None}}, "title: got null"),
+        ({"design": {}, "level": 99}, "level: got 99"),
+        ({"design": {}, "pins": [{}] * 9}, "pins: got"),
+        ({"design": {"catalogue": "/etc/passwd"}}, 'catalogue: got "/etc/passwd", but a page reads only files that'),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_a_sentence(address: str, body: Any, sentence: str) -> None:
+    status, text = asked(address, "compute", body)
+    assert status == 200
+    assert json.loads(text)["kind"] == "refused"
+    assert sentence in json.loads(text)["sentence"]
+
+
+def test_every_key_that_names_a_file_is_known() -> None:
+    def models(base: type[Model]) -> list[type[Model]]:
+        return [base, *(inner for one in base.__subclasses__() for inner in models(one))]
+
+    named = {
+        name
+        for model in models(Model)
+        for name, field in model.model_fields.items()
+        if any(getattr(mark, "func", None) is input_file for mark in field.metadata) or "Path" in str(field.annotation)
+    }
+    assert {"posterior", "catalogue"} <= named <= set(FILE_KEYS)
+
+
+def test_a_page_reads_the_files_of_its_campaigns(small: Path, tmp_path: Path) -> None:
+    hits = tmp_path / "hits.csv"
+    hits.write_text("hit_y,hit_z\n0,0\n0.001,0.002\n")
+    path = tmp_path / "listed.toml"
+    path.write_text(
+        small.read_text()
+        .replace('sampling = "sobol" ', 'sampling = "list"\nfile = "hits.csv" #')
+        .replace("count = 1500", "#")
+    )
+    shelf = shelf_of([path])
+    tables = shelf.designs["listed"]
+    assert tables["hits"]["file"] == str(hits)
+    assert [stage.name for stage in stages(shelf, shelf.checked(tables), 0)] == ["first", "draft", "full"]
+    (tmp_path / "other.csv").write_text(hits.read_text())
+    tables["hits"]["file"] = str(tmp_path / "other.csv")
+    with pytest.raises(CampaignError, match="a page reads only files that the campaigns name"):
+        shelf.checked(tables)
+
+
+def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> None:
+    plate, *computed = compute(address, tables_of(small))
+    assert plate["plate"]["numbers"]["open area"] == "34.8%"
+    assert [(line["stage"], line["hits"]) for line in computed] == [("first", 256), ("draft", 1024), ("full", 1500)]
+    assert [line["numerics"][:26] for line in computed[1:]] == [
+        "Numerics: draft keeps its ",
+        "Numerics: standard keeps i",
+    ]
+    assert "is not known" in computed[0]["numerics"]
+
+
+def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = tables_of(small)
+    tables["hits"]["count"] = 2**18
+    marched, march = [], March.march
+
+    def marching(self: March, progress: Any, cancel: Any) -> Any:
+        marched.append(cancel)
+        return march(self, progress, cancel)
+
+    monkeypatch.setattr(March, "march", marching)
+    place = urlsplit(address)
+    connection = http.client.HTTPConnection(place.hostname, place.port, timeout=60)
+    headers = {"Origin": f"http://{place.netloc}"}
+    connection.request("POST", f"{place.path}compute", json.dumps({"design": tables}), headers)
+    response = connection.getresponse()
+    stages_seen = 0
+    while stages_seen < 3:  # plate, first, draft
+        response.readline()
+        stages_seen += 1
+    time.sleep(1.0)
+    begin = time.perf_counter()
+    response.close()
+    connection.close()
+    own = dict(tables, title="another")
+    own["hits"] = tables["hits"] | {"count": 256}
+    compute(address, own)
+    assert time.perf_counter() - begin < 10.0
+    assert any(cancel.cancelled for cancel in marched)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_another_shape_is_a_valid_plate_of_the_same_open_area(small: Path, shape: str) -> None:
+    shelf = shelf_of([small])
+    design = shelf.checked(shelf.designs["small"])
+    campaign = shelf.checked(changed(design, shelf, "shape", 0, shape)).campaign
+    assert campaign.plate.open_area == pytest.approx(0.0 if shape == "none" else 0.348, abs=0.06)
+
+
+def test_threats_materials_and_layers_can_be_chosen(small: Path) -> None:
+    shelf = shelf_of([small])
+    design = shelf.checked(shelf.designs["small"])
+    for what, name in (
+        ("threat", ".30 AP M2"),
+        ("material", "AA2060-T8"),
+        ("add layer", ""),
+        ("threat", ""),
+        ("material", ""),
+    ):
+        before = design.campaign
+        design = shelf.checked(changed(design, shelf, what, 0, name))
+        if not name and what != "add layer":  # own values are those of the catalogue
+            assert design.campaign.core.mass_properties == before.core.mass_properties
+            assert design.campaign.plate.resistance == pytest.approx(before.plate.resistance, rel=1e-5)
+            assert design.campaign.impact == before.impact
+    assert design.campaign.core.mass == pytest.approx(5.3e-3)
+    assert len(design.campaign.layer) == 1
+    assert design.campaign.impact.velocity == Catalogue().all(Threat)[".30 AP M2"].velocities[0].value
+    assert shelf.checked(changed(design, shelf, "remove layer", 1, "")).campaign.layer == ()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["nothing.toml"], "nothing.toml: there is no such file"),
+        (["http://127.0.0.1:1/x/#rubbish"], 'holds no design behind its "#"'),
+        (["--port", "70000"], "--port: got 70000"),
+    ],
+)
+def test_a_mistake_ends_the_command(arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["design", "--no-browser", *arguments]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_a_shelf_has_a_design_of_each_plate() -> None:
+    shelf = shelf_of([Path(__file__).parents[3] / "campaigns" / "two_plates.toml"])
+    assert list(shelf.designs) == ["slots", "round holes"]
+    assert isinstance(shelf, Shelf)

@@ -1,0 +1,162 @@
+"""The whole search against fronts that are known, and against itself: killed, resumed, with other seeds."""
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from warpimpact import Campaign
+from warpimpact.campaign.text import CampaignError
+from warpimpact.optimisation.design import read_design
+from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
+from warpimpact.optimisation.searcher import Searcher, hypervolume
+from warpimpact.optimisation.space import Space, Variable
+from warpimpact.optimisation.text import front_lines
+from warpimpact.results import front as f
+from warpimpact.results.files import OutputError
+from warpimpact.runs.shards import folder_of as folder_of_parts
+
+from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
+
+MORE_HITS = SEARCH.replace("hits = 64", "hits = 256")
+MANY = SEARCH.replace("designs = 12", "designs = 40")
+RANGE = '{ low = "4 mm", high = "4 mm" }'
+THICKNESS = '[variables]\nthickness = { low = "2 mm", high = "8 mm" }\n'
+
+
+def test_the_front_of_solid_plates_is_that_of_the_work() -> None:
+    """docs/model.md §6.1 without friction: m (v₀² − v²)/2 = Y h πR², so v²/v₀² falls on a line over ρh."""
+    found = optimise(design(THICKNESS, WEIGHT_AND_ENERGY, SEARCH))
+    density, fraction = found[f.FRESH].values.T
+    radius = 3.0e-4 + 0.24**2 / (4 * 5.29)  # the largest of r(s) = c0 + c1 s + c2 s²
+    work = 2600e6 * (density / 7850.0) * np.pi * radius**2
+    expected = 1.0 - work / (0.5 * 4e-3 * 825.0**2)
+    assert fraction == pytest.approx(expected, abs=1e-3)
+    assert found.sizes["front"] == found.sizes["design"] == 12  # none beats another
+    assert found[f.KEPT].values.all()
+    # The dominated share of the box under a line through k points spread over it is at most 1/2.
+    assert 0.25 < float(found[f.VOLUME][-1]) < 1.5
+
+
+def _disc(coordinates: Sequence[Sequence[float]]) -> tuple[np.ndarray, np.ndarray]:
+    """Minimise x and y outside the unit disc: the front is a quarter of the circle, and with the reference (1, 1) its
+    hypervolume is 1 − π/4."""
+    points = 1.2 * np.array(coordinates)
+    return points, 1.0 - (points**2).sum(axis=1, keepdims=True)
+
+
+def test_a_front_with_a_constraint_has_its_hypervolume() -> None:
+    space = Space((Variable("x", "x", 0.0, 1.0), Variable("y", "y", 0.0, 1.0)))
+    searcher, kept = Searcher(space, 2, 1, 40, seed=1), []
+    for _ in range(50):
+        points, broken = _disc(searcher.ask())
+        searcher.tell(points, broken)
+        kept += list(points[broken[:, 0] <= 0.0])
+    exact = 1.0 - np.pi / 4.0
+    assert 0.9 * exact < hypervolume(np.array(kept), np.ones(2)) < exact
+
+
+@pytest.mark.parametrize("thickness", ["", f"thickness = {RANGE}", 'thickness = ["4 mm"]'])
+def test_a_space_of_one_point_returns_it(thickness: str) -> None:
+    found = optimise(design("[variables]", thickness, HOLES, WEIGHT_AND_ENERGY, SEARCH))
+    assert (found.sizes["design"], found.sizes["front"]) == (1, 1)
+    assert 'thickness = "4 mm"' in str(found[f.CAMPAIGN].values[0])
+
+
+def test_a_symmetry_of_the_problem_is_one_of_the_front() -> None:
+    """Round holes with exchanged spacings are the same plate, turned."""
+    spacings = "".join(f'"plate.pattern.spacing.{axis}" = ["8 mm", "10 mm"]\n' for axis in (0, 1))
+    found = optimise(
+        design(HOLES, "[variables]", spacings, WEIGHT_AND_ENERGY, SEARCH.replace("hits = 64", "hits = 256"))
+    )
+    values, low, high = (found[name].values for name in (f.FOUND, f.FOUND_LOW, f.FOUND_HIGH))
+    one, other = (int(np.flatnonzero((found[f.VALUE].values == pair).all(axis=1))[0]) for pair in ([0, 1], [1, 0]))
+    assert values[one, 0] == pytest.approx(values[other, 0], rel=1e-12)
+    apart = abs(values[one, 1] - values[other, 1])
+    assert apart < 0.5 * np.hypot(high[one, 1] - low[one, 1], high[other, 1] - low[other, 1]) * 1.5
+    assert values[one, 1] != values[other, 1]  # other hits
+
+
+SEARCHED = (
+    "[variables]",
+    'thickness = { low = "2 mm", high = "6 mm" }',
+    '"plate.pattern.diameter" = { low = "3 mm", high = "9 mm" }',
+    HOLES,
+    WEIGHT_AND_ENERGY,
+)
+
+
+def _same(one: xarray.Dataset, other: xarray.Dataset) -> None:
+    kept = [name for name in one.variables if name != f.COST]
+    xarray.testing.assert_identical(one[kept].drop_attrs(), other[kept].drop_attrs())
+
+
+def test_a_killed_search_is_resumed_to_the_same_file(tmp_path: Path) -> None:
+    file, whole, killed = (tmp_path / name for name in ("d.toml", "whole.nc", "killed.nc"))
+    file.write_text("\n".join([CORE, *SEARCHED, MANY]))
+    optimise_to_file(read_design(file), whole)
+    command = [sys.executable, "-m", "warpimpact", "optimise", str(file), "-o", str(killed)]
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    parts, until = folder_of_parts(killed), time.monotonic() + 120.0
+    while len(list(parts.glob("batch_*"))) < 3 and process.poll() is None and time.monotonic() < until:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    kept = len(list(parts.glob("batch_*")))
+    assert kept >= 3
+    assert not killed.exists()
+    with pytest.raises(OutputError, match="unfinished search"):
+        optimise_to_file(read_design(file), killed)
+    resumed = []
+    optimise_to_file(read_design(file), killed, resume=True, progress=lambda now: resumed.append(now.resumed))
+    assert resumed[-1] > 0
+    _same(f.read(whole), f.read(killed))
+    assert not parts.exists()
+
+
+def test_a_seed_gives_one_search_and_another_seed_another() -> None:
+    one, same, other = (optimise(design(*SEARCHED, SEARCH, f"seed = {seed}")) for seed in (1, 1, 2))
+    _same(one, same)
+    assert not np.array_equal(one[f.VALUE].values, other[f.VALUE].values)
+
+
+def test_a_campaign_of_the_front_runs_as_it_is(tmp_path: Path) -> None:
+    campaigns = optimise_to_file(design(*SEARCHED, SEARCH, folder=tmp_path), tmp_path / "front.nc")
+    found = f.read(tmp_path / "front.nc")
+    assert [path.name for path in campaigns] == list(found[f.FILE].values)
+    assert campaigns[0].parent == folder_of(tmp_path / "front.nc")
+    for path, density in zip(campaigns, found[f.FRESH].values[:, 0], strict=True):
+        assert Campaign.from_toml(path).target.areal_density == pytest.approx(density, rel=1e-9)
+    assert any("shrinkage" in line for line in front_lines(found))
+
+
+def test_no_design_within_the_bounds_is_an_outcome() -> None:
+    bound = '[[bounds]]\nmeasure = "stopped_share"\nat_least = 0.9\n'
+    found = optimise(design(*SEARCHED, bound, SEARCH))
+    assert found.attrs[f.OUTCOME] == f.NONE_FEASIBLE
+    assert (found.sizes["design"], found.sizes["front"]) == (12, 0)
+    assert any("no design keeps the bounds: P(stopped) >= 0.9" in line for line in front_lines(found))
+
+
+@pytest.mark.parametrize(
+    ("constraint", "named"),
+    [
+        ('smallest_ligament = "6 mm"', "smallest_ligament"),
+        ('largest_areal_density = "3 kg/m^2"', "largest_areal_density"),
+    ],
+)
+def test_an_infeasible_space_is_refused_with_what_rules_it_out(constraint: str, named: str) -> None:
+    with pytest.raises(CampaignError, match=rf"none of \d+ designs keeps {named}.*the nearest has"):
+        optimise(design(*SEARCHED, "[constraints]", constraint, SEARCH))
+
+
+def test_the_worst_threat_counts() -> None:
+    slow, fast = (f'[[threats]]\nname = "{v}"\nimpact = {{ velocity = {v} }}' for v in (600, 900))
+    both, alone = (optimise(design(HOLES, WEIGHT_AND_ENERGY, *some, SEARCH)) for some in ([slow, fast], [fast]))
+    assert both[f.FRESH].values[0, 1] == pytest.approx(alone[f.FRESH].values[0, 1], rel=1e-6)

@@ -1,0 +1,138 @@
+"""Hits at a finer level in a result, and levels that are found for measures."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpimpact import Campaign, Numerics
+from warpimpact.analysis.effectiveness import effectiveness
+from warpimpact.analysis.summary import estimated, summary_text
+from warpimpact.results import attributes as attr
+from warpimpact.results import files
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import finer_pair
+from warpimpact.results.measures import Measure
+from warpimpact.runs.run import run, run_to_file
+from warpimpact.solver.pilot import SHOTS
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+STOP = '[stop]\nquantity = "mean(tilt@130mm)"\nhalf_width = "{}"\nmax_count = 4096\n\n[output]'
+
+
+def campaign(changes: dict[str, str] | None = None) -> Campaign:
+    text = SLOTTED_PLATE.read_text(encoding="utf-8").replace("count = 4096", "count = 256")
+    for old, new in (changes or {}).items():
+        assert old in text
+        text = text.replace(old, new)
+    return Campaign.from_text(text, name="campaign", folder=Path())
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"[hits]": "[hits]\nirreducible = false"},
+        {'sampling = "sobol"': 'sampling = "random"', "seed = 1": "seed = 1\nirreducible = false"},
+        {'sampling = "sobol"': 'sampling = "grid"', "seed = 1\n": ""},
+    ],
+    ids=["images", "sobol", "random", "grid"],
+)
+def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, str]) -> None:
+    result = run(campaign({'"standard"': '"draft"', **changes}), device="cpu")
+    pair = finer_pair(result)
+    assert pair is not None
+    coarse, fine = pair
+    assert coarse.sizes["hit"] >= SHOTS
+    assert (coarse[v.HIT].values == result[v.FINER_HIT].values).all()
+    level = json.loads(result.attrs[attr.RESOLUTION])["level"] + 2
+    again = run(campaign(changes).model_copy(update={"numerics": Numerics(level=level)}), device="cpu")
+    at = result[v.FINER_HIT].values
+    for name in (v.RESIDUAL_VELOCITY, v.TILT, v.YAW, v.STATUS):
+        np.testing.assert_array_equal(fine[name].values, again[name].values[at])
+        assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
+    assert v.FINER_HIT not in again
+
+
+@pytest.mark.usefixtures("small_shards")
+def test_a_run_that_lost_its_first_shard_has_them_again(
+    tmp_path: Path, assert_same_bits: Callable[[Path, Path], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from warpimpact.runs.shards import ShardsOnDisk
+
+    scene = campaign({"[hits]": "[hits]\nirreducible = false", "count = 256": "count = 1024"})
+    straight, broken = tmp_path / "straight.nc", tmp_path / "broken.nc"
+    run_to_file(scene, straight, device="cpu")
+    with monkeypatch.context() as patched:
+        patched.setattr(ShardsOnDisk, "finish", lambda *arguments: 1 / 0)
+        with pytest.raises(ZeroDivisionError):
+            run_to_file(scene, broken, device="cpu")
+    first, *others = sorted(Path(f"{broken}.parts").glob("*.nc"))
+    assert others
+    first.unlink()
+    run_to_file(scene, broken, device="cpu", resume=True)
+    assert_same_bits(straight, broken)
+
+
+def test_a_file_and_a_choice_of_its_hits_keep_them(tmp_path: Path) -> None:
+    run_to_file(campaign(), tmp_path / "a.nc", device="cpu")
+    whole = files.read(tmp_path / "a.nc")
+    chosen = whole.isel(hit=np.arange(40, 80)[::-1])
+    pair = finer_pair(chosen)
+    assert pair is not None
+    np.testing.assert_array_equal(pair[0][v.HIT].values, np.intersect1d(chosen[v.HIT], whole[v.FINER_HIT]))
+    assert finer_pair(whole.isel(hit=slice(250, None))) is None
+    assert finer_pair(whole.drop_vars(v.FINER_HIT)) is None
+
+
+def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agrees() -> None:
+    every = {"[hits]": "[hits]\nirreducible = false", "count = 256": "count = 1024"}
+    told, truth = (
+        run(campaign(every).model_copy(update={"numerics": numerics}), device="cpu")
+        for numerics in (Numerics(), Numerics(level=6))
+    )
+    asked = [
+        Measure.parse(text)
+        for text in (
+            "mean(residual_velocity)",
+            "mean(tilt@130mm)",
+            "quantile(tilt@130mm, 0.9)",
+            "P(tilt@130mm > 30 deg)",
+            "P(perforated)",
+        )
+    ]
+    found, exact = estimated(told, asked), estimated(truth, asked)
+    for one in asked:
+        shift = found[one].numerics
+        assert shift is not None
+        # The hits whose yes turns to no are few: chance, which the interval by the hits has.
+        changed = np.sum(one.values(told) != one.values(truth)) if one.is_binary else 0
+        assert abs(found[one].value - exact[one].value) <= shift + 2.0 * np.sqrt(changed) / told.sizes["hit"], one
+        assert exact[one].numerics is None
+    for one, other in zip(effectiveness(told), effectiveness(truth), strict=True):
+        if one.hit is None and not one.label.startswith("P("):
+            assert abs(one.value - other.value) <= (one.numerics or 0.0), one.name
+    assert "numerics ± " in summary_text(told)
+    assert "numerics" not in summary_text(truth)
+
+
+def test_a_stop_rule_takes_the_level_and_the_hits_that_its_interval_needs() -> None:
+    def ran(half_width: str, **changes: str) -> dict[str, object]:
+        asked = {"[output]": STOP.format(half_width), "count = 256\n": "", 'fidelity = "standard"': ""} | changes
+        return dict(run(campaign(asked), device="cpu").attrs)
+
+    wide, narrow = ran("4 deg"), ran("0.8 deg")
+    for told, half_width in ((wide, 4.0), (narrow, 0.8)):
+        low, high = told[attr.ESTIMATE_INTERVAL]
+        assert told[attr.LEVEL_FOR] == "mean(tilt@130mm)"
+        assert told[attr.STOP_REASON] == "half_width"
+        assert 0.0 < told[attr.ESTIMATE_NUMERICS] <= 0.5 * half_width
+        assert 0.5 * (high - low) + told[attr.ESTIMATE_NUMERICS] <= half_width
+    levels = [json.loads(told[attr.RESOLUTION])["level"] for told in (wide, narrow)]
+    assert levels[0] < levels[1]
+    # Who asks for single hits, too, has the level that they need; more hits are then of no use.
+    asked = ran("1.2 deg", **{'fidelity = "standard"': 'fidelity = "draft"'})
+    assert attr.LEVEL_FOR not in asked
+    assert asked[attr.STOP_REASON] == "numerics"

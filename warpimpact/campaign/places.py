@@ -1,0 +1,86 @@
+"""Dotted places of a campaign, such as "plate.pattern.width" or "layer.0.gap": resolved, filled and read."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from ..scene import Impact, Interaction, Plate
+from ..scene.units import PositiveArealDensity, quoted, typed
+from .campaign import Campaign
+from .text import CampaignError
+
+_TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": Interaction}
+"""Tables whose keys need no table in front of them, as there is no other key of that name."""
+_WHOLE = ("core", "plate", "plate.pattern", "interaction")
+_WHOLE_OF_A_LAYER = re.compile(r"layer\.\d+(\.pattern)?")
+"""Tables that may be given as a whole."""
+
+
+def is_table(place: str) -> bool:
+    """Whether a whole table stands at a place."""
+    return place in _WHOLE or bool(_WHOLE_OF_A_LAYER.fullmatch(place))
+
+
+def resolved(key: str, name: str) -> str:
+    """The dotted place of a key, which may be that of an input of [impact], [plate] or [interaction] alone.
+
+    Args:
+        name: what errors call the table of keys, such as "sweep.toml: sweep".
+
+    Raises:
+        CampaignError: there is no such key.
+    """
+    if "." in key or key in _WHOLE:
+        return key
+    for table, model in _TABLES.items():
+        if key in model._keys():
+            return f"{table}.{key}"
+    known = ", ".join(name for model in _TABLES.values() for name in model._keys())
+    raise CampaignError(
+        f"{name}: got the unknown input {quoted(key)}; give one of {', '.join(_WHOLE)}, {known}, or a dotted "
+        'place such as "core.mass"'
+    )
+
+
+def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
+    """Put a value at its place in the tables of a campaign.
+
+    Raises:
+        CampaignError: the tables have no such place; `name` is as in `resolved`.
+    """
+    *tables, last = _parts(key)
+    if tables[:1] == ["layer"] and "layer" not in data:
+        raise CampaignError(f"{name}: got {quoted(key)}, but the campaign has no [[layer]]")
+    inside: Any = data
+    for part in tables:
+        entries: dict[Any, Any] = dict(enumerate(inside)) if isinstance(inside, list) else inside
+        inside = entries.setdefault(part, {} if entries is inside else None)
+        if not isinstance(inside, dict | list):
+            raise CampaignError(f"{name}: {key} leads through {part}, which is no table")
+    if isinstance(inside, list) and last not in range(len(inside)):
+        raise CampaignError(f"{name}: {key} leads to {last}, but its list has {len(inside)} entries")
+    inside[last] = value
+
+
+def _parts(key: str) -> list[str | int]:
+    """The parts of a dotted place; a number is that of an entry of a list."""
+    return [int(part) if part.isdecimal() else part for part in key.split(".")]
+
+
+def type_at(key: str, campaign: Campaign) -> Any:
+    """The type of an input, with its marks; None where it is in no model."""
+    table, _, last = key.rpartition(".")
+    if last == "areal_density":  # which a plate reads and has, but not as a field
+        return PositiveArealDensity
+    found = getattr(type(value_at(table, campaign)), "model_fields", {}).get(last)
+    return None if found is None else typed(found)
+
+
+def value_at(key: str, campaign: Campaign) -> Any:
+    """What stands at a place of a campaign; None where there is nothing."""
+    value: Any = campaign
+    for part in _parts(key) if key else ():
+        value = value[part] if isinstance(part, int) and isinstance(value, tuple) else getattr(value, str(part), None)
+    return value

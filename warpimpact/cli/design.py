@@ -1,0 +1,66 @@
+"""The command design: a page on this machine where a plate is drawn and its map answers."""
+
+import argparse
+from pathlib import Path
+
+from .options import Commands, add_command, add_device
+from .plain import say
+
+
+def add_design(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "design",
+        _design,
+        summary="draw a plate in the browser; its hit map answers while a slider moves",
+        description="Open a page in the browser of this machine. It draws the plate of a campaign, and its hit map "
+        "answers while a slider moves. The page gives the campaign file and the report of what it shows. It is for "
+        "this machine alone and needs no network. Ctrl-C ends it. It needs: pip install 'warpimpact[design]'",
+        example="design campaigns/slotted_plate.toml",
+    )
+    parser.add_argument(
+        "designs",
+        nargs="*",
+        metavar="CAMPAIGN.toml",
+        help="campaign files, or the address of a page, which holds its design (default: the slotted plate)",
+    )
+    parser.add_argument("--port", type=int, default=0, metavar="N", help="port of the page (default: one that is free)")
+    parser.add_argument("--no-browser", action="store_true", help="print the address and open no browser")
+    add_device(parser)
+
+
+def _design(arguments: argparse.Namespace) -> None:
+    from warpimpact.campaign.text import CampaignError
+    from warpimpact.design.designs import Shelf, from_address, shelf_of
+
+    try:
+        from warpimpact.design.server import serve
+    except ModuleNotFoundError as error:
+        raise CampaignError(f"design needs {error.name}: pip install 'warpimpact[design]'") from None
+    given = arguments.designs or [str(_example())]
+    addresses = [name for name in given if name.startswith("http://")]
+    shelf = shelf_of([Path(name) for name in given if name not in addresses])
+    held = {f"address {number}": from_address(address) for number, address in enumerate(addresses, 1)}
+    shelf = Shelf(held | dict(shelf.designs), shelf.files)
+    if not 0 <= arguments.port < 2**16:
+        raise CampaignError(f"--port: got {arguments.port}, but it must be a number from 0 to 65535")
+
+    def ready(address: str) -> None:
+        print(address, flush=True)
+        if not arguments.no_browser:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    try:
+        serve(shelf, port=arguments.port, device=arguments.device, ready=ready)
+    except OSError as error:
+        raise CampaignError(f"--port: got {arguments.port}, but it cannot be used ({error.strerror})") from None
+    except KeyboardInterrupt:
+        say("ended")
+
+
+def _example() -> Path:
+    from importlib.resources import files
+
+    return Path(str(files("warpimpact.campaigns").joinpath("slotted_plate.toml")))

@@ -1,0 +1,72 @@
+"""The command optimise: the best designs of a target."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpimpact.results.interrupts import terminated_as_interrupted
+
+from .mistakes import memory_told
+from .options import Commands, add_command, add_device, add_output, add_overwrite
+from .paths import check_place, check_suffix
+from .progress import Step, show_progress
+
+if TYPE_CHECKING:
+    from warpimpact.optimisation.search import SearchProgress
+
+NONE_WITHIN_BOUNDS = 4
+"""Exit code where no design that was computed keeps the bounds."""
+
+
+def add_optimise(commands: Commands) -> None:
+    parser = add_command(
+        commands,
+        "optimise",
+        _optimise,
+        summary="search the best designs: lightest, safest, and what lies between",
+        description="Search the free variables of a target for the designs that no other one beats in every objective. "
+        "Cheap hits come first, more where they decide; the front is computed again with fresh hits. Write every "
+        "design as netCDF, a campaign file for each design of the front, and a figure. Exit code 4: no design keeps "
+        "the bounds. Needs pip install 'warpimpact[optimise]'.",
+        example="optimise campaigns/designs/lightest_plate.toml -o front.nc",
+    )
+    parser.add_argument("design", type=Path, metavar="DESIGN.toml", help="design file: a campaign, and what is free")
+    add_output(parser, "FRONT.nc", "result file (default: the design's name, in this folder)")
+    add_device(parser)
+    parser.add_argument(
+        "--resume", action="store_true", help="continue an interrupted search; start a new one if there is none"
+    )
+    add_overwrite(parser, "an existing result, its campaigns or an interrupted search")
+
+
+def _optimise(arguments: argparse.Namespace) -> int:
+    from warpimpact.optimisation.design import read_design
+    from warpimpact.optimisation.optimise import folder_of, optimise_to_file
+    from warpimpact.optimisation.text import front_lines
+    from warpimpact.results import front
+
+    design = read_design(arguments.design)
+    output = arguments.output or Path(arguments.design.stem + ".nc")
+    check_suffix(output, "a search", ".nc")
+    check_place(output)
+    with memory_told(arguments.design), terminated_as_interrupted(), show_progress("design") as show:
+        campaigns = optimise_to_file(
+            design,
+            output,
+            device=arguments.device,
+            resume=arguments.resume,
+            overwrite=arguments.overwrite,
+            progress=lambda now: show(Step(now.done, now.total, 0, _running(now))),
+        )
+    dataset = front.read(output)
+    print("\n".join(front_lines(dataset)))
+    print(f"written to {output}" + (f", campaigns in {folder_of(output)}" if campaigns else ""))
+    return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
+
+
+def _running(now: "SearchProgress") -> str:
+    parts = [f"{now.front} on the front"]
+    if math.isfinite(now.hypervolume):
+        parts.append(f"hypervolume {now.hypervolume:.4f}")
+    return ", ".join(parts + ([now.what] if now.what else []))

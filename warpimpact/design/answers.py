@@ -1,0 +1,179 @@
+"""What a page gets: hit maps of a design at each stage, trajectories, figures, reports."""
+
+from __future__ import annotations
+
+import json
+from base64 import b64encode
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from typing import Any
+
+import xarray
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+
+from warpimpact.analysis.hit import hit_text
+from warpimpact.analysis.summary import breaks_promise
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.evidence import evidence_of
+from warpimpact.campaign.plausible import doubted
+from warpimpact.campaign.text import CampaignError
+from warpimpact.design.changes import choices
+from warpimpact.design.controls import groups
+from warpimpact.design.designs import FOLDER, Design, Shelf, stage_of
+from warpimpact.design.drawing import drawn
+from warpimpact.plotting.trajectory import FIGURES
+from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data
+from warpimpact.report.report import report_page, texts
+from warpimpact.report.words import compared, result_content
+from warpimpact.results import attributes as attr
+from warpimpact.runs.replay import replay
+from warpimpact.runs.run import run
+from warpimpact.solver.worker import Cancel
+
+_MOST_KEPT = 256 * 2**20
+"""Bytes of results that are kept: to go back to a design computes nothing."""
+_MOST_HISTORIES = 4
+_FIRST = "The error of the numerics is not known: the resolution is that of the last draft."
+OWN = "this design"
+"""Name of the design that is on the page; those it is compared with have names of their own."""
+
+
+class Answers:
+    """Answers the questions of a page, in the thread of the desk; keeps what it has computed.
+
+    Args:
+        shelf: what the page was started with.
+        device: where to compute.
+    """
+
+    def __init__(self, shelf: Shelf, device: str = "auto") -> None:
+        self.shelf, self._device = shelf, device
+        self._results: OrderedDict[str, xarray.Dataset] = OrderedDict()
+        self._histories: OrderedDict[tuple[str, int], xarray.Dataset] = OrderedDict()
+        self._environment = Environment(
+            loader=ChoiceLoader([PackageLoader("warpimpact.design", ""), PackageLoader("warpimpact.report", "")]),
+            autoescape=True,
+            undefined=StrictUndefined,
+            trim_blocks=True,
+        )
+
+    def page(self, **content: Any) -> str:
+        """The page without any design."""
+        return self._environment.get_template("design.html").render(**content)
+
+    def plate(self, design: Design) -> dict[str, Any]:
+        """The plate, the controls and the campaign file of a design; no shot is computed."""
+        campaign = design.campaign
+        return {
+            "kind": "plate",
+            "plate": drawn(campaign),
+            "groups": groups(design),
+            "choices": choices(design.tables),
+            "toml": design.text,
+            "title": campaign.title,
+            "notes": [*doubted(campaign.scene, campaign.impact, campaign.hits), *evidence_of(campaign)],
+        }
+
+    def result(self, text: str, cancel: Cancel) -> xarray.Dataset:
+        """The hit map of a campaign.
+
+        Raises:
+            Cancelled: by `cancel`.
+        """
+        if text not in self._results:
+            campaign = Campaign.from_text(text, name="design", folder=FOLDER)
+            self._results[text] = run(campaign, device=self._device, progress=lambda _: None, cancel=cancel)
+            while len(self._results) > 1 and sum(one.nbytes for one in self._results.values()) > _MOST_KEPT:
+                self._results.popitem(last=False)
+        self._results.move_to_end(text)
+        return self._results[text]
+
+    def stage(self, name: str, designs: Mapping[str, Design], total: int, cancel: Cancel) -> dict[str, Any]:
+        """The maps and the numbers of a design and of those that it is compared with, at one stage.
+
+        Args:
+            name: of the stage.
+            designs: as they are computed at it, by their names; the design of the page is the first.
+            total: hits of the design at its last stage.
+        """
+        datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
+        results = [result_content(label, dataset) for label, dataset in datasets.items()]
+        cancel.check()
+        most = MOST_HITS // len(datasets)
+        data = page_data([thinned(dataset, most) for dataset in datasets.values()])
+        comparison = compared(datasets, picture=False) if len(datasets) > 1 else None
+        own, attributes = results[0], next(iter(datasets.values())).attrs
+        resolution = json.loads(attributes[attr.RESOLUTION]) if attr.RESOLUTION in attributes else {}
+        html = self._environment.get_template("answer.html").render(
+            results=results, comparison=comparison, texts=texts()
+        )
+        return {
+            "kind": "stage",
+            "stage": name,
+            "hits": own["hits"],
+            "total": total,
+            "numerics": _FIRST if name == "first" else own["numerics"],
+            "kept": not breaks_promise(datasets[OWN]),
+            "level": resolution.get("level"),
+            "data": data,
+            "html": html,
+        }
+
+    def trajectory(self, design: Design, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:
+        """The trajectory of a hit of a design at a stage.
+
+        Raises:
+            ResultError: there is no such hit.
+        """
+        history = self._history(stage_of(self.shelf, design, level, stage).text, hit, cancel)
+        return {
+            "hit": hit,
+            "text": hit_text(history),
+            "figures": [draw.__name__.replace("_", " ") for draw in FIGURES],
+            "views": trajectory_data(history),
+        }
+
+    def figure(self, design: Design, level: int, stage: str, hit: int, name: str, cancel: Cancel) -> dict[str, str]:
+        """A figure of a hit's history as the address of an image.
+
+        Raises:
+            CampaignError: there is no such figure.
+        """
+        draw = next((draw for draw in FIGURES if draw.__name__.replace("_", " ") == name), None)
+        if draw is None:
+            raise CampaignError(f'got the figure "{name[:80]}", which replay does not draw')
+        history, buffer = self._history(stage_of(self.shelf, design, level, stage).text, hit, cancel), BytesIO()
+        draw(history).savefig(buffer, format="png", dpi=110)
+        return {"image": f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"}
+
+    def _history(self, text: str, hit: int, cancel: Cancel) -> xarray.Dataset:
+        key = (text, hit)
+        if key not in self._histories:
+            self._histories[key] = replay(self.result(text, cancel), hit)
+            while len(self._histories) > _MOST_HISTORIES:
+                self._histories.popitem(last=False)
+        return self._histories[key]
+
+    def report(self, designs: Mapping[str, Design], cancel: Cancel) -> str:
+        """The report of some designs as HTML.
+
+        Raises:
+            Cancelled: by `cancel`.
+        """
+        datasets = {name: self.result(design.text, cancel) for name, design in designs.items()}
+        return report_page(
+            datasets, folders=dict.fromkeys(datasets, FOLDER), progress=lambda done, total: cancel.check()
+        )
+
+
+def named(design: Design, others: Sequence[tuple[str, Design]]) -> dict[str, Design]:
+    """A design and those that it is compared with, by names that differ.
+
+    Raises:
+        CampaignError: two have one name.
+    """
+    names = [OWN, *(name for name, _ in others)]
+    if len(set(names)) < len(names):
+        raise CampaignError("got two designs of one name to compare; give each its own")
+    return {OWN: design, **dict(others)}

@@ -1,0 +1,85 @@
+"use strict";
+// Sliders, numbers and choices. `set(path, value)` changes a value of the design, `change(what, layer, value)` more.
+function controlsOf(place, { set, change }) {
+  let shape = "";
+  const update = new Map();
+  const make = (name, attributes = {}, ...inner) => {
+    const element = document.createElement(name);
+    Object.assign(element, attributes);
+    element.append(...inner);
+    return element;
+  };
+  const decimals = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  const written = (value, { unit }) => (unit ? `${value} ${unit}` : value);
+
+  function slider(control, id) {
+    const { label, unit, low, step, meaning, path } = control;
+    const range = make("input", { type: "range", id, min: low, max: control.high, step, title: meaning });
+    const number = make("input", { type: "number", step: "any", title: meaning });
+    number.setAttribute("aria-label", `${label}${unit ? ` in ${unit}` : ""}`);
+    const take = (value, from) => {
+      if (!Number.isFinite(value)) return;
+      if (from === number) range.max = Math.max(control.high, value);
+      (from === range ? number : range).value = value;
+      set(path, written(value, control));
+    };
+    range.addEventListener("input", () => take(Number(Number(range.value).toFixed(decimals(step))), range));
+    number.addEventListener("input", () => { if (number.value !== "") take(Number(number.value), number); });
+    update.set(id, ({ value, high, scatters }) => {
+      for (const one of [range, number]) {
+        one.disabled = scatters;
+        if (scatters) one.title = "It scatters from shot to shot; change its distribution in the campaign file.";
+      }
+      if (document.activeElement !== range) range.max = Math.max(high, value);
+      if (document.activeElement !== range || Math.abs(range.value - value) > step) range.value = value;
+      if (document.activeElement !== number) number.value = value;
+    });
+    return make("div", { className: "control" }, make("label", { htmlFor: id, title: meaning }, label), number,
+      make("span", { className: "unit" }, unit), range);
+  }
+
+  function choice(control, id, layer, choices) {
+    const own = control.what === "shape" ? [] : [["", "own values"]];
+    const names = [...own, ...choices[control.what].map((name) => [name, name])];
+    if (!names.some(([value]) => value === control.value)) names.push([control.value, control.value]);
+    const select = make("select", { id }, ...names.map(([value, text]) => make("option", { value }, text)));
+    select.addEventListener("change", () => change(control.what, layer, select.value));
+    update.set(id, ({ value }) => { select.value = value; });
+    return make("div", { className: "control" }, make("label", { htmlFor: id }, control.label), select);
+  }
+
+  function toggle(control, id) {
+    const box = make("input", { type: "checkbox", id });
+    box.addEventListener("change", () => set(control.path, box.checked));
+    update.set(id, ({ value }) => { box.checked = value; });
+    return make("div", { className: "control" }, make("label", { htmlFor: id, title: control.meaning }, control.label), box);
+  }
+
+  const idOf = ({ path }) => `control-${path.join("-")}`;
+
+  // Show the controls of a design; they stay the same elements as long as it has the same ones.
+  return (groups, choices) => {
+    const now = JSON.stringify([groups.map(({ name, controls }) => [name, controls.map((one) => [one.kind, one.path])]), choices]);
+    if (now !== shape) {
+      shape = now;
+      update.clear();
+      place.replaceChildren(...groups.map(({ name, layer, controls }) => {
+        const inner = controls.map((one) => {
+          if (one.kind === "choice") return choice(one, idOf(one), layer ?? 0, choices);
+          return (one.kind === "switch" ? toggle : slider)(one, idOf(one));
+        });
+        const group = make("fieldset", {}, make("legend", {}, name), ...inner);
+        if (layer) {
+          const button = make("button", { type: "button" }, "Remove this layer");
+          button.addEventListener("click", () => change("remove layer", layer, ""));
+          group.append(button);
+        }
+        return group;
+      }));
+      const button = make("button", { type: "button", id: "add-layer" }, "Add a layer");
+      button.addEventListener("click", () => change("add layer", 0, ""));
+      place.append(button);
+    }
+    for (const { controls } of groups) for (const one of controls) update.get(idOf(one))(one);
+  };
+}

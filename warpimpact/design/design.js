@@ -1,0 +1,374 @@
+"use strict";
+// The page: holds a design, asks for its maps while it changes, and shows what comes.
+(async () => {
+  const at = (id) => document.getElementById(id);
+  const PATIENCE = 400;  // [ms] for a map of an older design, which then is given up
+  const SETTLED = 350;  // [ms] without a change, after which a design can be undone
+  const state = { design: {}, pins: [], variable: "residual velocity" };
+  const done = { undo: [], redo: [], last: "" };
+  let level = 0, running = null, waiting = false, changedAt = 0, shown = null, settling = 0, chosen = null, toml = "";
+
+  const ask = (path, body, signal) => fetch(path, {
+    method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body), signal,
+  });
+  async function asked(path, body) {
+    const response = await ask(path, body), text = await response.text();
+    if (response.ok) return JSON.parse(text);
+    throw new Error(text.startsWith("{") ? JSON.parse(text).sentence : text || response.statusText);
+  }
+  const lost = (error) => (error instanceof TypeError ? "warpimpact design does not answer any more; is it still running?" : error.message);
+
+  function refuse(sentence) {
+    at("sentence").textContent = sentence;
+    at("sentence").hidden = false;
+    for (const id of ["maps", "answer", "trajectory"]) at(id).classList.add("stale");
+  }
+  function accept() {
+    at("sentence").hidden = true;
+    for (const id of ["maps", "answer", "trajectory"]) at(id).classList.remove("stale");
+  }
+
+  // Changes ---------------------------------------------------------------------------------------------------------
+
+  function put(path, value) {
+    let inside = state.design;
+    path.slice(0, -1).forEach((part, k) => {
+      if (typeof inside[part] !== "object") inside[part] = typeof path[k + 1] === "number" ? [] : {};
+      inside = inside[part];
+    });
+    inside[path.at(-1)] = value;
+  }
+  function set(path, value) {
+    put(path, value);
+    touched();
+  }
+  async function change(what, layer, value) {
+    try {
+      const design = await asked("change", { design: state.design, what, layer, value });
+      settle();
+      state.design = design;
+      touched();
+    } catch (error) {
+      refuse(lost(error));
+    }
+  }
+  function touched() {
+    changedAt = performance.now();
+    clearTimeout(settling);
+    settling = setTimeout(settle, SETTLED);
+    refresh();
+  }
+  // A design that stays for a while can be undone, and is in the address.
+  function settle() {
+    clearTimeout(settling);
+    const now = JSON.stringify(state.design);
+    if (now !== done.last) {
+      if (done.last) done.undo.push(done.last);
+      done.redo = [];
+      done.last = now;
+    }
+    buttons();
+    address.packed(state).then((text) => history.replaceState(null, "", `#${text}`));
+  }
+  function step(from, to) {
+    settle();
+    if (!from.length) return;
+    to.push(done.last);
+    done.last = from.pop();
+    state.design = JSON.parse(done.last);
+    document.activeElement?.blur();
+    touched();
+    buttons();
+  }
+  function buttons() {
+    at("undo").disabled = !done.undo.length;
+    at("redo").disabled = !done.redo.length;
+  }
+
+  // Computing -------------------------------------------------------------------------------------------------------
+
+  // One computation at a time: the first map of an older design may end if that takes no longer than PATIENCE, all else
+  // that is under way is given up.
+  function refresh() {
+    if (running && !running.answered) {
+      const left = PATIENCE - (performance.now() - running.begun);
+      waiting = true;
+      if (left > 0) {
+        if (!running.timer) running.timer = setTimeout(compute, left);
+        return;
+      }
+    }
+    compute();
+  }
+  async function compute() {
+    if (running) {
+      clearTimeout(running.timer);
+      running.abort.abort();
+    }
+    const own = { abort: new AbortController(), answered: false, begun: performance.now(), changedAt, level };
+    running = own;
+    waiting = false;
+    const text = JSON.stringify(state.design), pins = JSON.parse(JSON.stringify(state.pins));
+    try {
+      const response = await ask("compute", { design: state.design, pins, level }, own.abort.signal);
+      if (!response.ok) throw new Error(await response.text());
+      for await (const line of linesOf(response.body)) {
+        if (running !== own) return;
+        await take(line, own, text, pins);
+        if (own.answered && waiting) { compute(); return; }
+      }
+    } catch (error) {
+      if (error.name !== "AbortError" && running === own) refuse(lost(error));
+    }
+    if (running === own) own.answered = true;
+  }
+  async function* linesOf(stream) {
+    let rest = "";
+    for await (const chunk of readable(stream.pipeThrough(new TextDecoderStream()))) {
+      const parts = (rest + chunk).split("\n");
+      rest = parts.pop();
+      for (const part of parts) yield JSON.parse(part);
+    }
+  }
+  async function* readable(stream) {
+    const reader = stream.getReader();
+    for (;;) {
+      const { done: ended, value } = await reader.read();
+      if (ended) return;
+      yield value;
+    }
+  }
+  async function take(line, own, text, pins) {
+    if (line.kind === "refused") {
+      own.answered = true;
+      refuse(line.sentence);
+    } else if (line.kind === "plate") {
+      showPlate(line);
+    } else {
+      accept();
+      if (line.level !== null) level = line.level;
+      await show({ ...line, design: JSON.parse(text), pins, asked: own.level });
+      if (!own.answered) {
+        own.answered = true;
+        performance.measure("first map", { start: own.changedAt, end: performance.now() });
+      }
+    }
+  }
+
+  // Showing ---------------------------------------------------------------------------------------------------------
+
+  const viewOf = plateView(at("plate"), at("section"), (path, value) => set(path, `${value} mm`));
+  const controls = controlsOf(at("controls"), { set, change });
+
+  function showPlate({ plate, groups, choices, toml: file, title, notes }) {
+    toml = file;
+    if (document.activeElement !== at("title")) at("title").value = title;
+    document.title = `${title} · warpimpact design`;
+    controls(groups, choices);
+    const lengths = groups.flatMap(({ controls: all }) => all).filter(({ unit }) => unit === "mm");
+    viewOf(plate, lengths.map(({ path, value }) => [path, value]));
+    const rows = Object.entries({ thickness: plate.thickness, ...plate.numbers });
+    const cells = rows.flatMap(([name, value]) => [["dt", name, ""], ["dd", value, ""]]);
+    for (const note of notes) cells.push(["dt", "note", "warns"], ["dd", note, ""]);
+    at("numbers").replaceChildren(...cells.map(([tag, words, kind]) => {
+      const element = document.createElement(tag);
+      element.textContent = words;
+      element.className = kind;
+      return element;
+    }));
+  }
+
+  const NAMES = { first: "First look", draft: "Draft", full: "Complete" };
+  async function show(line) {
+    const same = shown && shown.stage === line.stage && JSON.stringify(shown.design) === JSON.stringify(line.design);
+    shown = line;
+    if (!same) chosen = null;
+    const status = document.createElement("strong"), more = line.stage === "full" ? "" : " It gets finer while nothing moves.";
+    status.textContent = NAMES[line.stage];
+    const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
+    at("status").replaceChildren(status, `: ${of} hits. ${line.numerics}${more}`);
+    at("status").classList.toggle("warns", !line.kept);
+    fillVariables(line.data);
+    at("hit-number").max = line.hits - 1;
+    at("answer").innerHTML = line.html;
+    await drawMaps();
+    if (!same && !at("trajectory").hidden) at("note").textContent = `${at("note").textContent.replace(/ \(of an earlier.*/, "")} (of an earlier map)`;
+  }
+  function fillVariables({ variables }) {
+    const keys = [...variables.map(({ key, label }) => [key, label]), ["status", "how the shots ended"]];
+    const picker = at("variable"), now = JSON.stringify(keys);
+    if (picker.dataset.keys !== now) {
+      picker.dataset.keys = now;
+      picker.replaceChildren(...keys.map(([value, text]) => new Option(text, value)));
+    }
+    picker.value = keys.some(([key]) => key === state.variable) ? state.variable : keys[0][0];
+  }
+  async function drawMaps() {
+    const { data } = shown, maps = hitMaps(data), names = ["this design", ...shown.pins.map(({ name }) => name)];
+    while (at("maps").children.length > names.length) at("maps").lastChild.remove();
+    await Promise.all(names.map(async (name, k) => {
+      if (!at(`map-${k}`)) at("maps").append(mapPlace(k));
+      at(`name-${k}`).hidden = names.length === 1;
+      at(`name-${k}`).firstChild.textContent = name;
+      const marked = chosen && chosen.result === k ? { chosen: chosen.hit } : {};
+      const place = await maps.drawMap(at(`map-${k}`), data.results[k], at("variable").value, { ...marked, tallest: 520 });
+      if (!place.dataset.clicks) {
+        place.dataset.clicks = "yes";
+        place.on("plotly_click", ({ points }) => {
+          const point = points.find(({ curveNumber }) => curveNumber === 0);
+          if (point) choose(k, hitMaps(shown.data).hitOf(shown.data.results[k], point));
+        });
+      }
+    }));
+  }
+  function mapPlace(k) {
+    const place = document.createElement("div"), name = document.createElement("h3"), map = document.createElement("div");
+    name.id = `name-${k}`;
+    name.className = "pinned";
+    name.append(document.createElement("span"));
+    if (k) {
+      const remove = document.createElement("button");
+      remove.textContent = "Unpin";
+      remove.addEventListener("click", () => { state.pins.splice(k - 1, 1); settle(); touched(); });
+      name.append(remove);
+    }
+    map.id = `map-${k}`;
+    map.className = "map";
+    place.append(name, map);
+    return place;
+  }
+
+  // A hit -----------------------------------------------------------------------------------------------------------
+
+  async function choose(k, place) {
+    const own = shown, result = own.data.results[k], hit = result.number[place];
+    const about = { design: k ? own.pins[k - 1].design : own.design, level: own.asked, stage: own.stage, hit };
+    chosen = { result: k, hit: place };
+    drawMaps();
+    at("trajectory").hidden = false;
+    at("note").textContent = `Following hit ${hit}…`;
+    try {
+      const { text, views, figures } = await asked("trajectory", about);
+      at("note").textContent = `Trajectory of hit ${hit}${own.pins.length ? ` on ${k ? own.pins[k - 1].name : "this design"}` : ""}.`;
+      at("told").textContent = text;
+      at("trajectory").classList.remove("stale");
+      await hitMaps(own.data).drawTrajectory([at("passage"), at("flight")], views);
+      at("figure").hidden = true;
+      at("figures").replaceChildren(...figures.map((name) => {
+        const button = document.createElement("button");
+        button.textContent = name;
+        button.addEventListener("click", () => showFigure(about, name));
+        return button;
+      }));
+    } catch (error) {
+      at("note").textContent = lost(error);
+    }
+  }
+  async function showFigure(about, figure) {
+    at("note").textContent = `Drawing ${figure} of hit ${about.hit}…`;
+    try {
+      const { image } = await asked("figure", { ...about, figure });
+      Object.assign(at("figure"), { src: image, alt: `${figure} of hit ${about.hit}`, hidden: false });
+      at("note").textContent = `Trajectory of hit ${about.hit}.`;
+    } catch (error) {
+      at("note").textContent = lost(error);
+    }
+  }
+
+  // Files and buttons -----------------------------------------------------------------------------------------------
+
+  function download(text, name, type) {
+    const link = document.createElement("a"), place = URL.createObjectURL(new Blob([text], { type }));
+    Object.assign(link, { href: place, download: name });
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(place), 10_000);
+  }
+  const fileName = () => (at("title").value.toLowerCase().replace(/[^a-z0-9]+/g, "_").replace(/^_|_$/g, "").slice(0, 60) || "design");
+  const save = () => { if (toml) download(toml, `${fileName()}.toml`, "application/toml"); };
+  function pin() {
+    if (state.pins.length >= 5) { refuse("Five designs are pinned already; unpin one first."); return; }
+    const used = state.pins.map(({ name }) => name);
+    const name = Array.from("ABCDEF", (letter) => `pin ${letter}`).find((one) => !used.includes(one));
+    state.pins.push({ name, design: JSON.parse(JSON.stringify(state.design)) });
+    settle();
+    touched();
+  }
+  async function report() {
+    at("report").disabled = true;
+    at("report").textContent = "Writing…";
+    try {
+      const { html } = await asked("report", { design: state.design, pins: state.pins });
+      download(html, `${fileName()}.html`, "text/html");
+    } catch (error) {
+      refuse(lost(error));
+    }
+    at("report").disabled = false;
+    at("report").textContent = "Report";
+  }
+  function load(design) {
+    settle();
+    state.design = design;
+    touched();
+  }
+  async function open(file) {
+    try {
+      load(await asked("open", { text: await file.text(), name: file.name }));
+    } catch (error) {
+      refuse(lost(error));
+    }
+  }
+
+  at("undo").addEventListener("click", () => step(done.undo, done.redo));
+  at("redo").addEventListener("click", () => step(done.redo, done.undo));
+  at("pin").addEventListener("click", pin);
+  at("save").addEventListener("click", save);
+  at("report").addEventListener("click", report);
+  at("copy").addEventListener("click", async () => {
+    settle();
+    history.replaceState(null, "", `#${await address.packed(state)}`);
+    await navigator.clipboard.writeText(location.href);
+    at("copy").textContent = "Copied";
+    setTimeout(() => { at("copy").textContent = "Copy address"; }, 1500);
+  });
+  at("open").addEventListener("click", () => at("file").click());
+  at("file").addEventListener("change", () => { if (at("file").files.length) open(at("file").files[0]); at("file").value = ""; });
+  at("title").addEventListener("input", () => set(["title"], at("title").value));
+  at("variable").addEventListener("change", () => { state.variable = at("variable").value; drawMaps(); settle(); });
+  at("hit-number").addEventListener("change", () => {
+    const place = shown?.data.results[0].number.indexOf(Number(at("hit-number").value));
+    if (place >= 0) choose(0, place);
+  });
+  addEventListener("keydown", (event) => {
+    const typing = event.target.matches("input:not([type=range]):not([type=checkbox]), select, textarea");
+    const key = event.key.toLowerCase(), command = event.ctrlKey || event.metaKey;
+    if (command && (key === "z" || key === "y") && !typing) {
+      event.preventDefault();
+      if (key === "y" || event.shiftKey) step(done.redo, done.undo); else step(done.undo, done.redo);
+    } else if (!command && !event.altKey && !typing) {
+      if (key === "p") pin();
+      if (key === "s") save();
+    }
+  });
+  let resized = 0;
+  addEventListener("resize", () => { clearTimeout(resized); resized = setTimeout(() => { if (shown) drawMaps(); }, 150); });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (shown) drawMaps(); });
+
+  // The beginning ---------------------------------------------------------------------------------------------------
+
+  async function opened() {
+    try {
+      const held = await address.unpacked(location.hash.slice(1));
+      Object.assign(state, { design: held.design, pins: held.pins ?? [], variable: held.variable ?? state.variable });
+      return true;
+    } catch {
+      return false;
+    }
+  }
+  const { designs } = await (await fetch("start")).json(), names = Object.keys(designs);
+  at("designs").replaceChildren(...names.map((name) => new Option(name, name)));
+  at("designs-label").hidden = names.length < 2;
+  at("designs").addEventListener("change", () => load(JSON.parse(JSON.stringify(designs[at("designs").value]))));
+  addEventListener("hashchange", async () => { if (await opened()) { settle(); touched(); } });
+  if (!(location.hash.length > 1 && await opened())) state.design = JSON.parse(JSON.stringify(designs[names[0]]));
+  touched();
+})();

@@ -1,0 +1,348 @@
+"""The server of the page: on this machine alone, behind a token, to a browser that shows this page and no other."""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import secrets
+import socket
+import warnings
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, MutableMapping
+from functools import cache, partial
+from importlib.resources import files
+from typing import Any
+
+import uvicorn
+from plotly.offline import get_plotlyjs
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, Response, StreamingResponse
+from starlette.routing import Mount, Route
+
+import warpimpact
+from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.design.answers import Answers, named
+from warpimpact.design.changes import changed
+from warpimpact.design.designs import Design, Shelf, Tables, as_json, stages
+from warpimpact.design.desk import Desk
+from warpimpact.results.files import ResultError
+from warpimpact.scene.plausible import Implausible
+from warpimpact.scene.units import quoted
+from warpimpact.solver.device import DeviceError
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+
+_MOST_BYTES = 2**20
+"""Of a request."""
+_MOST_PINS = 5
+_HEADERS = {
+    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "cross-origin-resource-policy": "same-origin",
+    "cross-origin-opener-policy": "same-origin",
+    "referrer-policy": "no-referrer",
+    "x-content-type-options": "nosniff",
+    "cache-control": "no-store",
+}
+_FILES = {
+    "report": ("page.css", "drawing.js"),
+    "design": ("design.css", "plate.js", "controls.js", "address.js", "design.js"),
+}
+"""Of the page, by the rooms that have them."""
+_MISTAKES = (CampaignError, ResultError, DeviceError, MemoryError)
+"""Errors that the page shows as a sentence."""
+_FIRST, _ASKED, _REFINE, _LAST = 0, 1, 2, 3
+"""Urgencies: the first map after a change, what somebody clicked, the stages that follow."""
+_LINES = "application/x-ndjson"
+_STAGES = {"first": _FIRST, "draft": _REFINE, "full": _LAST}
+
+
+class Guard:
+    """Answers this machine's own page alone: the host that a request names, its origin, and the token in its path.
+
+    Another page in the same browser can send requests to this machine, and a name server can give this machine another
+    name; neither knows the token, and neither has this origin.
+
+    Args:
+        app: what answers.
+        token: the first part of every path.
+        port: of the server.
+    """
+
+    def __init__(self, app: Any, token: str, port: int) -> None:
+        self._app, self._token = app, token
+        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            return
+        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
+        refusal = self._refusal(str(scope["path"]), str(scope["method"]), headers)
+        if refusal is not None:
+            await refusal(scope, receive, _with_headers(send))
+            return
+        await self._app(scope, receive, _with_headers(send))
+
+    def _refusal(self, path: str, method: str, headers: Mapping[str, str]) -> Response | None:
+        host, token = headers.get("host", ""), path.split("/")[1] if "/" in path else ""
+        if host not in self._hosts:
+            return PlainTextResponse("This page is for this machine: http://127.0.0.1.", status_code=403)
+        if not hmac.compare_digest(token.encode(), self._token.encode()):
+            return PlainTextResponse(
+                "This address has another token. warpimpact design prints the address when it starts; "
+                "warpimpact design 'ADDRESS' opens the design of an old one.",
+                status_code=403,
+            )
+        origin = headers.get("origin")
+        if method not in ("GET", "HEAD") and (origin is None or origin.removeprefix("http://") != host):
+            return PlainTextResponse("Only the page itself may ask this.", status_code=403)
+        return None
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: MutableMapping[str, Any]) -> None:
+        if message["type"] == "http.response.start":
+            own = [(name.encode(), value.encode()) for name, value in _HEADERS.items()]
+            message = {**message, "headers": [*message.get("headers", []), *own]}
+        await send(message)
+
+    return sending
+
+
+def application(shelf: Shelf, *, token: str, port: int, device: str = "auto") -> Guard:
+    """The page and all that it asks, as an ASGI application."""
+    pages = _Pages(Answers(shelf, device), Desk())
+    routes = [
+        Route("/", pages.page),
+        Route("/files/{name}", _file),
+        Route("/start", pages.start),
+        Route("/compute", pages.compute, methods=["POST"]),
+        Route("/change", pages.change, methods=["POST"]),
+        Route("/open", pages.open, methods=["POST"]),
+        Route("/trajectory", pages.trajectory, methods=["POST"]),
+        Route("/figure", pages.figure, methods=["POST"]),
+        Route("/report", pages.report, methods=["POST"]),
+    ]
+    return Guard(Starlette(routes=[Mount(f"/{token}", routes=routes)]), token, port)
+
+
+class _Pages:
+    """What the paths of the page answer; it holds nothing of a single browser."""
+
+    def __init__(self, answers: Answers, desk: Desk) -> None:
+        self._answers, self._desk, self._shelf = answers, desk, answers.shelf
+
+    async def page(self, request: Request) -> Response:
+        return HTMLResponse(self._answers.page(version=warpimpact.__version__))
+
+    async def start(self, request: Request) -> Response:
+        return PlainTextResponse(as_json({"designs": self._shelf.designs}), media_type="application/json")
+
+    async def compute(self, request: Request) -> Response:
+        """The plate of a design at once, then its maps, a line of JSON each, from few hits to all of them. Whoever
+        closes the connection ends the work."""
+
+        try:
+            asked = await _asked(request)
+            level = _whole(asked, "level", 0, 9)
+            design, others = self._designs(asked)
+        except _MISTAKES as error:
+            return PlainTextResponse(_refused(error), media_type=_LINES)
+
+        async def lines() -> AsyncIterator[str]:
+            try:
+                yield as_json(await run_in_threadpool(self._answers.plate, design)) + "\n"
+                for line in self._lines(design, others, level):
+                    yield as_json(await line) + "\n"
+            except _MISTAKES as error:
+                yield _refused(error)
+
+        return StreamingResponse(lines(), media_type=_LINES)
+
+    def _lines(self, design: Design, others: list[tuple[str, Design]], level: int) -> Any:
+        """What is to be awaited for each stage."""
+        total = design.campaign.hits.count or 0
+        every = [{stage.name: stage.design for stage in stages(self._shelf, one, level)} for _, one in others]
+        for name, own in stages(self._shelf, design, level):
+            at = [(label, one.get(name, one["full"])) for (label, _), one in zip(others, every, strict=True)]
+            designs = named(own, at)
+            yield self._desk.do(_STAGES[name], partial(self._answers.stage, name, designs, total))
+
+    async def change(self, request: Request) -> Response:
+        async def answer(asked: Tables) -> Any:
+            design, _ = self._designs(asked)
+            layer = _whole(asked, "layer", 0, 64)
+            return await run_in_threadpool(
+                changed, design, self._shelf, str(asked.get("what", "")), layer, str(asked.get("value", ""))
+            )
+
+        return await _answered(request, answer)
+
+    async def open(self, request: Request) -> Response:
+        """The tables of a campaign file that the browser has read."""
+
+        async def answer(asked: Tables) -> Any:
+            text = str(asked.get("text", ""))
+            return self._shelf.checked(parsed(text, str(asked.get("name", "file"))[:80])).tables
+
+        return await _answered(request, answer)
+
+    async def trajectory(self, request: Request) -> Response:
+        async def answer(asked: Tables) -> Any:
+            design, _ = self._designs(asked)
+            level, stage, hit = _hit(asked)
+            return await self._desk.do(
+                _ASKED, lambda cancel: self._answers.trajectory(design, level, stage, hit, cancel)
+            )
+
+        return await _answered(request, answer)
+
+    async def figure(self, request: Request) -> Response:
+        async def answer(asked: Tables) -> Any:
+            design, _ = self._designs(asked)
+            (level, stage, hit), name = _hit(asked), str(asked.get("figure", ""))
+            return await self._desk.do(
+                _ASKED, lambda cancel: self._answers.figure(design, level, stage, hit, name, cancel)
+            )
+
+        return await _answered(request, answer)
+
+    async def report(self, request: Request) -> Response:
+        async def answer(asked: Tables) -> Any:
+            design, others = self._designs(asked)
+            designs = named(design, others)
+            return {"html": await self._desk.do(_ASKED, lambda cancel: self._answers.report(designs, cancel))}
+
+        return await _answered(request, answer)
+
+    def _designs(self, asked: Tables) -> tuple[Design, list[tuple[str, Design]]]:
+        """The design that is asked about, and those to compare it with."""
+        pins = asked.get("pins", [])
+        if not isinstance(pins, list) or len(pins) > _MOST_PINS or not all(isinstance(pin, dict) for pin in pins):
+            raise CampaignError(f"pins: got {quoted(pins)}, but it must be a list of at most {_MOST_PINS} designs")
+        others = [(str(pin.get("name", ""))[:80], self._shelf.checked(pin.get("design", {}))) for pin in pins]
+        return self._shelf.checked(asked.get("design", {})), others
+
+
+async def _file(request: Request) -> Response:
+    name = request.path_params["name"]
+    if name == "plotly.js":
+        return Response(_plotly(), media_type="text/javascript")
+    room = next((room for room, names in _FILES.items() if name in names), None)
+    if room is None:
+        return PlainTextResponse("There is no such file.", status_code=404)
+    text = files(f"warpimpact.{room}").joinpath(name).read_text(encoding="utf-8")
+    return Response(text, media_type="text/css" if name.endswith("css") else "text/javascript")
+
+
+@cache
+def _plotly() -> str:
+    return str(get_plotlyjs())
+
+
+async def _asked(request: Request) -> Tables:
+    """What a request asks, as tables.
+
+    Raises:
+        CampaignError: it is no JSON, too long or nested too deep.
+    """
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > _MOST_BYTES:
+            raise CampaignError(f"got a request of more than {_MOST_BYTES} bytes")
+    try:
+        text = body.decode()
+    except UnicodeDecodeError:
+        raise CampaignError("got a request that is no text") from None
+    if not text.startswith("{"):
+        raise CampaignError("got a request that is no JSON object")
+    return parsed(text, "request")
+
+
+async def _answered(request: Request, answer: Callable[[Tables], Awaitable[Any]]) -> Response:
+    """The answer as JSON, or a sentence for a mistake. Whoever closes the connection ends the work."""
+    try:
+        asked = await _asked(request)
+        work, gone = asyncio.ensure_future(answer(asked)), asyncio.ensure_future(_gone(request))
+        try:
+            await asyncio.wait({work, gone}, return_when=asyncio.FIRST_COMPLETED)
+            if not work.done():
+                return PlainTextResponse("", status_code=499)
+            return PlainTextResponse(as_json(work.result()), media_type="application/json")
+        finally:
+            gone.cancel()
+            work.cancel()
+    except _MISTAKES as error:
+        return JSONResponse({"sentence": _sentence(error)}, status_code=422)
+
+
+async def _gone(request: Request) -> None:
+    """Returns when the connection of a request is closed."""
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+def _refused(error: BaseException) -> str:
+    return as_json({"kind": "refused", "sentence": _sentence(error)}) + "\n"
+
+
+def _sentence(error: BaseException) -> str:
+    return str(error).removeprefix("design: ") or "not enough memory"
+
+
+def _whole(asked: Tables, key: str, least: int, most: int) -> int:
+    """A whole number of a request; the least one if it is not given."""
+    value = asked.get(key, least)
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
+        raise CampaignError(f"{key}: got {quoted(value)}, but it must be a whole number from {least} to {most}")
+    return value
+
+
+def _hit(asked: Tables) -> tuple[int, str, int]:
+    """Level, stage and number of the hit that a request asks about."""
+    return _whole(asked, "level", 0, 9), str(asked.get("stage", "full")), _whole(asked, "hit", 0, 2**30)
+
+
+def bound(port: int) -> socket.socket:
+    """A socket of this machine alone.
+
+    Args:
+        port: 0 is any that is free.
+
+    Raises:
+        OSError: the port is taken.
+    """
+    own = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    own.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        own.bind(("127.0.0.1", port))
+    except OSError:
+        own.close()
+        raise
+    return own
+
+
+def serve(shelf: Shelf, *, port: int = 0, device: str = "auto", ready: Callable[[str], object]) -> None:
+    """Serve the page until a signal ends it.
+
+    Args:
+        ready: called with the address of the page.
+
+    Raises:
+        OSError: the port is taken.
+    """
+    with bound(port) as own:
+        token, port = secrets.token_urlsafe(18), own.getsockname()[1]
+        app = application(shelf, token=token, port=port, device=device)
+        config = uvicorn.Config(
+            app, log_level="critical", access_log=False, lifespan="off", timeout_graceful_shutdown=1
+        )
+        own.listen()
+        ready(f"http://127.0.0.1:{port}/{token}/")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Implausible)  # the page shows these
+            uvicorn.Server(config).run(sockets=[own])

@@ -1,0 +1,194 @@
+"""The front once more with fresh hits: searching picks lucky numbers, and what it picked is not what it reports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.campaign.text import CampaignError
+from warpimpact.optimisation.design import Design
+from warpimpact.optimisation.evaluate import Job, campaign_of
+from warpimpact.optimisation.judged import Record, excesses, interval, means, objectives
+from warpimpact.optimisation.measures import AREAL_DENSITY
+from warpimpact.optimisation.search import Searched
+from warpimpact.optimisation.searcher import front_of
+from warpimpact.optimisation.work import Work
+
+Array = NDArray[np.float64]
+
+FIDELITY = "standard"
+"""Of the pilots of the designs of the front, where the campaign does not fix a resolution."""
+SOLID_HITS = 64
+"""Hits of a solid plate: they differ only in what scatters."""
+SAME_WEIGHT = 0.01
+"""Areal densities that differ by less than this share are the same weight."""
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """The front by fresh hits.
+
+    Attributes:
+        numbers: of its designs among those of the search.
+        records: of fresh hits.
+        places: y and z of the hits of each [m], shape [front, 2, hits].
+        solids: solid plates of equal areal density.
+        kept: whether fresh hits leave a design on the front and within the bounds.
+        groups: number of the first design than which each is not certainly better.
+        references: targets to compare with.
+    """
+
+    numbers: NDArray[np.int64]
+    records: tuple[Record, ...]
+    places: Array
+    solids: tuple[Record, ...]
+    kept: NDArray[np.bool_]
+    groups: NDArray[np.int64]
+    references: tuple[Record, ...]
+
+
+def confirm(design: Design, work: Work, found: Searched, follow: Callable[[str], None]) -> Confirmed:
+    """Compute the front, its solid plates and the references with fresh hits at standard."""
+    numbers = spread(found.front, design.search.confirmed)
+    chosen = [found.records[int(number)] for number in numbers]
+    others = [_reference(design, place) for place in range(len(design.references))]
+    follow(f"{len(chosen)} designs of the front with fresh hits")
+    records, places = _fresh(design, work, [*chosen, *others])
+    follow("solid plates of the same weight")
+    solids = _solids(design, work, records[: len(chosen)])
+    front = records[: len(chosen)]
+    return Confirmed(
+        numbers=numbers,
+        records=tuple(front),
+        places=places[: len(chosen)],
+        solids=tuple(solids),
+        kept=_kept(design, front),
+        groups=groups(design, front),
+        references=tuple(records[len(chosen) :]),
+    )
+
+
+def spread(front: NDArray[np.int64], most: int) -> NDArray[np.int64]:
+    """So many designs of a front at even distances along it, both ends among them."""
+    if len(front) <= most:
+        return front
+    places = np.unique(np.round(np.linspace(0, len(front) - 1, most)).astype(np.int64))
+    return np.asarray(front[places])
+
+
+def fresh_seed(design: Design) -> int:
+    """Of hits that no search has seen."""
+    return int(np.random.SeedSequence(design.search.seed, spawn_key=(24,)).generate_state(1)[0] >> 1)
+
+
+def _reference(design: Design, place: int) -> Record:
+    """A target to compare with, not yet computed."""
+    given = design.references[place]
+    tables: dict[str, Any] = dict(design.base) | {"plate": dict(given.plate)}
+    if given.layer is not None:
+        tables["layer"] = [dict(one) for one in given.layer]
+    try:
+        campaign = campaign_of(design, tables, design.threats[0])
+    except CampaignError as error:
+        text = str(error).removeprefix(f"{design.name}: ")
+        raise CampaignError(f'{design.name}: references[{place}] "{given.name}": {text}') from None
+    return Record(np.zeros(0), tables, campaign.target.areal_density, (), np.zeros((0, 0, 0)))
+
+
+def check_references(design: Design) -> None:
+    """Refuse a reference that is no campaign before anything is computed.
+
+    Raises:
+        CampaignError: names it.
+    """
+    for place in range(len(design.references)):
+        _reference(design, place)
+
+
+def _fresh(design: Design, work: Work, targets: Sequence[Record]) -> tuple[list[Record], Array]:
+    """Targets with fresh hits, and where these lie."""
+    seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
+    threats = range(len(design.threats))
+    asked = [Job(one.tables, threat, 0, count, FIDELITY, seed) for one in targets for threat in threats]
+    if not design.keys:
+        empty = np.zeros((len(threats), 0, count))
+        found = [Record(one.values, one.tables, one.areal_density, ("",) * len(threats), empty) for one in targets]
+        return found, np.zeros((len(targets), 2, 0))
+    levels = work.levels(asked)
+    said = work.said([Job(*_of(job), level, seed) for job, level in zip(asked, levels, strict=True)])
+    records = []
+    for number, one in enumerate(targets):
+        own = slice(number * len(threats), (number + 1) * len(threats))
+        records.append(
+            Record(
+                values=one.values,
+                tables=one.tables,
+                areal_density=one.areal_density,
+                levels=tuple(levels[own]),
+                said=np.array([part.values for part in said[own]]),
+                seconds=sum(part.seconds for part in said[own]),
+            )
+        )
+    return records, np.array([one.places for one in said[:: len(threats)]])
+
+
+def _of(job: Job) -> tuple[Any, int, int, int]:
+    return job.tables, job.threat, job.first, job.count
+
+
+def _solids(design: Design, work: Work, front: Sequence[Record]) -> list[Record]:
+    """The solid plate of the areal density of every design of the front."""
+    if not design.keys or not front:
+        return list(front)
+    jobs = [
+        Job(one.tables, threat, 0, SOLID_HITS, level, fresh_seed(design), solid=True)
+        for one in front
+        for threat, level in enumerate(one.levels)
+    ]
+    said, threats = work.said(jobs), len(design.threats)
+    return [
+        Record(
+            values=one.values,
+            tables=one.tables,
+            areal_density=one.areal_density,
+            levels=one.levels,
+            said=np.array([part.values for part in said[number * threats : (number + 1) * threats]]),
+        )
+        for number, one in enumerate(front)
+    ]
+
+
+def _kept(design: Design, front: Sequence[Record]) -> NDArray[np.bool_]:
+    """Whether each design is within the bounds, and no other one that is dominates it."""
+    kept = np.array([not excesses(design, one).any() for one in front], dtype=bool)
+    within = np.flatnonzero(kept)
+    points = np.array([objectives(design, front[int(number)]) for number in within])
+    kept[:] = False
+    kept[within[front_of(points)]] = True
+    return kept
+
+
+def groups(design: Design, front: Sequence[Record]) -> NDArray[np.int64]:
+    """Number of the first design of the front than which each is not certainly better in any objective."""
+    found = np.arange(len(front))
+    for number, one in enumerate(front):
+        leaders = [lead for lead in range(number) if found[lead] == lead]
+        found[number] = next((lead for lead in leaders if not is_better(design, one, front[lead])), number)
+    return found
+
+
+def is_better(design: Design, one: Record, other: Record) -> bool:
+    """Whether some objective tells at 95 %, by the same hits of both, that one design is better than another."""
+    count = len(design.objectives)
+    signs = np.array([asked.sign for asked in design.objectives])[:, None]
+    gain = signs * (means(design, other, other.hits) - means(design, one, one.hits))[:count]
+    low = interval(gain)[0]
+    for row, asked in enumerate(design.objectives):
+        least = SAME_WEIGHT * other.areal_density if asked.measure == AREAL_DENSITY else 0.0
+        if low[row] > least:
+            return True
+    return False

@@ -1,0 +1,308 @@
+"""A design file: a campaign, and what is searched in it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError, model_validator
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.problems import sentence
+from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.optimisation import measures
+from warpimpact.optimisation.space import Space, read_space
+from warpimpact.scene.model import Model
+from warpimpact.scene.units import (
+    Number,
+    Obliquity,
+    PositiveArealDensity,
+    PositiveLength,
+    Radians,
+    Title,
+    quoted,
+)
+
+Array = NDArray[np.float64]
+_Table = dict[str, Any]
+_Name = Annotated[Title, Field(min_length=1, max_length=80)]
+
+OWN = ("variables", "objectives", "bounds", "threats", "constraints", "search", "references")
+"""Tables that a design file has beside those of a campaign."""
+
+
+class _Asked(Model):
+    """A measure of `warpimpact inspect`, or the areal density.
+
+    Attributes:
+        measure: its name, as inspect gives it to programs.
+        angle: inclination beyond which a core counts as tilted [rad].
+        standoff: distance behind the rear face [m]; the largest of the campaign unless given.
+        threats: over several threats the "worst" one counts, or their weighted "mean".
+    """
+
+    measure: str
+    angle: Obliquity = Radians(np.radians(30.0))
+    standoff: PositiveLength | None = None
+    threats: Literal["worst", "mean"] = "worst"
+
+    @model_validator(mode="after")
+    def _is_known(self) -> _Asked:
+        if self.measure not in measures.names():
+            raise ValueError(
+                f"got measure = {quoted(self.measure)}, but it must be one of {', '.join(measures.names())}"
+            )
+        return self
+
+    @property
+    def key(self) -> tuple[str, float, float | None]:
+        """What tells two effects apart."""
+        return measures.effect_of(self.measure), float(self.angle), self.standoff
+
+
+class Objective(_Asked):
+    """What is minimised or maximised.
+
+    Attributes:
+        goal: "minimise" or "maximise"; unless given, what is better for whoever is behind the plate.
+    """
+
+    goal: Literal["minimise", "maximise"] | None = None
+
+    @property
+    def sign(self) -> float:
+        """Factor that makes it a quantity to minimise."""
+        if self.goal is not None:
+            return 1.0 if self.goal == "minimise" else -1.0
+        return -1.0 if measures.higher_is_better(self.measure) else 1.0
+
+
+class Bound(_Asked):
+    """A measure that is held within a limit, one of both.
+
+    Attributes:
+        at_most, at_least: limits, in the units in which inspect shows the measure.
+    """
+
+    at_most: Number | None = None
+    at_least: Number | None = None
+
+    @model_validator(mode="after")
+    def _has_a_limit(self) -> Bound:
+        if (self.at_most is None) == (self.at_least is None):
+            raise ValueError("needs at_most or at_least, one of both")
+        return self
+
+    @property
+    def limit(self) -> float:
+        return float(self.at_most if self.at_most is not None else self.at_least)  # type: ignore[arg-type]
+
+    @property
+    def sign(self) -> float:
+        """Factor that makes it a quantity that must not exceed the limit."""
+        return 1.0 if self.at_most is not None else -1.0
+
+
+class Threat(Model):
+    """A threat: what it replaces of the campaign.
+
+    Attributes:
+        name: of the threat.
+        weight: in a mean over the threats.
+        core, impact: keys of these tables.
+    """
+
+    name: _Name
+    weight: Annotated[Number, Field(gt=0)] = 1.0
+    core: _Table = Field(default_factory=dict)
+    impact: _Table = Field(default_factory=dict)
+
+
+class Reference(Model):
+    """A target to compare with, such as a published plate: what it replaces of the campaign.
+
+    Attributes:
+        name: of the target.
+        plate: the whole table.
+        layer: all tables behind it; those of the campaign unless given.
+    """
+
+    name: _Name
+    plate: _Table
+    layer: tuple[_Table, ...] | None = None
+
+
+class Constraints(Model):
+    """What is checked of every layer with holes before anything is computed.
+
+    Attributes:
+        smallest_ligament: least width of material between two holes [m].
+        smallest_hole: least diameter of the largest circle in a hole [m].
+        largest_hole: greatest extent of a hole [m].
+        smallest_corner_radius: least radius of the corners of a hole [m]; that of a slot is half its width.
+        smallest_open_area, largest_open_area: share of holes.
+        smallest_areal_density, largest_areal_density: of the whole target [kg/m²].
+    """
+
+    smallest_ligament: PositiveLength | None = None
+    smallest_hole: PositiveLength | None = None
+    largest_hole: PositiveLength | None = None
+    smallest_corner_radius: PositiveLength | None = None
+    smallest_open_area: Annotated[Number, Field(ge=0, lt=1)] | None = None
+    largest_open_area: Annotated[Number, Field(gt=0, le=1)] | None = None
+    smallest_areal_density: PositiveArealDensity | None = None
+    largest_areal_density: PositiveArealDensity | None = None
+
+
+class Search(Model):
+    """How much is computed.
+
+    Attributes:
+        designs: that are computed at most.
+        population: designs that are computed together, and from which the next ones follow.
+        seed: of the optimiser and of the hits.
+        hits: computed of every design at first.
+        most_hits: computed of a design while the paired difference to the front does not decide.
+        confirmed: designs of the front that are computed again with fresh hits, at most.
+        confirm_hits: hits of each of these.
+    """
+
+    designs: Annotated[int, Field(strict=True, ge=1, le=1_000_000)] = 1000
+    population: Annotated[int, Field(strict=True, ge=4, le=1024)] = 40
+    seed: Annotated[int, Field(strict=True, ge=0, lt=2**31)] = 0
+    hits: Annotated[int, Field(strict=True, ge=16, le=2**16)] = 64
+    most_hits: Annotated[int, Field(strict=True, ge=16, le=2**20)] = 1024
+    confirmed: Annotated[int, Field(strict=True, ge=1, le=200)] = 20
+    confirm_hits: Annotated[int, Field(strict=True, ge=64, le=2**22)] = 1024
+
+    @model_validator(mode="after")
+    def _grows(self) -> Search:
+        if self.most_hits < self.hits:
+            raise ValueError(f"got most_hits = {self.most_hits}, but it must be at least hits = {self.hits}")
+        return self
+
+    @property
+    def rungs(self) -> list[int]:
+        """Hits of a design, from the first to the most, each four times as many."""
+        rungs = [self.hits]
+        while rungs[-1] < self.most_hits:
+            rungs.append(min(4 * rungs[-1], self.most_hits))
+        return rungs
+
+
+class _Asking(Model):
+    """The tables of a design file beside those of a campaign and its variables."""
+
+    objectives: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=3)]
+    bounds: Annotated[tuple[Bound, ...], Field(max_length=16)] = ()
+    threats: Annotated[tuple[Threat, ...], Field(max_length=16)] = ()
+    references: Annotated[tuple[Reference, ...], Field(max_length=16)] = ()
+    constraints: Constraints = Constraints()
+    search: Search = Search()
+
+
+@dataclass(frozen=True)
+class Design:
+    """A design file.
+
+    Attributes:
+        title: of the campaign.
+        text: the file.
+        name, folder: what errors call it, and where the files are that it names.
+        base: tables of the campaign.
+        space: its variables.
+        objectives, bounds, threats, references, constraints, search: as in the file; without threats there is that of
+            the campaign, without a name.
+    """
+
+    title: str
+    text: str
+    name: str
+    folder: Path
+    base: Mapping[str, Any]
+    space: Space
+    objectives: tuple[Objective, ...]
+    bounds: tuple[Bound, ...]
+    threats: tuple[Threat, ...]
+    references: tuple[Reference, ...]
+    constraints: Constraints
+    search: Search
+    keys: tuple[tuple[str, float, float | None], ...] = field(default=())
+
+    @property
+    def asked(self) -> tuple[Objective | Bound, ...]:
+        """Objectives and bounds."""
+        return (*self.objectives, *self.bounds)
+
+    def tables(self, values: Array) -> dict[str, Any]:
+        """The tables of the campaign of a point of the space."""
+        return self.space.tables(self.base, values, self.name)
+
+    def campaign(self, tables: Mapping[str, Any], threat: Threat, **replaced: Any) -> Campaign:
+        """The campaign of a target and a threat.
+
+        Args:
+            tables: of the target.
+            replaced: keys of [hits] and [numerics], by table.
+
+        Raises:
+            CampaignError: it is not valid.
+        """
+        data = dict(tables)
+        for table in ("core", "impact"):
+            own = getattr(threat, table)
+            data[table] = dict(own) if table == "core" and own else data.get(table, {}) | own
+        for table, given in replaced.items():
+            data[table] = data.get(table, {}) | given
+        return Campaign.from_text(json.dumps(data, ensure_ascii=False), name=self.name, folder=self.folder)
+
+
+def read_design(path: str | Path) -> Design:
+    """Read a design file; file names in it count from its folder.
+
+    Raises:
+        CampaignError: the file is missing, is not TOML, or has a value that is not allowed.
+    """
+    path = Path(path)
+    return design_from(read_text(path), str(path), path.parent)
+
+
+def design_from(text: str, name: str, folder: Path) -> Design:
+    """Read a design from its text; `name` is what errors call it."""
+    data = parsed(text, name)
+    own = {key: data.pop(key) for key in OWN if key in data}
+    for table in ("stop", "burst"):
+        if table in data:
+            raise CampaignError(f"{name}: {table}: a design file takes no [{table}]; [search] sets the hits")
+    space = read_space(own.pop("variables", {}), name)
+    try:
+        asking = _Asking.model_validate(own)
+    except ValidationError as error:
+        raise CampaignError(f"{name}: {sentence(error, own)}") from None
+    threats = asking.threats or (Threat(name="threat"),)
+    names = [one.name for one in threats] + [one.name for one in asking.references]
+    if twice := next((one for one in names if names.count(one) > 1), None):
+        raise CampaignError(f'{name}: got the name "{twice}" twice, but each threat and reference needs its own')
+    keys = dict.fromkeys(
+        one.key for one in (*asking.objectives, *asking.bounds) if one.measure != measures.AREAL_DENSITY
+    )
+    return Design(
+        title=str(data.get("title", "")),
+        text=text,
+        name=name,
+        folder=folder,
+        base=data,
+        space=space,
+        objectives=asking.objectives,
+        bounds=asking.bounds,
+        threats=threats,
+        references=asking.references,
+        constraints=asking.constraints,
+        search=asking.search,
+        keys=tuple(keys),
+    )

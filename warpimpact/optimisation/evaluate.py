@@ -1,0 +1,181 @@
+"""Designs in, what their hits say out: the one place of a search that computes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.analysis.effects import EFFECT_VARIABLES, Effect, effects
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.optimisation.design import Design, Threat
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.results import attributes as attr
+from warpimpact.results import variables as v
+from warpimpact.results.dataset import narrow_table
+from warpimpact.results.table import Table
+from warpimpact.runs.compute import at_solid
+from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.scene.units import Radians
+from warpimpact.solver.findings import HitErrors
+from warpimpact.solver.many import simulate_many
+from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.simulate import pilot_of
+from warpimpact.solver.worker import Worker
+
+Array = NDArray[np.float64]
+
+MOST_HITS = 2**20
+"""Images of hits that a sampler of a search has, far more than are computed."""
+_TURNING = ("obliquity", "azimuth", "pitch", "yaw", "spin")
+
+
+@dataclass(frozen=True)
+class Job:
+    """Some hits of a target by a threat.
+
+    Attributes:
+        tables: of the target's campaign.
+        threat: its number in the design file.
+        first, count: hits that are computed, from the first on; equal numbers of all designs belong together.
+        level: numerics as JSON.
+        seed: of the hits.
+        solid: whether the solid plate of equal areal density takes the place of the target.
+    """
+
+    tables: Mapping[str, Any]
+    threat: int
+    first: int
+    count: int
+    level: str
+    seed: int
+    solid: bool = False
+
+
+class Said(NamedTuple):
+    """What the hits of a job say.
+
+    Attributes:
+        values: of every effect that the design file asks for, shape [effects, hits]; NaN where a hit does not count.
+        places: y and z of the hits [m], shape [2, hits].
+        seconds: processor time of preparing and marching, its share of those computed side by side.
+    """
+
+    values: Array
+    places: Array
+    seconds: float
+
+
+def campaign_of(design: Design, tables: Mapping[str, Any], threat: Threat, seed: int | None = None) -> Campaign:
+    """The campaign whose hits a search computes: those of the irreducible part of the cell, where it has one.
+
+    Args:
+        seed: of the hits; that of the search if None.
+
+    Raises:
+        CampaignError: it is not valid.
+    """
+    seed = design.search.seed if seed is None else seed
+    sampling = {"sampling": "sobol", "count": MOST_HITS, "seed": seed, "irreducible": is_even(tables)}
+    kept = {key: value for key, value in tables.get("hits", {}).items() if key in ("area", "replicates")}
+    return design.campaign(dict(tables) | {"hits": kept | sampling}, threat)
+
+
+def is_even(tables: Mapping[str, Any]) -> bool:
+    """Whether nothing but plate and shot decides the symmetries of a target."""
+    layers, impact = tables.get("layer", ()), tables.get("impact", {})
+    holed = any({"pattern", "size"} & {*layer} for layer in layers)
+    return not holed and not any(isinstance(impact.get(name), dict) for name in _TURNING)
+
+
+def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
+    """Hits of a campaign that are computed: none is an image of another."""
+    images = len(campaign.symmetries)
+    return campaign.sampler().shots(first * images, count * images)[::images]
+
+
+def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: int | None = None) -> list[Said]:
+    """Compute jobs side by side; what one says depends on nothing but the job.
+
+    Raises:
+        DeviceError: the device is absent.
+    """
+    scenes = [_scene_of(design, job) for job in jobs]
+    outcomes, seconds = _marched([job.level for job in jobs], scenes, Worker(device, threads))
+    said = []
+    for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
+        table = narrow_table(scene, shots, one, EFFECT_VARIABLES)
+        said.append(Said(said_of(design, table), np.array([shots.hit_y, shots.hit_z]), seconds / len(jobs)))
+    return said
+
+
+def _scene_of(design: Design, job: Job) -> tuple[Campaign, Scene, Shots]:
+    campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
+    shots = hits_of(campaign, job.first, job.count)
+    return (campaign, *at_solid(campaign, shots)) if job.solid else (campaign, campaign.scene, shots)
+
+
+def _marched(
+    levels: Sequence[str], scenes: Sequence[tuple[Campaign, Scene, Shots]], worker: Worker
+) -> tuple[list[Outcomes], float]:
+    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took."""
+    found: dict[int, Outcomes] = {}
+    begin = time.process_time()
+    for level in dict.fromkeys(levels):
+        numerics = Numerics.model_validate_json(level)
+        same = [number for number, one in enumerate(levels) if one == level]
+        found |= zip(same, simulate_many([scenes[number][1:] for number in same], numerics, worker), strict=True)
+    return [found[number] for number in range(len(scenes))], time.process_time() - begin
+
+
+def said_of(design: Design, table: Table) -> Array:
+    """What every effect of a design file says of the hits of a table, shape [effects, hits]; NaN of one that it lacks,
+    as a solid plate has no base."""
+    said = np.full((len(design.keys), table.sizes["hit"]), np.nan)
+    for row, key in enumerate(design.keys):
+        if (effect := effects_in(table, *key[1:]).get(key[0])) is not None:
+            said[row] = effect.values(table)
+    return said
+
+
+def effects_in(table: Table, angle: float, standoff: float | None) -> dict[str, Effect]:
+    """The effects of a table by their names."""
+    core, at = str(table.attrs[attr.CORE]), tuple(table[v.STANDOFF].values)
+    return _effects(core, angle, standoff, at, frozenset(table.variables))(table)
+
+
+_Of = Callable[[Table], dict[str, Effect]]
+
+
+@lru_cache(maxsize=256)
+def _effects(
+    core: str, angle: float, standoff: float | None, at: Any, has: Any
+) -> Callable[[Table], dict[str, Effect]]:
+    """Effects of tables of a core, made once: the silhouettes of a core take as long as some hits."""
+    kept: dict[str, Effect] = {}
+
+    def of(table: Table) -> dict[str, Effect]:
+        if not kept:
+            kept.update({one.name: one for one in effects(table, angle=Radians(angle), standoff=standoff)})
+        return kept
+
+    return of
+
+
+def level_of(design: Design, job: Job, device: str = "auto") -> str:
+    """The numerics, as JSON, that a pilot finds for a job; those of the campaign where it fixes a resolution.
+
+    Args:
+        job: its `level` is the fidelity that is asked for, where the campaign does not fix a resolution.
+    """
+    campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
+    if campaign.numerics.explicit is not None:
+        return campaign.numerics.model_dump_json()
+    asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
+    found: HitErrors = pilot_of(campaign.scene, hits_of(campaign, 0, pilot_size(asked.asked)), asked, Worker(device))
+    return found.numerics.model_dump_json()

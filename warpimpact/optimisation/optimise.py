@@ -1,0 +1,110 @@
+"""From a design file to its front: search, fresh hits, file and campaigns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpimpact.campaign.text import CampaignError
+from warpimpact.optimisation.confirm import check_references, confirm
+from warpimpact.optimisation.crew import Crew, local_crew
+from warpimpact.optimisation.design import Design, read_design
+from warpimpact.optimisation.outcome import to_dataset, write_campaigns
+from warpimpact.optimisation.search import Follow, SearchProgress, search
+from warpimpact.optimisation.work import Work
+from warpimpact.results import front as f
+from warpimpact.results.files import OutputError
+from warpimpact.runs.run import Interrupted
+from warpimpact.runs.shards import claimed
+from warpimpact.runs.store import Store
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def optimise(design: Design | str | Path, *, device: str = "auto", progress: Follow | None = None) -> xarray.Dataset:
+    """Search the best designs, in memory.
+
+    Args:
+        design: the design, or its file.
+        device: "auto" (CUDA if there is one, else the CPU), "cpu" or "cuda:0".
+        progress: called with how far the search is.
+
+    Returns:
+        The Dataset of results/front.py: every design that was computed, and the front by fresh hits.
+
+    Raises:
+        CampaignError: the file has a value that is not allowed, or no design keeps the constraints.
+        DeviceError: the device is absent.
+    """
+    one = design if isinstance(design, Design) else read_design(design)
+    return _found(one, local_crew(device), None, progress or (lambda now: None))[0]
+
+
+def optimise_to_file(
+    design: Design,
+    output: Path,
+    *,
+    device: str = "auto",
+    crew: Crew | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    progress: Follow | None = None,
+) -> list[Path]:
+    """Search the best designs into a file, with a campaign file for each design of the front in `folder_of(output)`;
+    what is computed is on the disk at once, in `output`.parts.
+
+    Args:
+        crew: who computes, in place of `device`.
+
+    Returns:
+        The campaign files.
+
+    Raises:
+        OutputError: something cannot be written, must not be overwritten or is no part of this search.
+        CampaignError: no design keeps the constraints.
+        Interrupted: by the keyboard; what is saved can be resumed.
+    """
+    crew = crew or local_crew(device)
+    with claimed(output):
+        store = Store(output, {"design": design.text, **crew.made_by}, "search")
+        store.begin(resume=resume, overwrite=overwrite)
+        try:
+            dataset, campaigns = _found(design, crew, store, progress or (lambda now: None), folder_of(output))
+            f.write(dataset, output)
+        except KeyboardInterrupt:
+            kept = f"{store.count} batches are saved in {store.folder}; continue with --resume"
+            raise Interrupted(f"interrupted; {kept if store.count else 'nothing is saved'}") from None
+        except (CampaignError, OutputError):
+            if not store.count:
+                store.discard()
+            raise
+        store.discard()
+    return campaigns
+
+
+def folder_of(output: Path) -> Path:
+    """Where the campaigns of the designs of a front are."""
+    return output.with_name(f"{output.stem}_designs")
+
+
+def _found(
+    design: Design, crew: Crew, store: Store | None, follow: Follow, folder: Path | None = None
+) -> tuple[xarray.Dataset, list[Path]]:
+    check_references(design)
+    work = Work(design, crew, store)
+    last: list[SearchProgress] = []
+
+    def kept(now: SearchProgress) -> None:
+        last[:] = [now]
+        follow(now)
+
+    found = search(design, work, kept)
+    confirmed = confirm(design, work, found, lambda what: follow(_with(last[-1], what)))
+    dataset = to_dataset(design, found, confirmed, crew.made_by)
+    names = [str(name) for name in dataset[f.FILE].values]
+    return dataset, write_campaigns(design, confirmed, names, folder) if folder is not None and names else []
+
+
+def _with(now: SearchProgress, what: str) -> SearchProgress:
+    return SearchProgress(now.done, now.total, now.resumed, now.front, now.hypervolume, what)

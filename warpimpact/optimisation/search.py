@@ -1,0 +1,309 @@
+"""The search: points that the optimiser asks for, few hits first, more where the paired difference does not decide."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.campaign.text import CampaignError
+from warpimpact.optimisation.design import Design
+from warpimpact.optimisation.evaluate import Job
+from warpimpact.optimisation.feasible import Checked, checked
+from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
+from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
+from warpimpact.optimisation.work import Work
+
+Array = NDArray[np.float64]
+
+IDLE = 25
+"""Generations without a design that is new and keeps the constraints, after which a search ends."""
+FIDELITY = "draft"
+"""Of the pilots of a search, where the campaign does not fix a resolution."""
+NEIGHBOURHOOD = 0.5
+"""Share of every range within which designs of the same alternatives share a pilot."""
+
+
+@dataclass(frozen=True)
+class SearchProgress:
+    """How far a search is.
+
+    Attributes:
+        done, total: designs that are computed; `total` is the most.
+        resumed: hits of designs that an earlier call had computed, as a number of designs.
+        front: designs on the front.
+        hypervolume: of the front, as a multiple of the box between the best and the worst values of the first
+            generation; NaN before there is one.
+        what: what is computed.
+    """
+
+    done: int
+    total: int
+    resumed: int
+    front: int
+    hypervolume: float
+    what: str
+
+
+Follow = Callable[[SearchProgress], None]
+
+
+@dataclass(frozen=True)
+class Searched:
+    """A search that has ended.
+
+    Attributes:
+        records: all designs that were computed, in that order.
+        front: numbers of those on the front, by the first objective.
+        refused: designs that broke a constraint and were not computed.
+        history: computed designs and hypervolume after every generation, shape [generations, 2].
+        reference, scale: worst values of the first generation to minimise, and the distance from the best, shape
+            [objectives]; empty where no design keeps the bounds.
+        pilots: that were run.
+    """
+
+    records: tuple[Record, ...]
+    front: NDArray[np.int64]
+    refused: int
+    history: Array
+    reference: Array
+    scale: Array
+    pilots: int
+
+
+def search(design: Design, work: Work, follow: Follow = lambda now: None) -> Searched:
+    """Search until the designs of the budget are computed, or there are no others.
+
+    Raises:
+        CampaignError: no design keeps the constraints; the message names the one that rules them out.
+    """
+    state = _State(design, work, follow)
+    for points, tell in _generations(design):
+        state.generation(points)
+        if state.done >= design.search.designs or state.idle >= IDLE:
+            break
+        tell(*state.told(points))
+    if not state.records:
+        raise CampaignError(f"{design.name}: {state.why_none()}")
+    return state.searched()
+
+
+Tell = Callable[[Array, Array], None]
+
+
+def _generations(design: Design) -> Iterator[tuple[list[Array], Tell]]:
+    """Points of the space, with a function that takes what became of them."""
+    space, plan = design.space, design.search
+    if space.size <= plan.designs:
+        every = list(space.points())
+        for first in range(0, len(every), plan.population):
+            yield every[first : first + plan.population], lambda told, broken: None
+        return
+    searcher = Searcher(space, len(design.objectives), 1 + len(design.bounds), plan.population, plan.seed)
+    while asked := searcher.ask():
+        yield [space.at(one) for one in asked], searcher.tell
+
+
+@dataclass
+class _State:
+    """What a search knows."""
+
+    design: Design
+    work: Work
+    follow: Follow
+    records: dict[bytes, Record] = field(default_factory=dict)
+    refused: dict[bytes, Checked] = field(default_factory=dict)
+    pilots: list[tuple[Array, int, str]] = field(default_factory=list)
+    history: list[tuple[int, float]] = field(default_factory=list)
+    box: tuple[Array, Array] | None = None
+    idle: int = 0
+
+    @property
+    def done(self) -> int:
+        return len(self.records)
+
+    def generation(self, points: Sequence[Array]) -> None:
+        """Compute those points that are new and keep the constraints."""
+        new: dict[bytes, Record] = {}
+        for values in points:
+            key = values.tobytes()
+            if key in self.records or key in self.refused or key in new:
+                continue
+            if self.done + len(new) == self.design.search.designs:
+                break
+            tables = self.design.tables(values)
+            found = checked(self.design, tables)
+            if found.violations or found.campaign is None:
+                self.refused[key] = found
+                continue
+            threats, effects = len(self.design.threats), len(self.design.keys)
+            nothing = np.zeros((threats, effects, 0))
+            new[key] = Record(values, tables, found.campaign.target.areal_density, (), nothing)
+        self.idle = 0 if new else self.idle + 1
+        if new:
+            self._compute(new)
+            self._measure()
+
+    def _compute(self, new: dict[bytes, Record]) -> None:
+        """Hits of designs, from rung to rung for those that may be on the front."""
+        levels = self._levels(list(new.values()))
+        for key, of_threats in zip(list(new), levels, strict=True):
+            one = new[key]
+            new[key] = Record(one.values, one.tables, one.areal_density, of_threats, one.said)
+        going, before = list(new), 0
+        for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
+            self._tell(f"{len(going)} designs at {hits} hits", len(new))
+            for key, record in zip(going, self._more([new[key] for key in going], before, hits), strict=True):
+                new[key] = record
+            best = [record for record in self._front() if record.hits >= hits]
+            candidates = [new[key] for key in going]
+            keep = undecided(self.design, candidates, [*best, *candidates], hits)
+            going, before = [key for key, kept in zip(going, keep, strict=True) if kept], hits
+            if not going:
+                break
+        self.records |= new
+
+    def _more(self, records: Sequence[Record], first: int, stop: int) -> list[Record]:
+        """Designs with their hits up to so many."""
+        design = self.design
+        if not design.keys:
+            return [one.more(np.zeros((len(design.threats), 0, stop)), 0.0) for one in records]
+        jobs = [
+            Job(one.tables, threat, first, stop - first, level, design.search.seed)
+            for one in records
+            for threat, level in enumerate(one.levels)
+        ]
+        said, threats = self.work.said(jobs), len(design.threats)
+        found = []
+        for number, one in enumerate(records):
+            own = said[number * threats : (number + 1) * threats]
+            found.append(one.more(np.array([part.values for part in own]), sum(part.seconds for part in own)))
+        return found
+
+    def _levels(self, records: Sequence[Record]) -> list[tuple[str, ...]]:
+        """Numerics of designs for every threat: those of the pilot of a neighbour, or of their own."""
+        places = [self._place(one.values) for one in records]
+        if not self.design.keys:
+            return [("",) * len(self.design.threats) for _ in records]
+        centres: list[tuple[Array, int]] = [(place, threat) for place, threat, _ in self.pilots]
+        jobs = []
+        for one, place in zip(records, places, strict=True):
+            for threat in range(len(self.design.threats)):
+                if not any(of == threat and _near(place, centre) for centre, of in centres):
+                    centres.append((place, threat))
+                    jobs.append(Job(one.tables, threat, 0, 0, FIDELITY, self.design.search.seed))
+        self._tell(f"{len(jobs)} pilots", 0)
+        found = self.work.levels(jobs)
+        self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], found, strict=True)]
+        return [tuple(self._nearest(place, threat) for threat in range(len(self.design.threats))) for place in places]
+
+    def _nearest(self, place: Array, threat: int) -> str:
+        near = [(_apart(place, centre), level) for centre, of, level in self.pilots if of == threat]
+        return min(near, key=lambda one: one[0])[1]
+
+    def _place(self, values: Array) -> Array:
+        """Shares of the ranges; numbers of choices, and what does not count, lie far apart if they differ."""
+        shares = [
+            1e6 * value if one.labels else (value - one.low) / ((one.high - one.low) or 1.0)
+            for one, value in zip(self.design.space.variables, values, strict=True)
+        ]
+        return np.asarray(np.nan_to_num(np.array(shares), nan=-1e6))
+
+    def _valid(self) -> list[Record]:
+        """Designs that keep the bounds, with all the hits that they may have."""
+        most = self.design.search.most_hits if self.design.keys else self.design.search.hits
+        full = [one for one in self.records.values() if one.hits >= most]
+        return [
+            one
+            for one in full
+            if not excesses(self.design, one).any() and np.isfinite(objectives(self.design, one)).all()
+        ]
+
+    def _front(self) -> list[Record]:
+        valid = self._valid()
+        points = np.array([objectives(self.design, one) for one in valid]).reshape(
+            len(valid), len(self.design.objectives)
+        )
+        return [valid[number] for number in front_of(points)]
+
+    def _measure(self) -> None:
+        """Note the hypervolume, in the box of the first generation in which some design keeps the bounds."""
+        every = [objectives(self.design, one) for one in self.records.values() if not excesses(self.design, one).any()]
+        finite = np.array([one for one in every if np.isfinite(one).all()])
+        if self.box is None and len(finite):
+            low, high = finite.min(axis=0), finite.max(axis=0)
+            self.box = high, np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
+        self.history.append((self.done, self._volume()))
+        self._tell("", 0)
+
+    def _volume(self) -> float:
+        front = self._front()
+        if self.box is None or not front:
+            return 0.0
+        reference, scale = self.box
+        points = np.array([objectives(self.design, one) for one in front])
+        return hypervolume((points - reference) / scale, np.full(len(scale), 1e-9))
+
+    def told(self, points: Sequence[Array]) -> tuple[Array, Array]:
+        """Objectives and violations of the points of a generation."""
+        count, rows = len(self.design.objectives), []
+        for values in points:
+            key = values.tobytes()
+            if (record := self.records.get(key)) is not None:
+                rows.append(
+                    [*np.nan_to_num(objectives(self.design, record), posinf=1e30), 0.0, *excesses(self.design, record)]
+                )
+            else:
+                broken = self.refused[key].excess
+                rows.append([*([0.0] * count), broken, *([0.0] * len(self.design.bounds))])
+        told = np.array(rows)
+        return told[:, :count], told[:, count:]
+
+    def _tell(self, what: str, under: int) -> None:
+        plan, last = self.design.search, self.history[-1][1] if self.history else math.nan
+        total = int(min(plan.designs, self.design.space.size))
+        self.follow(SearchProgress(self.done, total, self.work.resumed, len(self._front()), last, what))
+
+    def why_none(self) -> str:
+        """Which constraint rules out all designs that were tried."""
+        tried = list(self.refused.values())
+        broken: dict[str, list[float]] = {}
+        for one in tried:
+            for violation in one.violations:
+                broken.setdefault(violation.constraint, []).append(violation.share)
+        by_all = [name for name, shares in broken.items() if len(shares) == len(tried)]
+        name = by_all[0] if by_all else max(broken, key=lambda key: len(broken[key]))
+        nearest = min(
+            (violation for one in tried for violation in one.violations if violation.constraint == name),
+            key=lambda violation: violation.share,
+        )
+        others = ", ".join(sorted({*broken} - {name}))
+        alone = "" if by_all or not others else f", which {len(broken[name])} of them break, beside {others}"
+        return f"constraints: none of {len(tried)} designs keeps {name}{alone}; the nearest has {nearest.text}"
+
+    def searched(self) -> Searched:
+        records = list(self.records.values())
+        on_front = {id(one) for one in self._front()}
+        front = [number for number, one in enumerate(records) if id(one) in on_front]
+        front.sort(key=lambda number: tuple(objectives(self.design, records[number])))
+        reference, scale = self.box or (np.zeros(0), np.zeros(0))
+        return Searched(
+            records=tuple(records),
+            front=np.array(front, dtype=np.int64),
+            refused=len(self.refused),
+            history=np.array(self.history, dtype=float).reshape(-1, 2),
+            reference=reference,
+            scale=scale,
+            pilots=len(self.pilots),
+        )
+
+
+def _apart(one: Array, other: Array) -> float:
+    return float(np.abs(one - other).max(initial=0.0))
+
+
+def _near(one: Array, other: Array) -> bool:
+    return _apart(one, other) <= NEIGHBOURHOOD

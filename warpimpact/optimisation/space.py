@@ -1,0 +1,236 @@
+"""The free variables of a design: ranges, steps, lists and alternatives, flattened; a point of them as a campaign."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.campaign.places import is_table, put, resolved
+from warpimpact.campaign.text import CampaignError
+from warpimpact.scene.units import quoted
+
+Array = NDArray[np.float64]
+
+MOST_VARIABLES = 64
+MOST_STEPS = 100_000
+_RANGE = {"low", "high", "step"}
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?")
+_DIGITS = 6
+"""Significant digits of a value of a range without a step."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A free variable: a range, with or without a step, or a choice.
+
+    Attributes:
+        name: its key in the design file; below an alternative as "plate.pattern[slots].width".
+        place: where its value stands in the campaign.
+        low, high, step: of a range, in its unit; no step of a continuous one.
+        unit: as it was written.
+        labels, values: of a choice.
+        under: number of the choice, and of its option, below which the variable stands; None where it always counts.
+    """
+
+    name: str
+    place: str
+    low: float = 0.0
+    high: float = 0.0
+    step: float | None = None
+    unit: str = ""
+    labels: tuple[str, ...] = ()
+    values: tuple[Any, ...] = ()
+    under: tuple[int, int] | None = None
+
+    @property
+    def count(self) -> int | None:
+        """How many values it has; None of a continuous one."""
+        if self.labels:
+            return len(self.labels)
+        if self.low == self.high:
+            return 1
+        return None if self.step is None else 1 + math.floor((self.high - self.low) / self.step + 1e-9)
+
+    def at(self, coordinate: float) -> float:
+        """The value at a coordinate: of a share of a continuous range, or of the number of a value. Of a choice it is
+        that number."""
+        if self.labels:
+            return float(int(coordinate))
+        if self.count is None:
+            value = self.low + coordinate * (self.high - self.low)
+        else:
+            value = self.low + int(coordinate) * (self.step or 0.0)
+        digits = _DIGITS - 1 - math.floor(math.log10(max(abs(self.low), abs(self.high), 1e-300)))
+        return min(max(round(value, digits), self.low), self.high)
+
+    def written(self, value: float) -> Any:
+        """A value as it stands in a campaign."""
+        if self.labels:
+            return self.values[int(value)]
+        number = int(value) if not self.unit and value == int(value) and self.step is not None else value
+        return f"{value:.12g} {self.unit}" if self.unit else number
+
+    def text(self, value: float) -> str:
+        """A value for a person."""
+        return self.labels[int(value)] if self.labels else f"{value:.6g} {self.unit}".strip()
+
+
+@dataclass(frozen=True)
+class Space:
+    """All variables, a choice before what stands below it."""
+
+    variables: tuple[Variable, ...]
+
+    @property
+    def size(self) -> float:
+        """Number of its points, those that differ in variables that do not count included; infinite of a continuous
+        space."""
+        counts = [one.count for one in self.variables]
+        return math.inf if None in counts else float(math.prod(count for count in counts if count is not None))
+
+    def at(self, coordinates: Sequence[float]) -> Array:
+        """Values at coordinates as `Variable.at` takes them, shape [variables]; NaN of those that do not count."""
+        values = np.full(len(self.variables), math.nan)
+        for number, (one, coordinate) in enumerate(zip(self.variables, coordinates, strict=True)):
+            if one.under is None or values[one.under[0]] == one.under[1]:
+                values[number] = one.at(coordinate)
+        return values
+
+    def points(self) -> Iterator[Array]:
+        """All points of a space that is not continuous, each once."""
+        seen = set()
+        for numbers in np.ndindex(*(one.count or 0 for one in self.variables)):
+            values = self.at([float(number) for number in numbers])
+            if values.tobytes() not in seen:
+                seen.add(values.tobytes())
+                yield values
+
+    def tables(self, base: Mapping[str, Any], values: Array, name: str) -> dict[str, Any]:
+        """The tables of the campaign of a point.
+
+        Args:
+            base: those of the design file.
+            name: what errors call it.
+        """
+        data = json.loads(json.dumps(base, default=str))
+        for one, value in zip(self.variables, values, strict=True):
+            if not math.isnan(value):
+                put(data, one.place, json.loads(json.dumps(one.written(value), default=str)), f"{name}: variables")
+        return dict(data)
+
+    def text(self, values: Array) -> str:
+        """A point for a person."""
+        told = zip(self.variables, values, strict=True)
+        return ", ".join(f"{one.name} = {one.text(value)}" for one, value in told if not math.isnan(value))
+
+
+def read_space(given: Any, name: str) -> Space:
+    """The table `[variables]` of a design file.
+
+    Args:
+        name: what errors call the file.
+
+    Raises:
+        CampaignError: a variable is neither a range nor a list, or has no value.
+    """
+    if not isinstance(given, dict):
+        raise CampaignError(f"{name}: variables: got {quoted(given)}, but it must be a table")
+    found: list[Variable] = []
+    for key, value in given.items():
+        _read(found, key, resolved(key, f"{name}: variables"), value, f"{name}: variables.{key}")
+    if len(found) > MOST_VARIABLES:
+        raise CampaignError(f"{name}: variables: got {len(found)}, but at most {MOST_VARIABLES} are searched")
+    places = [one.place for one in found if one.under is None]
+    if twice := next((place for place in places if places.count(place) > 1), None):
+        raise CampaignError(f"{name}: variables: got two variables for {twice}")
+    return Space(tuple(found))
+
+
+def _read(found: list[Variable], name: str, place: str, given: Any, where: str, under: Any = None) -> None:
+    """Add a variable and those below its alternatives."""
+    if isinstance(given, dict) and "low" in given:
+        found.append(_range(name, place, given, where, under))
+    elif isinstance(given, list) and given:
+        _read_choice(found, name, place, given, where, under)
+    else:
+        raise CampaignError(
+            f"{where}: got {quoted(given)}, but it must be a range, as "
+            '{ low = "3 mm", high = "8 mm", step = "0.5 mm" }, or a list of values'
+        )
+
+
+def _range(name: str, place: str, given: dict[str, Any], where: str, under: Any) -> Variable:
+    if unknown := next((key for key in given if key not in _RANGE), None):
+        raise CampaignError(f"{where}: got the unknown key {quoted(unknown)}; allowed are low, high, step")
+    if "high" not in given:
+        raise CampaignError(f"{where}.high: is missing, but must be given")
+    numbers, units = {}, {}
+    for key, value in given.items():
+        match = _NUMBER.fullmatch(value) if isinstance(value, str) else None
+        if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+            numbers[key], units[key] = float(value), ""
+        elif match is not None:
+            numbers[key], units[key] = float(match[1]), (match[2] or "").strip()
+        else:
+            raise CampaignError(f"{where}.{key}: got {quoted(value)}, but it must be a number or a string with a unit")
+    if len(set(units.values())) > 1:
+        raise CampaignError(f"{where}: got the units {', '.join(map(quoted, units.values()))}, but they must be one")
+    low, high, step = numbers["low"], numbers["high"], numbers.get("step")
+    if not low <= high:
+        raise CampaignError(f"{where}: got low = {low:g} and high = {high:g}, but low must not be greater")
+    if step is not None and not (step > 0.0 and (high - low) / step <= MOST_STEPS):
+        raise CampaignError(
+            f"{where}.step: got {step:g}, but it must be greater than 0 and divide the range into at most {MOST_STEPS}"
+        )
+    return Variable(name, place, low, high, step, units["low"], under=under)
+
+
+def _read_choice(found: list[Variable], name: str, place: str, given: list[Any], where: str, under: Any) -> None:
+    """A list of values, or of tables with names; ranges and lists in a table are variables below it."""
+    whole = is_table(place) or place == "layer" or all(isinstance(one, dict) for one in given)
+    if whole and not all(isinstance(one, dict) and isinstance(one.get("name"), str) for one in given):
+        raise CampaignError(f"{where}: must be a list of tables, each with a name")
+    if not whole and any(isinstance(one, dict | list) for one in given):
+        raise CampaignError(f"{where}: got {quoted(given)}, but it must be a list of values")
+    labels = tuple(
+        one["name"] if whole else one if isinstance(one, str) else json.dumps(one, default=str) for one in given
+    )
+    if len(set(labels)) < len(labels):
+        raise CampaignError(f"{where}: got a value twice, but each must differ")
+    number, values, below = len(found), [], []
+    for option, one in enumerate(given):
+        if not whole:
+            values.append(one)
+            continue
+        table = {key: part for key, part in one.items() if key != "name"}
+        inner: Any = table.get("layer", []) if place == "layer" else table
+        values.append(inner)
+        below += [(option, path, part) for path, part in _free(inner)]
+    found.append(Variable(name, place, labels=labels, values=tuple(values), under=under))
+    for option, path, part in below:
+        _read(
+            found,
+            f"{name}[{labels[option]}].{path}",
+            f"{place}.{path}",
+            part,
+            f"{where}[{option}].{path}",
+            (number, option),
+        )
+
+
+def _free(inside: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """The ranges in a table, with their places in it."""
+    entries = inside.items() if isinstance(inside, dict) else enumerate(inside) if isinstance(inside, list) else ()
+    for key, one in entries:
+        place = f"{path}.{key}" if path else str(key)
+        if isinstance(one, dict) and "low" in one:
+            yield place, one
+        else:
+            yield from _free(one, place)

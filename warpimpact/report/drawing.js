@@ -1,0 +1,179 @@
+"use strict";
+// Draws maps of hits and views of a core, on a page that has Plotly. All numbers come from `data` (report/hits.py).
+function hitMaps(data) {
+  const config = { displaylogo: false, responsive: true, showSendToCloud: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+  const STATUS = "status", MISSING = "#9e9e9e", CHOSEN = "#d55e00";
+  // Of the page, which may be light or dark.
+  const ink = getComputedStyle(document.body).color;
+  const font = { family: "system-ui, sans-serif", size: 12, color: ink };
+  const sheet = { font, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)" } };
+  // Four digits; less than a thousandth of a unit is rounding.
+  const number = (value) => {
+    if (value === null) return "–";
+    return String(Math.abs(value) < 1e-3 ? 0 : Number(value.toPrecision(4))).replace("-", "−");
+  };
+  const statusOf = (code) => data.statuses.find((status) => status.code === code);
+  const split = (label) => label.match(/^(.*) \[(.*)\]$/).slice(1);
+
+  function told(result, hit, keys) {
+    const lines = data.variables.filter(({ key }) => keys.includes(key)).map(({ key, label }) => {
+      const [name, unit] = split(label);
+      return `${name}: ${number(result.columns[key][hit])}${unit === "°" ? "" : " "}${unit}`;
+    });
+    const place = `y = ${number(result.y[hit])} mm, z = ${number(result.z[hit])} mm`;
+    return [`hit ${result.number[hit]}: ${statusOf(result.status[hit]).label}`, place, ...lines];
+  }
+
+  // The label at the pointer for every hit, short enough for a phone.
+  function hovers(result, variable) {
+    const keys = data.variables.map(({ key }) => key).filter((key) => key === variable || data.main.includes(key));
+    return result.number.map((_, hit) => told(result, hit, keys).join("<br>"));
+  }
+
+  function valuesOf(result, variable) {
+    if (variable !== STATUS) return result.columns[variable];
+    return result.status.map((code) => data.statuses.findIndex((status) => status.code === code));
+  }
+
+  // One scale for all results makes maps comparable.
+  function colours(variable) {
+    if (variable === STATUS) {
+      const count = data.statuses.length;
+      const scale = data.statuses.flatMap(({ colour }, k) => [[k / count, colour], [(k + 1) / count, colour]]);
+      const bar = { tickvals: data.statuses.map((_, k) => k), ticktext: data.statuses.map(({ label }) => label) };
+      return { scale, low: -0.5, high: count - 0.5, bar };
+    }
+    const { signed, label } = data.variables.find(({ key }) => key === variable);
+    let low = Infinity, high = -Infinity;
+    for (const result of data.results) {
+      for (const value of result.columns[variable]) {
+        if (value !== null) { low = Math.min(low, value); high = Math.max(high, value); }
+      }
+    }
+    if (low > high) { low = 0; high = 1; }
+    if (signed) { high = Math.max(Math.abs(low), Math.abs(high)); low = -high; }
+    return { scale: signed ? "RdBu" : "Viridis", reversed: signed, low, high, bar: { title: { text: split(label)[1] } } };
+  }
+
+  function pixelTrace(result, values, texts, { scale, reversed, low, high, bar }) {
+    const rows = result.nearest.length, columns = result.nearest[0].length;
+    const [wide, tall] = result.period;
+    const centres = (count, length) => Array.from({ length: count }, (_, k) => ((k + 0.5) / count - 0.5) * length);
+    return {
+      type: "heatmap", x: centres(columns, wide), y: centres(rows, tall),
+      z: result.nearest.map((row) => row.map((hit) => values[hit])),
+      text: result.nearest.map((row) => row.map((hit) => texts[hit])),
+      hovertemplate: "%{text}<extra></extra>", hoverongaps: true,
+      colorscale: scale, reversescale: reversed, zmin: low, zmax: high, colorbar: { thickness: 14, xpad: 5, ...bar },
+    };
+  }
+
+  function pointTrace(result, values, texts, { scale, reversed, low, high, bar }) {
+    const marker = {
+      size: 9, line: { color: "black", width: 0.7 }, color: values.map((value) => (value === null ? NaN : value)),
+      colorscale: scale, reversescale: reversed, cmin: low, cmax: high, showscale: true, colorbar: { thickness: 14, xpad: 5, ...bar },
+    };
+    return {
+      type: "scatter", mode: "markers", x: result.y, y: result.z, marker, text: texts,
+      hovertemplate: "%{text}<extra></extra>",
+    };
+  }
+
+  const passive = { hoverinfo: "skip", showlegend: false };
+
+  // `chosen` is a hit with a ring; `replayed` are hits with a dot.
+  function drawMap(place, result, variable, { chosen = null, replayed = [], tallest: most = 480 } = {}) {
+    const values = valuesOf(result, variable), scale = colours(variable);
+    const [y, z] = result.outline;
+    const traces = [
+      (result.nearest ? pixelTrace : pointTrace)(result, values, hovers(result, variable), scale),
+      { ...passive, type: "scatter", mode: "lines", x: y, y: z, line: { color: "black", width: 3 } },
+      { ...passive, type: "scatter", mode: "lines", x: y, y: z, line: { color: "white", width: 1.2 } },
+      {
+        ...passive, type: "scatter", mode: "markers", x: replayed.map((hit) => result.y[hit]),
+        y: replayed.map((hit) => result.z[hit]),
+        marker: { symbol: "circle", size: 6, color: "white", line: { color: "black", width: 1 } },
+      },
+      {
+        ...passive, type: "scatter", mode: "markers", x: chosen === null ? [] : [result.y[chosen]],
+        y: chosen === null ? [] : [result.z[chosen]],
+        marker: { symbol: "circle-open", size: 16, color: CHOSEN, line: { width: 3 } },
+      },
+    ];
+    // One scale of length for all maps: the widest fills its place, and the tallest stays on a screen.
+    const spans = data.results.map(({ limits }) => limits.map(([low, high]) => high - low));
+    const [widest, tallest] = [0, 1].map((axis) => Math.max(...spans.map((span) => span[axis])));
+    const bar = 90, perMm = Math.min((place.clientWidth - 60 - bar) / widest, most / tallest);
+    const [wide, tall] = spans[data.results.indexOf(result)];
+    const layout = {
+      ...sheet, margin: { l: 50, r: 10 + bar, t: 30, b: 45 }, width: wide * perMm + 60 + bar,
+      height: tall * perMm + 75, autosize: false,
+      plot_bgcolor: MISSING, hoverlabel: { align: "left", bgcolor: "white", font: { color: "black" } },
+      xaxis: { title: { text: "hit y [mm]" }, range: result.limits[0], constrain: "domain", zeroline: false, showgrid: false },
+      yaxis: {
+        title: { text: "hit z [mm]" }, range: result.limits[1], constrain: "domain", zeroline: false, showgrid: false,
+        scaleanchor: "x",
+      },
+    };
+    return Plotly.react(place, traces, layout, config);
+  }
+
+  function distance(result, one, other) {
+    const along = (axis, period) => {
+      const offset = result[axis][one] - result[axis][other];
+      return offset - period * Math.round(offset / period);
+    };
+    return Math.hypot(along("y", result.period[0]), along("z", result.period[1]));
+  }
+
+  // The core in two views with one scale, x-y above x-z, and all layers cut through the hit point.
+  function drawViews(place, { solid }, poses) {
+    const traces = [], shapes = [];
+    [["y", "x", "y"], ["z", "x2", "y2"]].forEach(([view, xaxis, yaxis], row) => {
+      for (const { label, colour, [view]: [x, y] } of poses) {
+        traces.push({
+          type: "scatter", mode: "lines", x, y, xaxis, yaxis, name: label, legendgroup: label, showlegend: row === 0,
+          fill: "toself", fillcolor: `${colour}40`, line: { color: colour, width: 1.5 }, hoverinfo: "skip",
+        });
+      }
+      for (const [front, rear, low, high] of solid[view]) {
+        shapes.push({
+          type: "rect", xref: xaxis, yref: yaxis, x0: front, x1: rear, y0: low, y1: high,
+          fillcolor: "#bbbbbb", line: { width: 0 }, layer: "below",
+        });
+      }
+    });
+    const range = (values, room, least) => {
+      const [low, high] = [Math.min(...values), Math.max(...values)], half = Math.max((high - low) / 2 + room, least / 2);
+      return [(low + high) / 2 - half, (low + high) / 2 + half];
+    };
+    const [x, y, z] = [["y", 0, 0], ["y", 1, 20], ["z", 1, 20]].map(([view, axis, least]) =>
+      range(poses.flatMap((pose) => pose[view][axis]), 3, least));
+    const perMm = Math.max(place.clientWidth - 70, 1) / (x[1] - x[0]), gap = 40, below = 95;
+    const [high, low] = [y, z].map(([from, to]) => (to - from) * perMm), total = high + gap + low;
+    const layout = {
+      ...sheet, shapes, height: total + below + 10, margin: { l: 55, r: 15, t: 10, b: below },
+      legend: { orientation: "h", y: -55 / total, yanchor: "top" },
+      xaxis: { range: x, anchor: "y", zeroline: false },
+      yaxis: { range: y, title: { text: "y [mm]" }, domain: [1 - high / total, 1], scaleanchor: "x", zeroline: false },
+      xaxis2: { range: x, anchor: "y2", title: { text: "x [mm]" }, zeroline: false },
+      yaxis2: { range: z, title: { text: "z [mm]" }, domain: [0, low / total], scaleanchor: "x2", zeroline: false },
+    };
+    return Plotly.react(place, traces, layout, { ...config, displayModeBar: false });
+  }
+
+  // The core in the plate and behind it, each in its place.
+  function drawTrajectory([passage, flight], trajectory) {
+    const { inside, behind } = trajectory;
+    drawViews(passage, trajectory, inside);
+    drawViews(flight, trajectory, [{ ...inside[0], label: "on impact" }, ...behind]);
+  }
+
+  function hitOf(result, point) {
+    if (!result.nearest) return point.pointIndex;
+    const [row, column] = point.pointIndex;
+    return result.nearest[row][column];
+  }
+
+  return { distance, drawMap, drawTrajectory, hitOf, number, told };
+}

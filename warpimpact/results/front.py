@@ -1,0 +1,138 @@
+"""The file of a search for designs: its variables and attributes, written whole or not at all.
+
+design      every design that was computed
+variable    the free variables
+asked       objectives, then bounds
+front       designs of the front, computed again with fresh hits
+reference   targets to compare with, with the hits of the front
+generation  of the search
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpimpact.records.variable import Variable
+from warpimpact.results import attributes as attr
+from warpimpact.results.files import ResultError, aside
+from warpimpact.results.interrupts import uninterrupted
+
+if TYPE_CHECKING:
+    import xarray
+
+_BY_DESIGN, _BY_FRONT, _BY_REFERENCE = ("design", "asked"), ("front", "asked"), ("reference", "asked")
+_LOW, _HIGH = "lower end of its 95 % interval", "upper end of its 95 % interval"
+
+NAME = Variable("variable", ("variable",), "1", "free variable")
+UNIT = Variable("variable_unit", ("variable",), "1", "unit of the variable, as the design file has it")
+LABELS = Variable("variable_labels", ("variable",), "1", "what a variable chooses from, as a JSON list")
+ASKED = Variable("asked", ("asked",), "1", "objective or bound")
+LABEL = Variable("asked_label", ("asked",), "1", "what it is, for people, with its unit")
+SIGN = Variable("asked_sign", ("asked",), "1", "1 where less is sought, -1 where more is")
+LIMIT = Variable("asked_limit", ("asked",), "1", "limit of a bound in its own units; no value of an objective")
+
+VALUE = Variable("value", ("design", "variable"), "1", "value in its unit; number of a choice; none where unused")
+FOUND = Variable("found", _BY_DESIGN, "1", "objective or bound in its own units")
+FOUND_LOW = Variable("found_low", _BY_DESIGN, "1", _LOW)
+FOUND_HIGH = Variable("found_high", _BY_DESIGN, "1", _HIGH)
+HITS = Variable("hits", ("design",), "1", "hits that were computed by each threat")
+LEVELS = Variable("numerics", ("design",), "1", "numerics by threat, as JSON")
+COST = Variable("cost", ("design",), "s", "processor time that its hits took")
+ON_FRONT = Variable("on_front", ("design",), "1", "1 on the front of the search, else 0")
+
+NUMBER = Variable("front_design", ("front",), "1", "number of the design")
+FRESH = Variable("front_found", _BY_FRONT, "1", "objective or bound by fresh hits, in its own units")
+FRESH_LOW = Variable("front_found_low", _BY_FRONT, "1", _LOW)
+FRESH_HIGH = Variable("front_found_high", _BY_FRONT, "1", _HIGH)
+KEPT = Variable("front_kept", ("front",), "1", "1 where fresh hits leave it on the front and within the bounds, else 0")
+GROUP = Variable("front_group", ("front",), "1", "first design than which it is not certainly better at 95 %")
+CAMPAIGN = Variable("front_campaign", ("front",), "1", "campaign of the first threat, as TOML")
+FILE = Variable("front_file", ("front",), "1", "name of its campaign file")
+SOLID = Variable("front_solid", _BY_FRONT, "1", "the same of the solid plate of equal areal density")
+FRESH_LEVELS = Variable("front_numerics", ("front",), "1", "numerics by threat, as JSON")
+HIT_Y = Variable("front_hit_y", ("front", "hit"), "m", "hit point in the irreducible part of the cell, y")
+HIT_Z = Variable("front_hit_z", ("front", "hit"), "m", "hit point in the irreducible part of the cell, z")
+HIT_VALUE = Variable("front_hit_value", ("front", "effect", "hit"), "1", "what the hit says, of the first threat")
+
+REFERENCE = Variable("reference", ("reference",), "1", "target to compare with")
+REFERENCE_FOUND = Variable("reference_found", _BY_REFERENCE, "1", "objective or bound, in its own units")
+REFERENCE_LOW = Variable("reference_found_low", _BY_REFERENCE, "1", _LOW)
+REFERENCE_HIGH = Variable("reference_found_high", _BY_REFERENCE, "1", _HIGH)
+REFERENCE_CAMPAIGN = Variable("reference_campaign", ("reference",), "1", "campaign of the first threat, as TOML")
+
+COMPUTED = Variable("computed", ("generation",), "1", "designs that were computed so far")
+VOLUME = Variable(
+    "hypervolume",
+    ("generation",),
+    "1",
+    "hypervolume of the front so far, as a share of the box of the first generation",
+)
+
+VARIABLES = (
+    *(NAME, UNIT, LABELS, ASKED, LABEL, SIGN, LIMIT, VALUE, FOUND, FOUND_LOW, FOUND_HIGH, HITS, LEVELS, COST),
+    *(ON_FRONT, NUMBER, FRESH, FRESH_LOW, FRESH_HIGH, KEPT, GROUP, CAMPAIGN, FILE, SOLID, FRESH_LEVELS),
+    *(HIT_Y, HIT_Z, HIT_VALUE, REFERENCE, REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH, REFERENCE_CAMPAIGN),
+    *(COMPUTED, VOLUME),
+)
+COORDINATES = (NAME, ASKED, REFERENCE)
+
+DESIGN = "design_file"
+"""Attribute: the text of the design file."""
+OUTCOME, FEASIBLE, NONE_FEASIBLE = "outcome", "front", "no design within the bounds"
+"""Attribute: how the search ended, one of both."""
+BOX = "hypervolume_box"
+"""Attribute: worst values of the first generation to minimise, then the distances from the best."""
+REFUSED, PILOTS = "refused_designs", "pilots"
+"""Attributes: designs that broke a constraint, and pilots of the search."""
+SURVIVES = "front_survival"
+"""Attribute: of a posterior, which neighbours on the front stay in order, as a JSON list of shares of the draws."""
+_REFERENCES = "docs/howto/optimise.md of warpimpact"
+
+
+def dataset_of(columns: dict[Variable, Any], attributes: dict[str, Any]) -> xarray.Dataset:
+    """The Dataset of these columns."""
+    import xarray
+
+    data = {name: (name.dims, _array(values), name.attributes) for name, values in columns.items()}
+    coordinates = {name: one for name, one in data.items() if name in COORDINATES}
+    fixed = {"Conventions": "CF-1.11", attr.REFERENCES: _REFERENCES}
+    own = {name: one for name, one in data.items() if name not in coordinates}
+    return xarray.Dataset(own, coordinates, fixed | attributes)
+
+
+def _array(values: Any) -> Any:
+    found = np.asarray(values)
+    return found.astype(object) if found.dtype.kind == "U" else found
+
+
+def write(dataset: xarray.Dataset, path: Path) -> None:
+    """Write a search; an existing file is replaced.
+
+    Raises:
+        OutputError: it cannot be written; what was there before is untouched.
+    """
+    with uninterrupted(), aside(path) as file:
+        dataset.to_netcdf(file, engine="netcdf4", format="NETCDF4")
+
+
+def read(path: Path) -> xarray.Dataset:
+    """Read a search into memory.
+
+    Raises:
+        ResultError: the file is missing, is not netCDF, or is no search.
+    """
+    import xarray
+
+    if not path.is_file():
+        raise ResultError(f"{path}: cannot be read (it {'is no file' if path.exists() else 'is not there'})")
+    try:
+        with uninterrupted(), xarray.open_dataset(path, engine="netcdf4") as file:
+            found = file.load()
+    except Exception as error:  # a file that was altered leads xarray into errors of any class
+        raise ResultError(f"{path}: cannot be read as a netCDF file ({str(error)[:200]})") from error
+    if DESIGN not in found.attrs or not {FOUND, VALUE, HITS} <= {*found.variables}:
+        raise ResultError(f"{path}: is no search for designs, as warpimpact optimise writes")
+    return found

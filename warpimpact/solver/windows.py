@@ -1,0 +1,84 @@
+"""Windows: the part of each layer about a hit whose nodes remember what has weakened them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Core, Shots
+    from warpimpact.solver.grid import Grid
+    from warpimpact.solver.materials import Materials
+
+Cells = tuple[int, int]
+"""Of a window, along y and z."""
+Counts = NDArray[np.int64]
+
+SIZES = (1024, 2048, 3072, 4096, 6144)
+"""Windows that blocks have [nodes]; each is compiled by itself. Two fields of float32 of the largest fill the 48 KiB of
+shared memory that a block of every CUDA device has."""
+SLACK, NODAL_SLACK = 1.6, 1.2
+"""Half the width of a first window for a straight shot, in radii of the core. It is smaller for the literal scheme: on
+its fine grid, large windows cost more time than the repetition of some shots."""
+DEEP = 0.6
+"""Half of what the first window of a layer behind the plate is wider than that of the plate, in largest distances of
+the core's surface from its centre of mass: the core arrives turned."""
+
+
+def first_windows(
+    core: Core, shots: Shots, material: Materials, plates: Sequence[Sequence[Grid]], which: Counts, *, nodal: bool
+) -> Counts:
+    """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
+    plate, or the laminate that it begins; shape [shots]. Layers farther away have windows of their own.
+
+    Args:
+        material: of the plate.
+        plates: the grids of all layers, one way or several.
+        which: of these, shape [1] or [shots].
+    """
+    slack = NODAL_SLACK if nodal else SLACK
+    turned = np.minimum(1.0, np.sin(np.hypot(shots.pitch, shots.yaw)))
+    half = (
+        slack * core.max_radius / np.cos(shots.obliquity)
+        + material.together * np.tan(shots.obliquity)
+        + core.bounding_radius * turned
+    )
+    spacing, reach = (np.array([getattr(grids[0], name) for grids in plates])[which] for name in ("spacing", "reach"))
+    return np.asarray(2 * (np.ceil(half / spacing).astype(np.int64) + 2 * reach + 3))
+
+
+def windows_behind(
+    core: Core,
+    shots: Shots,
+    materials: Sequence[Materials],
+    plates: Sequence[Sequence[Grid]],
+    which: Counts,
+    plate: Counts,
+    *,
+    burst: bool,
+) -> Counts:
+    """Nodes of the windows of all layers, in each direction, shape [layers, shots], if those of the plate have so many;
+    0 where a layer keeps no field. A layer that earlier hits pierce keeps their channels.
+
+    Args:
+        plates, which: as in `first_windows`.
+        plate: shape [1] or [shots].
+    """
+    steep, own = np.tan(shots.obliquity), [np.broadcast_to(plate, len(shots))]
+    wide = np.array([grids[0].spacing for grids in plates])[which]
+    for k, material in enumerate(materials[1:], start=1):
+        spacing = np.array([grids[k].spacing for grids in plates])[which]
+        taps = np.array([len(grids[k].taps) for grids in plates])[which]
+        thicker = np.maximum(0.0, material.together - materials[0].together)
+        half = 0.5 * own[0] * wide + DEEP * core.bounding_radius + thicker * steep
+        count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
+        own.append(count if material.weakens or burst else np.zeros_like(own[0]))
+    return np.stack([own[material.laminate] for material in materials])
+
+
+def block_window(cells: int) -> int:
+    """Nodes of the window of a block that holds so many in each direction; 0 if none does."""
+    return next((size for size in SIZES if size >= cells**2), 0)
