@@ -182,10 +182,15 @@ def _judged(
 
 
 def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
-    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers."""
+    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers.
+    What is not asked for counts as 0, however large its error is."""
     velocity, tilt = np.nan_to_num(errors[:2], nan=math.inf)
     depth = np.nan_to_num(errors[2], nan=0.0) if layered else 0.0
-    return float(max(velocity / accuracy.residual_velocity, tilt / accuracy.tilt, depth / accuracy.depth))
+    allowed = accuracy.residual_velocity, accuracy.tilt, accuracy.depth
+    return max(
+        float(error) / bound if math.isfinite(bound) else 0.0
+        for error, bound in zip((velocity, tilt, depth), allowed, strict=True)
+    )
 
 
 def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:

@@ -13,6 +13,7 @@ from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
 from warpimpact.scene import (
     PRESETS,
+    Accuracy,
     CirclePattern,
     Hits,
     Impact,
@@ -259,6 +260,16 @@ def test_levels_that_a_pilot_tries(excess: list[float], tried: list[int], taken:
     found = pilot._coarsest(judge, range(5), 9, 1)
     assert found is not None
     assert (seen, found.numerics.level) == (tried, taken)
+
+
+@pytest.mark.parametrize("error", [math.inf, math.nan, 1e300])
+@pytest.mark.parametrize(
+    ("asked", "place"), [({"tilt": 0.02}, 0), ({"residual_velocity": 1.0}, 1), ({"residual_velocity": 1.0}, 2)]
+)
+def test_what_an_accuracy_does_not_ask_for_counts_nothing(asked: dict[str, float], place: int, error: float) -> None:
+    errors = np.array([0.5, math.radians(0.01), 0.0])
+    errors[place] = error
+    assert pilot._excess(Accuracy(**asked), errors, layered=True) == 0.5
 
 
 @pytest.mark.parametrize(("share_of_allowed", "parts"), [(0.5, [16, 16]), (1.1, [16, 16, 16, 16])])
