@@ -3,7 +3,6 @@
 import json
 import re
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -39,14 +38,6 @@ def parsed(text: str, name: str) -> dict[str, Any]:
     if nested:
         raise CampaignError(f"{name}: is not a campaign: its tables and arrays are nested more than {_MOST_DEEP} deep")
     return data
-
-
-def toml_of(data: Mapping[str, Any]) -> str:
-    """The tables of a campaign as the text of a TOML file, from which `parsed` reads the same."""
-    import tomli_w  # which a run does not need
-
-    text: str = tomli_w.dumps(data, indent=2)
-    return text
 
 
 def _from_json(text: str) -> Any:

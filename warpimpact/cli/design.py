@@ -22,7 +22,8 @@ def add_design(commands: Commands) -> None:
         "designs",
         nargs="*",
         metavar="CAMPAIGN.toml",
-        help="campaign files, or the address of a page, which holds its design (default: the slotted plate)",
+        help="campaigns; also results, searches of warpimpact optimise with their designs, and the address of "
+        "a page, which holds its design (default: the slotted plate)",
     )
     parser.add_argument("--port", type=int, default=0, metavar="N", help="port of the page (default: one that is free)")
     parser.add_argument("--no-browser", action="store_true", help="print the address and open no browser")

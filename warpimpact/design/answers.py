@@ -13,7 +13,7 @@ import xarray
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
 from warpimpact.analysis.hit import hit_text
-from warpimpact.analysis.summary import breaks_promise
+from warpimpact.analysis.summary import breaks_promise, promise_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.evidence import evidence_of
 from warpimpact.campaign.plausible import doubted
@@ -23,7 +23,7 @@ from warpimpact.design.controls import groups
 from warpimpact.design.designs import FOLDER, Design, Shelf, stage_of
 from warpimpact.design.drawing import drawn
 from warpimpact.plotting.trajectory import FIGURES
-from warpimpact.report.hits import MOST_HITS, page_data, thinned, trajectory_data
+from warpimpact.report.hits import MOST_HITS, PIXELS, page_data, thinned, trajectory_data
 from warpimpact.report.report import report_page, texts
 from warpimpact.report.words import compared, result_content
 from warpimpact.results import attributes as attr
@@ -34,7 +34,9 @@ from warpimpact.solver.worker import Cancel
 _MOST_KEPT = 256 * 2**20
 """Bytes of results that are kept: to go back to a design computes nothing."""
 _MOST_HISTORIES = 4
-_FIRST = "The error of the numerics is not known: the resolution is that of the last draft."
+_COARSE = 96
+"""Pixels along the longer side of a first map, which has few hits."""
+_FIRST = "The error of the numerics is not known."
 OWN = "this design"
 """Name of the design that is on the page; those it is compared with have names of their own."""
 
@@ -89,36 +91,44 @@ class Answers:
         self._results.move_to_end(text)
         return self._results[text]
 
-    def stage(self, name: str, designs: Mapping[str, Design], total: int, cancel: Cancel) -> dict[str, Any]:
-        """The maps and the numbers of a design and of those that it is compared with, at one stage.
+    def maps(self, name: str, designs: Mapping[str, Design], total: int, cancel: Cancel) -> dict[str, Any]:
+        """The maps of a design and of those that it is compared with, at one stage.
 
         Args:
             name: of the stage.
             designs: as they are computed at it, by their names; the design of the page is the first.
             total: hits of the design at its last stage.
+
+        Raises:
+            Cancelled: by `cancel`.
         """
         datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
-        results = [result_content(label, dataset) for label, dataset in datasets.items()]
-        cancel.check()
+        own = datasets[OWN]
+        promise = promise_text(own)
         most = MOST_HITS // len(datasets)
-        data = page_data([thinned(dataset, most) for dataset in datasets.values()])
+        resolution = json.loads(own.attrs[attr.RESOLUTION]) if attr.RESOLUTION in own.attrs else {}
+        return {
+            "kind": "maps",
+            "stage": name,
+            "hits": own.sizes["hit"],
+            "total": total,
+            "numerics": _FIRST if name == "first" or promise is None else f"Numerics: {promise}.",
+            "kept": not breaks_promise(own),
+            "level": resolution.get("level"),
+            "data": page_data(
+                [thinned(dataset, most) for dataset in datasets.values()], _COARSE if name == "first" else PIXELS
+            ),
+        }
+
+    def numbers(self, designs: Mapping[str, Design], cancel: Cancel) -> dict[str, Any]:
+        """The tables of the same designs as HTML."""
+        datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
+        results = [result_content(label, dataset) for label, dataset in datasets.items()]
         comparison = compared(datasets, picture=False) if len(datasets) > 1 else None
-        own, attributes = results[0], next(iter(datasets.values())).attrs
-        resolution = json.loads(attributes[attr.RESOLUTION]) if attr.RESOLUTION in attributes else {}
         html = self._environment.get_template("answer.html").render(
             results=results, comparison=comparison, texts=texts()
         )
-        return {
-            "kind": "stage",
-            "stage": name,
-            "hits": own["hits"],
-            "total": total,
-            "numerics": _FIRST if name == "first" else own["numerics"],
-            "kept": not breaks_promise(datasets[OWN]),
-            "level": resolution.get("level"),
-            "data": data,
-            "html": html,
-        }
+        return {"kind": "numbers", "html": html}
 
     def trajectory(self, design: Design, level: int, stage: str, hit: int, cancel: Cancel) -> dict[str, Any]:
         """The trajectory of a hit of a design at a stage.

@@ -4,9 +4,10 @@
   const at = (id) => document.getElementById(id);
   const PATIENCE = 400;  // [ms] for a map of an older design, which then is given up
   const SETTLED = 350;  // [ms] without a change, after which a design can be undone
+  const narrow = matchMedia("(max-width: 45rem)");
   const state = { design: {}, pins: [], variable: "residual velocity" };
   const done = { undo: [], redo: [], last: "" };
-  let level = 0, running = null, waiting = false, changedAt = 0, shown = null, settling = 0, chosen = null, toml = "";
+  let level = 0, running = null, waiting = false, changedAt = 0, shown = null, settling = 0, chosen = null, followed = null, toml = "";
 
   const ask = (path, body, signal) => fetch(path, {
     method: "POST", headers: { "content-type": "application/json" }, body: JSON.stringify(body), signal,
@@ -25,7 +26,7 @@
   }
   function accept() {
     at("sentence").hidden = true;
-    for (const id of ["maps", "answer", "trajectory"]) at(id).classList.remove("stale");
+    for (const id of ["maps", "trajectory"]) at(id).classList.remove("stale");
   }
 
   // Changes ---------------------------------------------------------------------------------------------------------
@@ -105,7 +106,7 @@
       clearTimeout(running.timer);
       running.abort.abort();
     }
-    const own = { abort: new AbortController(), answered: false, begun: performance.now(), changedAt, level };
+    const own = { abort: new AbortController(), answered: false, begun: performance.now(), changedAt, level, times: {} };
     running = own;
     waiting = false;
     const text = JSON.stringify(state.design), pins = JSON.parse(JSON.stringify(state.pins));
@@ -114,6 +115,7 @@
       if (!response.ok) throw new Error(await response.text());
       for await (const line of linesOf(response.body)) {
         if (running !== own) return;
+        own.times[line.kind] ??= performance.now() - own.changedAt;
         await take(line, own, text, pins);
         if (own.answered && waiting) { compute(); return; }
       }
@@ -144,13 +146,16 @@
       refuse(line.sentence);
     } else if (line.kind === "plate") {
       showPlate(line);
+    } else if (line.kind === "numbers") {
+      at("answer").innerHTML = line.html;
+      at("answer").classList.remove("stale");
     } else {
       accept();
       if (line.level !== null) level = line.level;
       await show({ ...line, design: JSON.parse(text), pins, asked: own.level });
       if (!own.answered) {
         own.answered = true;
-        performance.measure("first map", { start: own.changedAt, end: performance.now() });
+        performance.measure("first map", { start: own.changedAt, end: performance.now(), detail: own.times });
       }
     }
   }
@@ -190,18 +195,24 @@
     at("status").classList.toggle("warns", !line.kept);
     fillVariables(line.data);
     at("hit-number").max = line.hits - 1;
-    at("answer").innerHTML = line.html;
+    at("answer").classList.add("stale");
     await drawMaps();
     if (!same && !at("trajectory").hidden) at("note").textContent = `${at("note").textContent.replace(/ \(of an earlier.*/, "")} (of an earlier map)`;
   }
-  function fillVariables({ variables }) {
-    const keys = [...variables.map(({ key, label }) => [key, label]), ["status", "how the shots ended"]];
+  // The variable that was chosen, unless no hit has a value of it.
+  function shownVariable({ main, results }, keys) {
+    const there = (key) => results.some(({ columns }) => columns[key]?.some((value) => value !== null));
+    const wanted = [state.variable, ...main].find((key) => keys.includes(key) && (key === "status" || there(key)));
+    return wanted ?? "status";
+  }
+  function fillVariables(data) {
+    const { variables } = data, keys = [...variables.map(({ key, label }) => [key, label]), ["status", "how the shots ended"]];
     const picker = at("variable"), now = JSON.stringify(keys);
     if (picker.dataset.keys !== now) {
       picker.dataset.keys = now;
       picker.replaceChildren(...keys.map(([value, text]) => new Option(text, value)));
     }
-    picker.value = keys.some(([key]) => key === state.variable) ? state.variable : keys[0][0];
+    picker.value = shownVariable(data, keys.map(([key]) => key));
   }
   async function drawMaps() {
     const { data } = shown, maps = hitMaps(data), names = ["this design", ...shown.pins.map(({ name }) => name)];
@@ -211,7 +222,7 @@
       at(`name-${k}`).hidden = names.length === 1;
       at(`name-${k}`).firstChild.textContent = name;
       const marked = chosen && chosen.result === k ? { chosen: chosen.hit } : {};
-      const place = await maps.drawMap(at(`map-${k}`), data.results[k], at("variable").value, { ...marked, tallest: 520 });
+      const place = await maps.drawMap(at(`map-${k}`), data.results[k], at("variable").value, { ...marked, tallest: narrow.matches ? 0.34 * innerHeight : 520 });
       if (!place.dataset.clicks) {
         place.dataset.clicks = "yes";
         place.on("plotly_click", ({ points }) => {
@@ -252,6 +263,7 @@
       at("note").textContent = `Trajectory of hit ${hit}${own.pins.length ? ` on ${k ? own.pins[k - 1].name : "this design"}` : ""}.`;
       at("told").textContent = text;
       at("trajectory").classList.remove("stale");
+      followed = views;
       await hitMaps(own.data).drawTrajectory([at("passage"), at("flight")], views);
       at("figure").hidden = true;
       at("figures").replaceChildren(...figures.map((name) => {
@@ -349,9 +361,13 @@
       if (key === "s") save();
     }
   });
+  const redraw = () => {
+    if (shown) drawMaps();
+    if (followed) hitMaps(shown.data).drawTrajectory([at("passage"), at("flight")], followed);
+  };
   let resized = 0;
-  addEventListener("resize", () => { clearTimeout(resized); resized = setTimeout(() => { if (shown) drawMaps(); }, 150); });
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (shown) drawMaps(); });
+  addEventListener("resize", () => { clearTimeout(resized); resized = setTimeout(redraw, 150); });
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
 
   // The beginning ---------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,11 @@ from typing import Any, NamedTuple
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.plates import read_plates
-from warpimpact.campaign.text import CampaignError, parsed, read_text, toml_of
+from warpimpact.campaign.text import CampaignError, parsed, read_text
+from warpimpact.campaign.toml import toml_text
+from warpimpact.results import attributes as attr
+from warpimpact.results import front
+from warpimpact.results.files import ResultError, opened
 from warpimpact.scene.units import quoted
 
 Tables = dict[str, Any]
@@ -57,7 +61,7 @@ class Shelf:
                 )
         if (null := _null_in(tables, "")) is not None:
             raise CampaignError(f"{_NAME}: {null}: got null, but it must be a value, or be left out")
-        text = toml_of(tables)
+        text = toml_text(tables)
         return Design(tables, text, Campaign.from_text(text, name=_NAME, folder=FOLDER))
 
 
@@ -84,16 +88,17 @@ class Stage(NamedTuple):
 
 
 def shelf_of(paths: list[Path]) -> Shelf:
-    """What campaign files hold; of a file with several plates a design each.
+    """What files hold: campaigns, of which one with several plates has a design each; searches of warpimpact optimise,
+    with the designs of their fronts; and results, with their campaigns.
 
     Raises:
-        CampaignError: a file is missing or not valid.
+        CampaignError, ResultError: a file is missing or not valid.
     """
     designs: dict[str, Tables] = {}
     for path in paths:
         for name, text in _texts(path):
             tables = _absolute(parsed(text, str(path)), path.parent)
-            Campaign.from_text(toml_of(tables), name=str(path), folder=path.parent)
+            Campaign.from_text(toml_text(tables), name=str(path), folder=path.parent)
             designs[name if name not in designs else f"{name} ({path})"] = tables
     files = {name for tables in designs.values() for _, name in _files_of(tables, "")}
     return Shelf(designs, frozenset(files))
@@ -101,12 +106,27 @@ def shelf_of(paths: list[Path]) -> Shelf:
 
 def _texts(path: Path) -> Iterator[tuple[str, str]]:
     """Name and text of every design in a file."""
+    if path.suffix == ".nc":
+        yield from _texts_of_results(path)
+        return
     text = read_text(path)
     if isinstance(parsed(text, str(path)).get("plate"), list):
         for name, campaign in read_plates(path).items():
             yield name, campaign.text
     else:
         yield path.stem, text
+
+
+def _texts_of_results(path: Path) -> Iterator[tuple[str, str]]:
+    """The same of a file of results: the campaigns of a front, or that of a hit map."""
+    try:
+        found = front.read(path)
+    except ResultError:
+        with opened(path) as dataset:
+            yield path.stem, str(dataset.attrs[attr.CAMPAIGN])
+        return
+    for name, text in zip(found[front.FILE].values, found[front.CAMPAIGN].values, strict=True):
+        yield Path(str(name)).stem, str(text)
 
 
 def _files_of(part: Any, place: str) -> Iterator[tuple[str, str]]:

@@ -41,7 +41,7 @@ def drawn(campaign: Campaign) -> dict[str, Any]:
         "path": svg_path(rings),
         "cell": cell,
         "core": round(core.max_radius * _MM, _DIGITS),
-        "dimensions": [_line(one) for one in hole_dimensions(plate)],
+        "dimensions": [_line(one) for one in hole_dimensions(plate, ligament)],
         "ligament": None if ligament is None else _line(ligament),
         "handles": list(_handles(campaign)),
         "section": _section(target, half[1]),
@@ -73,7 +73,7 @@ def _handles(campaign: Campaign) -> Iterator[dict[str, Any]]:
             reach = float(((ring - place) @ direction).max())
             value = float(getattr(pattern, name))
             yield _handle(["plate", "pattern", name], place + reach * direction, direction, value / reach)
-    for axis, direction in enumerate(np.eye(2)):
+    for axis, direction in enumerate(np.array([[1.0, 0.0], [0.0, -1.0]])):  # where no dimension stands
         at = pattern.unit_cell[axis] / 2
         key: list[str | int] = ["plate", "pattern", "spacing", axis]
         yield _handle(key, at * direction, direction, pattern.spacing[axis] / at)

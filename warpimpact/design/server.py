@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import hmac
 import secrets
 import socket
 import warnings
-from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, MutableMapping
+from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable
+from contextlib import aclosing
 from functools import cache, partial
 from importlib.resources import files
 from typing import Any
@@ -26,27 +26,15 @@ from warpimpact.design.answers import Answers, named
 from warpimpact.design.changes import changed
 from warpimpact.design.designs import Design, Shelf, Tables, as_json, stages
 from warpimpact.design.desk import Desk
+from warpimpact.design.guard import Guard
 from warpimpact.results.files import ResultError
 from warpimpact.scene.plausible import Implausible
 from warpimpact.scene.units import quoted
 from warpimpact.solver.device import DeviceError
 
-Scope = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
-Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
-
 _MOST_BYTES = 2**20
 """Of a request."""
 _MOST_PINS = 5
-_HEADERS = {
-    "content-security-policy": "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
-    "img-src 'self' data: blob:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    "cross-origin-resource-policy": "same-origin",
-    "cross-origin-opener-policy": "same-origin",
-    "referrer-policy": "no-referrer",
-    "x-content-type-options": "nosniff",
-    "cache-control": "no-store",
-}
 _FILES = {
     "report": ("page.css", "drawing.js"),
     "design": ("design.css", "plate.js", "controls.js", "address.js", "design.js"),
@@ -58,58 +46,6 @@ _FIRST, _ASKED, _REFINE, _LAST = 0, 1, 2, 3
 """Urgencies: the first map after a change, what somebody clicked, the stages that follow."""
 _LINES = "application/x-ndjson"
 _STAGES = {"first": _FIRST, "draft": _REFINE, "full": _LAST}
-
-
-class Guard:
-    """Answers this machine's own page alone: the host that a request names, its origin, and the token in its path.
-
-    Another page in the same browser can send requests to this machine, and a name server can give this machine another
-    name; neither knows the token, and neither has this origin.
-
-    Args:
-        app: what answers.
-        token: the first part of every path.
-        port: of the server.
-    """
-
-    def __init__(self, app: Any, token: str, port: int) -> None:
-        self._app, self._token = app, token
-        self._hosts = {f"127.0.0.1:{port}", f"localhost:{port}"}
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        if scope["type"] != "http":
-            return
-        headers = {name.decode("latin-1"): value.decode("latin-1") for name, value in scope["headers"]}
-        refusal = self._refusal(str(scope["path"]), str(scope["method"]), headers)
-        if refusal is not None:
-            await refusal(scope, receive, _with_headers(send))
-            return
-        await self._app(scope, receive, _with_headers(send))
-
-    def _refusal(self, path: str, method: str, headers: Mapping[str, str]) -> Response | None:
-        host, token = headers.get("host", ""), path.split("/")[1] if "/" in path else ""
-        if host not in self._hosts:
-            return PlainTextResponse("This page is for this machine: http://127.0.0.1.", status_code=403)
-        if not hmac.compare_digest(token.encode(), self._token.encode()):
-            return PlainTextResponse(
-                "This address has another token. warpimpact design prints the address when it starts; "
-                "warpimpact design 'ADDRESS' opens the design of an old one.",
-                status_code=403,
-            )
-        origin = headers.get("origin")
-        if method not in ("GET", "HEAD") and (origin is None or origin.removeprefix("http://") != host):
-            return PlainTextResponse("Only the page itself may ask this.", status_code=403)
-        return None
-
-
-def _with_headers(send: Send) -> Send:
-    async def sending(message: MutableMapping[str, Any]) -> None:
-        if message["type"] == "http.response.start":
-            own = [(name.encode(), value.encode()) for name, value in _HEADERS.items()]
-            message = {**message, "headers": [*message.get("headers", []), *own]}
-        await send(message)
-
-    return sending
 
 
 def application(shelf: Shelf, *, token: str, port: int, device: str = "auto") -> Guard:
@@ -154,22 +90,33 @@ class _Pages:
 
         async def lines() -> AsyncIterator[str]:
             try:
-                yield as_json(await run_in_threadpool(self._answers.plate, design)) + "\n"
-                for line in self._lines(design, others, level):
-                    yield as_json(await line) + "\n"
+                async with aclosing(self._lines(design, others, level)) as found:
+                    async for line in found:
+                        yield as_json(line) + "\n"
             except _MISTAKES as error:
                 yield _refused(error)
 
         return StreamingResponse(lines(), media_type=_LINES)
 
-    def _lines(self, design: Design, others: list[tuple[str, Design]], level: int) -> Any:
-        """What is to be awaited for each stage."""
+    async def _lines(self, design: Design, others: list[tuple[str, Design]], level: int) -> AsyncGenerator[Any]:
+        """The plate, and maps and numbers of each stage. The first map is computed while the plate is drawn."""
         total = design.campaign.hits.count or 0
         every = [{stage.name: stage.design for stage in stages(self._shelf, one, level)} for _, one in others]
+        plate = True
         for name, own in stages(self._shelf, design, level):
             at = [(label, one.get(name, one["full"])) for (label, _), one in zip(others, every, strict=True)]
             designs = named(own, at)
-            yield self._desk.do(_STAGES[name], partial(self._answers.stage, name, designs, total))
+            maps = asyncio.ensure_future(
+                self._desk.do(_STAGES[name], partial(self._answers.maps, name, designs, total))
+            )
+            try:
+                if plate:
+                    yield await run_in_threadpool(self._answers.plate, design)
+                    plate = False
+                yield await maps
+            finally:
+                maps.cancel()
+            yield await self._desk.do(_STAGES[name], partial(self._answers.numbers, designs))
 
     async def change(self, request: Request) -> Response:
         async def answer(asked: Tables) -> Any:

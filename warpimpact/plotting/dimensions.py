@@ -38,13 +38,13 @@ class Dimension(NamedTuple):
     text: str
 
 
-def hole_dimensions(plate: Plate) -> list[Dimension]:
-    """Width and height of the hole that is nearest to the middle, beside it, and the periods of the pattern."""
+def hole_dimensions(plate: Plate, ligament: Dimension | None) -> list[Dimension]:
+    """Width and height of the hole that is nearest to the middle, away from the smallest ligament, and the periods of
+    the pattern."""
     if isinstance(plate.pattern, NoPattern) or not (holes := _holes(plate)):
         return []
     low_y, low_z, high_y, high_z = holes[0].bounds
     period_y, period_z = plate.pattern.unit_cell
-    ligament = smallest_ligament(plate)
     on_the_right = ligament is not None and ligament.start[0] + ligament.end[0] < 0.0  # where the ligament is not
     beside = high_y + _BESIDE * period_y if on_the_right else low_y - _BESIDE * period_y
     below = low_z - _BELOW * period_z
@@ -73,9 +73,10 @@ def smallest_ligament(plate: Plate) -> Dimension | None:
 
 def draw_dimensions(axes: Axes, plate: Plate) -> None:
     """Draw the dimensions on axes in mm."""
-    for dimension in hole_dimensions(plate):
+    ligament = smallest_ligament(plate)
+    for dimension in hole_dimensions(plate, ligament):
         _draw(axes, dimension, _COLOUR)
-    if (ligament := smallest_ligament(plate)) is not None:
+    if ligament is not None:
         _draw(axes, ligament, _LIGAMENT_COLOUR)
 
 

@@ -5,6 +5,7 @@ function hitMaps(data) {
   const STATUS = "status", MISSING = "#9e9e9e", CHOSEN = "#d55e00";
   // Of the page, which may be light or dark.
   const ink = getComputedStyle(document.body).color;
+  const rule = { gridcolor: getComputedStyle(document.documentElement).getPropertyValue("--line") };
   const font = { family: "system-ui, sans-serif", size: 12, color: ink };
   const sheet = { font, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", modebar: { bgcolor: "rgba(0,0,0,0)" } };
   // Four digits; less than a thousandth of a unit is rounding.
@@ -154,10 +155,10 @@ function hitMaps(data) {
     const layout = {
       ...sheet, shapes, height: total + below + 10, margin: { l: 55, r: 15, t: 10, b: below },
       legend: { orientation: "h", y: -55 / total, yanchor: "top" },
-      xaxis: { range: x, anchor: "y", zeroline: false },
-      yaxis: { range: y, title: { text: "y [mm]" }, domain: [1 - high / total, 1], scaleanchor: "x", zeroline: false },
-      xaxis2: { range: x, anchor: "y2", title: { text: "x [mm]" }, zeroline: false },
-      yaxis2: { range: z, title: { text: "z [mm]" }, domain: [0, low / total], scaleanchor: "x2", zeroline: false },
+      xaxis: { ...rule, range: x, anchor: "y", zeroline: false },
+      yaxis: { ...rule, range: y, title: { text: "y [mm]" }, domain: [1 - high / total, 1], scaleanchor: "x", zeroline: false },
+      xaxis2: { ...rule, range: x, anchor: "y2", title: { text: "x [mm]" }, zeroline: false },
+      yaxis2: { ...rule, range: z, title: { text: "z [mm]" }, domain: [0, low / total], scaleanchor: "x2", zeroline: false },
     };
     return Plotly.react(place, traces, layout, { ...config, displayModeBar: false });
   }

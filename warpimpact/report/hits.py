@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,8 @@ MOST_HITS = 12_000
 """Most hits on a page, for all results together: about 1 MB, compressed."""
 WORST_SHARE = 0.25
 """Share of the trajectories that show the worst hits; the others are spread evenly."""
-_PIXELS = 160
+PIXELS = 160
+"""Along the longer side of a map."""
 _BEHIND = "#707070"  # colour of the core behind the plate
 _DIGITS = 5
 _TURN = 1.5  # turn of an outline from point to point [degree]; its error is 0.01 mm of a core's profile
@@ -74,11 +76,12 @@ def worst_and_spread(dataset: xarray.Dataset, count: int, *, first: Sequence[int
     return [int(number) for number in numbers[chosen]]
 
 
-def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
+def page_data(datasets: Sequence[xarray.Dataset], pixels: int = PIXELS) -> dict[str, Any]:
     """Data of the maps of a page: the variables, and the hits of each result in shown units.
 
     Args:
         datasets: results from `thinned`.
+        pixels: along the longer side of a map.
     """
     columns = [_columns(dataset) for dataset in datasets]
     shared = {key: column for key, column in columns[0].items() if all(key in others for others in columns)}
@@ -91,7 +94,7 @@ def page_data(datasets: Sequence[xarray.Dataset]) -> dict[str, Any]:
             if any((dataset[v.STATUS].values == status).any() for dataset in datasets)
         ],
         "results": [
-            _map_data(dataset, {key: column[key].values for key in shared})
+            _map_data(dataset, {key: column[key].values for key in shared}, pixels)
             for dataset, column in zip(datasets, columns, strict=True)
         ],
     }
@@ -118,8 +121,8 @@ def _columns(dataset: xarray.Dataset) -> dict[str, Shown]:
     return columns
 
 
-def _map_data(dataset: xarray.Dataset, columns: dict[str, Array]) -> dict[str, Any]:
-    nearest = nearest_hits(dataset, _PIXELS)
+def _map_data(dataset: xarray.Dataset, columns: dict[str, Array], pixels: int) -> dict[str, Any]:
+    nearest = nearest_hits(dataset, pixels)
     y, z = hit_points(dataset).T * _MM
     return {
         "period": _rounded(np.asarray(dataset.attrs[attr.PLATE_PERIOD]) * _MM),
@@ -172,4 +175,8 @@ def _solid_boxes(history: xarray.Dataset, view: str) -> list[list[float]]:
 
 def _rounded(values: Array) -> list[float | None]:
     """Values rounded to `_DIGITS` digits; None for NaN."""
-    return [float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
+    size = np.abs(values, out=np.ones_like(values), where=np.isfinite(values) & (values != 0.0))
+    power = np.clip(_DIGITS - 1 - np.floor(np.log10(size)), -300.0, 300.0)
+    up, down = 10.0 ** np.maximum(power, 0.0), 10.0 ** np.maximum(-power, 0.0)  # whole powers, which are exact
+    rounded = np.rint(values * up / down) / up * down
+    return [value if math.isfinite(value) else None for value in rounded.tolist()]

@@ -16,10 +16,14 @@ from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.cli import main
 from warpimpact.design.changes import SHAPES, changed
-from warpimpact.design.designs import FILE_KEYS, Shelf, shelf_of, stages
+from warpimpact.design.designs import FILE_KEYS, shelf_of, stages
+from warpimpact.results import attributes as attr
+from warpimpact.results import files, front
 from warpimpact.scene.files import input_file
 from warpimpact.scene.model import Model
 from warpimpact.solver.marching import March
+
+CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 
 def asked(
@@ -130,7 +134,9 @@ def test_a_page_reads_the_files_of_its_campaigns(small: Path, tmp_path: Path) ->
 
 
 def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> None:
-    plate, *computed = compute(address, tables_of(small))
+    plate, *lines = compute(address, tables_of(small))
+    assert [line["kind"] for line in lines] == ["maps", "numbers"] * 3
+    computed = lines[::2]
     assert plate["plate"]["numbers"]["open area"] == "34.8%"
     assert [(line["stage"], line["hits"]) for line in computed] == [("first", 256), ("draft", 1024), ("full", 1500)]
     assert [line["numerics"][:26] for line in computed[1:]] == [
@@ -155,10 +161,8 @@ def test_who_leaves_ends_the_work(address: str, small: Path, monkeypatch: pytest
     headers = {"Origin": f"http://{place.netloc}"}
     connection.request("POST", f"{place.path}compute", json.dumps({"design": tables}), headers)
     response = connection.getresponse()
-    stages_seen = 0
-    while stages_seen < 3:  # plate, first, draft
+    for _ in range(5):  # plate; maps and numbers of two stages
         response.readline()
-        stages_seen += 1
     time.sleep(1.0)
     begin = time.perf_counter()
     response.close()
@@ -213,7 +217,12 @@ def test_a_mistake_ends_the_command(arguments: list[str], sentence: str, capsys:
     assert sentence in capsys.readouterr().err
 
 
-def test_a_shelf_has_a_design_of_each_plate() -> None:
-    shelf = shelf_of([Path(__file__).parents[3] / "campaigns" / "two_plates.toml"])
-    assert list(shelf.designs) == ["slots", "round holes"]
-    assert isinstance(shelf, Shelf)
+def test_a_shelf_has_every_design_of_its_files(small: Path, make_result: Callable[..., Any], tmp_path: Path) -> None:
+    text, search, result = small.read_text(), tmp_path / "front.nc", tmp_path / "slotted.nc"
+    columns = {front.FOUND: [[1.0]], front.VALUE: [[1.0]], front.HITS: [64]}
+    columns |= {front.FILE: ["design_00.toml", "design_01.toml"], front.CAMPAIGN: [text, text.replace("4 mm", "5 mm")]}
+    front.write(front.dataset_of(columns, {front.DESIGN: ""}), search)
+    files.write(make_result().assign_attrs({attr.CAMPAIGN: text}), result)
+    shelf = shelf_of([CAMPAIGNS / "two_plates.toml", search, result])
+    assert list(shelf.designs) == ["slots", "round holes", "design_00", "design_01", "slotted"]
+    assert [one["plate"]["thickness"] for one in shelf.designs.values()] == ["4 mm", "4 mm", "4 mm", "5 mm", "4 mm"]

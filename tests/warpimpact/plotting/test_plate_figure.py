@@ -85,14 +85,22 @@ def test_numbers_stand_above_the_picture() -> None:
 
 
 def test_dimensions_are_those_of_the_plate() -> None:
-    assert [dimension.text for dimension in hole_dimensions(plate())] == ["4", "12", "16", "16"]
+    assert [dimension.text for dimension in hole_dimensions(plate(), smallest_ligament(plate()))] == [
+        "4",
+        "12",
+        "16",
+        "16",
+    ]
     ligament = smallest_ligament(plate())
     assert ligament is not None
     assert ligament.text == "4"
     middle = 0.5 * (ligament.start + ligament.end)
     assert plate().is_solid(*middle)
     assert not plate().is_solid(*(middle + 0.52 * (ligament.end - ligament.start)))
-    assert (smallest_ligament(plate(pattern=NoPattern())), hole_dimensions(plate(pattern=NoPattern()))) == (None, [])
+    assert (smallest_ligament(plate(pattern=NoPattern())), hole_dimensions(plate(pattern=NoPattern()), None)) == (
+        None,
+        [],
+    )
     shown = [text.get_text() for text in plate_figure(plate()).axes[0].texts]
     assert sorted(filter(None, shown)) == ["12", "16", "16", "4", "4"]
 
