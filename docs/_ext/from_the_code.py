@@ -210,6 +210,20 @@ class FiringReference(CampaignReference):
             yield from self.of_table(name, part)
 
 
+class DesignReference(CampaignReference):
+    """Every key of a design file beside those of a campaign, table by table, from its JSON schema."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.optimisation.schema import asking_schema
+
+        self.schema = asking_schema()
+        yield from ["## Tables of the file", ""]
+        yield from self.keys(self.schema)
+        for name, part in self.schema["properties"].items():
+            if name != "variables":
+                yield from self.of_table(name, part)
+
+
 # --- Commands ---
 
 
@@ -364,6 +378,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     for name, directive in {
         "campaign-reference": CampaignReference,
         "firing-reference": FiringReference,
+        "design-reference": DesignReference,
         "exclusion-reference": ExclusionReference,
         "command-reference": CommandReference,
         "variable-reference": VariableReference,

@@ -2,14 +2,15 @@
 
 import argparse
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
-from .options import Commands, add_command, add_device, add_output, add_overwrite
-from .paths import check_place, check_suffix
+from .options import Commands, add_command, add_computing, add_output, add_overwrite
+from .paths import check_picture, check_place, check_suffix
 from .progress import Step, show_progress
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def add_optimise(commands: Commands) -> None:
     )
     parser.add_argument("design", type=Path, metavar="DESIGN.toml", help="design file: a campaign, and what is free")
     add_output(parser, "FRONT.nc", "result file (default: the design's name, in this folder)")
-    add_device(parser)
+    add_computing(parser)
     parser.add_argument(
         "--resume", action="store_true", help="continue an interrupted search; start a new one if there is none"
     )
@@ -41,27 +42,36 @@ def add_optimise(commands: Commands) -> None:
 
 
 def _optimise(arguments: argparse.Namespace) -> int:
+    from warpimpact.optimisation.crew import cluster_crew, local_crew
     from warpimpact.optimisation.design import read_design
     from warpimpact.optimisation.optimise import folder_of, optimise_to_file
     from warpimpact.optimisation.text import front_lines
+    from warpimpact.plotting.front import front_figure
     from warpimpact.results import front
 
     design = read_design(arguments.design)
     output = arguments.output or Path(arguments.design.stem + ".nc")
     check_suffix(output, "a search", ".nc")
     check_place(output)
-    with memory_told(arguments.design), terminated_as_interrupted(), show_progress("design") as show:
+    picture = output.with_suffix(".png")
+    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
+    cluster = arguments.scheduler is not None or arguments.workers is not None
+    where = {"address": arguments.scheduler, "workers": arguments.workers, "device": arguments.device}
+    own = cluster_crew(**where) if cluster else nullcontext(local_crew(arguments.device))
+    with memory_told(arguments.design), terminated_as_interrupted(), show_progress("design") as show, own as crew:
         campaigns = optimise_to_file(
             design,
             output,
-            device=arguments.device,
+            crew=crew,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=lambda now: show(Step(now.done, now.total, 0, _running(now))),
         )
     dataset = front.read(output)
     print("\n".join(front_lines(dataset)))
-    print(f"written to {output}" + (f", campaigns in {folder_of(output)}" if campaigns else ""))
+    front_figure(dataset, design.folder).savefig(picture, dpi=150)
+    beside = f", campaigns in {folder_of(output)}" if campaigns else ""
+    print(f"written to {output}, figure in {picture}{beside}")
     return 0 if dataset.attrs[front.OUTCOME] == front.FEASIBLE else NONE_WITHIN_BOUNDS
 
 

@@ -13,8 +13,9 @@ from .paths import check_output
 _SCHEMA = "warpimpact.schema.json"
 _FIT_SCHEMA = "warpimpact.fit.schema.json"
 _TEST_SCHEMA = "warpimpact.test.schema.json"
-_FITS, _FIRING = "fits", "firing"
-"""Folders of the examples that warpimpact identify and warpimpact test take."""
+_DESIGN_SCHEMA = "warpimpact.design.schema.json"
+_FITS, _FIRING, _DESIGNS = "fits", "firing", "designs"
+"""Folders of the examples that warpimpact identify, warpimpact test and warpimpact optimise take."""
 
 
 def add_examples(commands: Commands) -> None:
@@ -22,9 +23,9 @@ def add_examples(commands: Commands) -> None:
         commands,
         "examples",
         _examples,
-        summary="list the campaigns, fits and tests that come with warpimpact",
-        description="List the campaigns, fits and tests that come with warpimpact, each with the question that it "
-        "answers. warpimpact new NAME copies an example.",
+        summary="list the campaigns, fits, tests and designs that come with warpimpact",
+        description="List the campaigns, fits, tests and designs that come with warpimpact, each with the question "
+        "that it answers. warpimpact new NAME copies an example.",
         example="examples",
     )
 
@@ -43,8 +44,8 @@ def add_new(commands: Commands) -> None:
         "new",
         _new,
         summary="start a campaign of your own from an example",
-        description="Copy a campaign, a fit or a test that comes with warpimpact, and the files that it names. Write "
-        f"its schema ({_SCHEMA}, {_FIT_SCHEMA} or {_TEST_SCHEMA}), so that an editor can complete and check the keys.",
+        description="Copy a campaign, a fit, a test or a design that comes with warpimpact, and the files that it "
+        f"names. Write its schema, such as {_SCHEMA}, so that an editor can complete and check the keys.",
         example="new slotted_plate -o my.toml",
     )
     parser.add_argument("name", metavar="NAME", help="name of an example; warpimpact examples lists them")
@@ -66,7 +67,9 @@ def _new(arguments: argparse.Namespace) -> None:
     source, output = paths[name], arguments.output or Path(f"{name}.toml")
     # Commands in the comments name the file by its place in the checkout.
     text = re.sub(
-        rf"campaigns/(?:{_FITS}/|{_FIRING}/)?{name}\.toml", lambda _: output.name, source.read_text(encoding="utf-8")
+        rf"campaigns/(?:{_FITS}/|{_FIRING}/|{_DESIGNS}/)?{name}\.toml",
+        lambda _: output.name,
+        source.read_text(encoding="utf-8"),
     )
     tables = tomllib.loads(text)
     copies = {source.parent / file: output.parent / file for file in _named(tables)}
@@ -74,8 +77,9 @@ def _new(arguments: argparse.Namespace) -> None:
         check_output(file, overwrite=arguments.overwrite)
     for one, copy in copies.items():
         shutil.copyfile(one, copy)
-    kind = "fit" if source.parent.name == _FITS else "test" if "target" in tables else "campaign"
-    schema = output.parent / {"fit": _FIT_SCHEMA, "test": _TEST_SCHEMA}.get(kind, _SCHEMA)
+    kinds = {_FITS: "fit", _DESIGNS: "design"}
+    kind = kinds.get(source.parent.name, "test" if "target" in tables else "campaign")
+    schema = output.parent / {"fit": _FIT_SCHEMA, "test": _TEST_SCHEMA, "design": _DESIGN_SCHEMA}.get(kind, _SCHEMA)
     output.write_text(f"#:schema {schema.name}\n{text}", encoding="utf-8")
     schema.write_text(_schema_text(kind), encoding="utf-8")
     for written in (output, *copies.values(), schema):
@@ -87,7 +91,7 @@ def _campaigns() -> dict[str, Path]:
     from importlib.resources import files
 
     folder = Path(str(files("warpimpact.campaigns")))
-    paths = [*folder.glob("*.toml"), *folder.glob(f"{_FITS}/*.toml"), *folder.glob(f"{_FIRING}/*.toml")]
+    paths = [path for kind in (".", _FITS, _FIRING, _DESIGNS) for path in folder.glob(f"{kind}/*.toml")]
     return {path.stem: path for path in sorted(paths, key=lambda path: path.stem)}
 
 
@@ -113,12 +117,14 @@ def add_schema(commands: Commands) -> None:
     other = parser.add_mutually_exclusive_group()
     other.add_argument("--fit", action="store_true", help="print the schema of fits, which warpimpact identify takes")
     other.add_argument("--test", action="store_true", help="print the schema of tests, which warpimpact test takes")
+    other.add_argument("--design", action="store_true", help="print that of designs, which warpimpact optimise takes")
     add_output(parser, "SCHEMA.json", "file (default: printed)")
     add_overwrite(parser, "an existing file")
 
 
 def _schema(arguments: argparse.Namespace) -> None:
-    text = _schema_text("fit" if arguments.fit else "test" if arguments.test else "campaign")
+    kinds = [kind for kind in ("fit", "test", "design") if getattr(arguments, kind)]
+    text = _schema_text(kinds[0] if kinds else "campaign")
     if arguments.output is None:
         print(text, end="")
         return
@@ -133,8 +139,9 @@ def _schema_text(kind: str) -> str:
     from warpimpact.campaign.schema import campaign_schema
     from warpimpact.firing.schema import firing_schema
     from warpimpact.identification.schema import fit_schema
+    from warpimpact.optimisation.schema import design_schema
 
-    made = {"campaign": campaign_schema, "fit": fit_schema, "test": firing_schema}[kind]
+    made = {"campaign": campaign_schema, "fit": fit_schema, "test": firing_schema, "design": design_schema}[kind]
     return json.dumps(made(), indent=1, ensure_ascii=False) + "\n"
 
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import Job, Said, level_of, said_by
 from warpimpact.results.interrupts import stop_if_asked
+from warpimpact.runs.cluster import LISTEN_EVERY, check_alike, connected
 from warpimpact.runs.describe import made_by
+from warpimpact.runs.team import awaited
 
 TOGETHER = 16
 """Jobs that are computed between two looks for a signal, and by a worker at a time."""
@@ -56,3 +60,43 @@ def local_crew(device: str) -> Crew:
 def parts(jobs: Sequence[Job]) -> list[Sequence[Job]]:
     """Jobs by TOGETHER."""
     return [jobs[first : first + TOGETHER] for first in range(0, len(jobs), TOGETHER)]
+
+
+@contextmanager
+def cluster_crew(*, address: str | None = None, workers: int | None = None, device: str = "auto") -> Iterator[Crew]:
+    """The workers of a Dask cluster.
+
+    Args:
+        address, workers, device: as in `cluster_team`.
+
+    Raises:
+        ClusterError, DeviceError: as in `cluster_team`.
+    """
+    with connected(address, workers) as (reached, executor, threads):
+
+        def each(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
+            futures = [reached.asked(executor.submit, function, *call) for call in calls]
+            try:
+                return [awaited(future, LISTEN_EVERY, reached.threads) for future in futures]
+            finally:
+                for future in futures:
+                    future.cancel()
+
+        (kind,) = each(made_by, [(device,)])
+
+        def said(design: Design, jobs: Sequence[Job]) -> list[Said]:
+            of_parts = each(_said_alike, [(design, some, device, threads, kind) for some in parts(jobs)])
+            return [one for some in of_parts for one in some]
+
+        def levels(design: Design, jobs: Sequence[Job]) -> list[str]:
+            return each(level_of, [(design, job, device) for job in jobs])
+
+        yield Crew(said, levels, kind)
+
+
+def _said_alike(
+    design: Design, jobs: Sequence[Job], device: str, threads: int | None, kind: dict[str, str]
+) -> list[Said]:
+    """Compute jobs on a worker that gives the same bits as the others."""
+    check_alike(device, kind)
+    return said_by(design, jobs, device, threads)

@@ -23,7 +23,6 @@ from warpimpact.scene.units import (
     Obliquity,
     PositiveArealDensity,
     PositiveLength,
-    Radians,
     Title,
     quoted,
 )
@@ -47,7 +46,7 @@ class _Asked(Model):
     """
 
     measure: str
-    angle: Obliquity = Radians(np.radians(30.0))
+    angle: Annotated[Obliquity, Field(validate_default=True)] = "30 deg"
     standoff: PositiveLength | None = None
     threats: Literal["worst", "mean"] = "worst"
 
@@ -195,7 +194,7 @@ class Search(Model):
         return rungs
 
 
-class _Asking(Model):
+class Asking(Model):
     """The tables of a design file beside those of a campaign and its variables."""
 
     objectives: Annotated[tuple[Objective, ...], Field(min_length=1, max_length=3)]
@@ -281,7 +280,7 @@ def design_from(text: str, name: str, folder: Path) -> Design:
             raise CampaignError(f"{name}: {table}: a design file takes no [{table}]; [search] sets the hits")
     space = read_space(own.pop("variables", {}), name)
     try:
-        asking = _Asking.model_validate(own)
+        asking = Asking.model_validate(own)
     except ValidationError as error:
         raise CampaignError(f"{name}: {sentence(error, own)}") from None
     threats = asking.threats or (Threat(name="threat"),)

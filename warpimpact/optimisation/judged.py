@@ -38,6 +38,7 @@ class Record:
         levels: numerics for every threat, as JSON.
         said: of every threat and effect, shape [threats, effects, hits].
         seconds: processor time that its hits took.
+        means, known: what `means` and `values` found, by the number of hits.
     """
 
     values: Array
@@ -47,6 +48,7 @@ class Record:
     said: Array
     seconds: float = 0.0
     means: dict[int, Array] = field(default_factory=dict, compare=False)
+    known: dict[int, Array] = field(default_factory=dict, compare=False)
 
     @property
     def hits(self) -> int:
@@ -56,7 +58,7 @@ class Record:
     def more(self, said: Array, seconds: float) -> Record:
         """With further hits."""
         joined = np.concatenate([self.said, said], axis=2)
-        return replace(self, said=joined, seconds=self.seconds + seconds)
+        return replace(self, said=joined, seconds=self.seconds + seconds, means={}, known={})
 
 
 def means(design: Design, record: Record, hits: int) -> Array:
@@ -69,7 +71,10 @@ def means(design: Design, record: Record, hits: int) -> Array:
 
 def values(design: Design, record: Record, hits: int | None = None) -> Array:
     """Objectives and bounds over the first hits, shape [asked]; NaN where no hit counts."""
-    return np.array([_mean(numbers_of(design, record, one, hits or record.hits)) for one in design.asked])
+    hits = record.hits if hits is None else hits
+    if hits not in record.known:
+        record.known[hits] = np.array([_mean(numbers_of(design, record, one, hits)) for one in design.asked])
+    return record.known[hits]
 
 
 def numbers_of(design: Design, record: Record, one: Objective | Bound, hits: int) -> Array:

@@ -23,6 +23,8 @@ IDLE = 25
 """Generations without a design that is new and keeps the constraints, after which a search ends."""
 FIDELITY = "draft"
 """Of the pilots of a search, where the campaign does not fix a resolution."""
+MARGIN = 0.1
+"""Share of the box of the first generation by which the reference of the hypervolume lies beyond it."""
 NEIGHBOURHOOD = 0.5
 """Share of every range within which designs of the same alternatives share a pilot."""
 
@@ -35,8 +37,8 @@ class SearchProgress:
         done, total: designs that are computed; `total` is the most.
         resumed: hits of designs that an earlier call had computed, as a number of designs.
         front: designs on the front.
-        hypervolume: of the front, as a multiple of the box between the best and the worst values of the first
-            generation; NaN before there is one.
+        hypervolume: of the front up to a tenth beyond the worst values of the first generation, in units of the box
+            between its best and worst values; NaN before there is one.
         what: what is computed.
     """
 
@@ -245,7 +247,7 @@ class _State:
             return 0.0
         reference, scale = self.box
         points = np.array([objectives(self.design, one) for one in front])
-        return hypervolume((points - reference) / scale, np.full(len(scale), 1e-9))
+        return hypervolume((points - reference) / scale, np.full(len(scale), MARGIN))
 
     def told(self, points: Sequence[Array]) -> tuple[Array, Array]:
         """Objectives and violations of the points of a generation."""

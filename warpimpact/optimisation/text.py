@@ -43,7 +43,28 @@ def front_lines(dataset: xarray.Dataset) -> Iterator[str]:
             for one in range(len(asked))
         ]
         yield f"{name}: {', '.join(numbers)}"
+        yield from _against(dataset, place)
     yield from _shrinkage(dataset)
+
+
+def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:
+    """How much better than a reference a design is in one of two objectives that is no worse in the other."""
+    goals = np.flatnonzero(np.isnan(dataset[f.LIMIT].values))
+    if len(goals) != 2:
+        return
+    signs, names = dataset[f.SIGN].values[goals], [str(label).partition(" [")[0] for label in dataset[f.LABEL].values]
+    fresh = (signs * dataset[f.FRESH].values[:, goals])[dataset[f.KEPT].values == 1]
+    files = dataset[f.FILE].values[dataset[f.KEPT].values == 1]
+    own = signs * dataset[f.REFERENCE_FOUND].values[reference, goals]
+    for one, other in ((0, 1), (1, 0)):
+        able = np.flatnonzero(fresh[:, other] <= own[other])
+        if len(able) and own[one]:
+            best = able[np.argmin(fresh[able, one])]
+            gain = (own[one] - fresh[best, one]) / abs(own[one])
+            yield (
+                f"    no worse in {names[goals[other]]}: {files[best]} has {abs(gain):.1%} "
+                f"{'less' if gain * signs[one] > 0 else 'more'} {names[goals[one]]}"
+            )
 
 
 def _number(dataset: xarray.Dataset, value: str, low: str, high: str, place: int, asked: int) -> str:

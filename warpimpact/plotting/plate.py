@@ -50,7 +50,7 @@ def plate_figure(plate: Plate | Target, core: Core | None = None, title: str = "
     figure, axes = _sheet(drawn_extent(plate, core) * _MM, beside=_SECTION if layered else 0.0)
     if layered:
         _draw_section(figure, axes, target)
-    patches = [*_holes(plate, axes), *_frames(plate), *([] if core is None else [_section(core)])]
+    patches = [*hole_patches(plate, axes), *_frames(plate), *([] if core is None else [_section(core)])]
     for patch in patches:
         axes.add_patch(patch)
     draw_dimensions(axes, plate)
@@ -116,7 +116,7 @@ def _sheet(extent: NDArray[np.float64], beside: float) -> tuple[Figure, Axes]:
     return figure, axes
 
 
-def _holes(plate: Plate, axes: Axes) -> list[Patch]:
+def hole_patches(plate: Plate, axes: Axes) -> list[Patch]:
     """All holes within the axes as one patch; islands in a hole stay steel."""
     ranges = (np.array(ends) / _MM for ends in (axes.get_xlim(), axes.get_ylim()))
     outlines = plate.pattern.outlines(*((low, high) for low, high in ranges))

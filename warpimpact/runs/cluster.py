@@ -22,7 +22,7 @@ from warpimpact.solver.worker import Worker
 
 LONELY = 120.0
 """Seconds for which a scheduler may be without workers."""
-_LISTEN_EVERY = 0.2
+LISTEN_EVERY = 0.2
 """Seconds between two looks for a signal while a worker prepares."""
 
 
@@ -61,6 +61,34 @@ def cluster_team(
             seconds, or shots kill one worker after another.
         DeviceError: the workers lack the device, or compute other bits than the first one asked.
     """
+    with connected(address, workers) as (reached, executor, threads):
+        asked = reached.asked
+        kind = awaited(asked(executor.submit, made_by, device), LISTEN_EVERY, reached.threads)
+        campaign = awaited(asked(executor.submit, _looked_at, campaign), LISTEN_EVERY, reached.threads)
+        how = _How(device, threads, kind)
+        yield Team(
+            computation=computation,
+            pilot=lambda: asked(executor.submit, _pilot, computation, campaign, how),
+            trying=lambda: None,
+            submit=lambda task: asked(executor.submit, _compute_alike, computation, campaign, task, how),
+            width=lambda: 2 * max(1, reached.threads()),
+            task=lambda rate: task_size(kind),
+            made_by=kind | dict(computation.content),
+            underway=lambda: 0,
+        )
+
+
+@contextmanager
+def connected(address: str | None, workers: int | None) -> Iterator[tuple[Reached, Any, int | None]]:
+    """A scheduler, an executor that submits to its workers, and the threads of each of these; None where they were
+    started elsewhere.
+
+    Args:
+        address, workers: as in `cluster_team`.
+
+    Raises:
+        ClusterError: as in `cluster_team`.
+    """
     with _starting():
         from distributed import Client, KilledWorker, LocalCluster, WorkerPlugin
         from distributed.comm import CommClosedError
@@ -88,22 +116,9 @@ def cluster_team(
         if threads is not None:
             client.register_plugin(_ignoring_interrupts(WorkerPlugin))
         executor = client.get_executor(pure=False)
-        reached = _Reached(client, address)
-        asked = reached.asked
+        reached = Reached(client, address)
         try:
-            kind = awaited(asked(executor.submit, made_by, device), _LISTEN_EVERY, reached.threads)
-            campaign = awaited(asked(executor.submit, _looked_at, campaign), _LISTEN_EVERY, reached.threads)
-            how = _How(device, threads, kind)
-            yield Team(
-                computation=computation,
-                pilot=lambda: asked(executor.submit, _pilot, computation, campaign, how),
-                trying=lambda: None,
-                submit=lambda task: asked(executor.submit, _compute_alike, computation, campaign, task, how),
-                width=lambda: 2 * max(1, reached.threads()),
-                task=lambda rate: task_size(kind),
-                made_by=kind | dict(computation.content),
-                underway=lambda: 0,
-            )
+            yield reached, executor, threads
         except (CommClosedError, CancelledError) as error:  # without its scheduler a client cancels what it waits for
             raise _lost(address, error) from None
         except KilledWorker as error:
@@ -131,7 +146,7 @@ def _starting() -> Iterator[None]:
         ) from error
 
 
-class _Reached:
+class Reached:
     """A scheduler that may be lost, or all of its workers.
 
     Raises:
@@ -187,13 +202,22 @@ def _pilot(computation: Computation, campaign: Campaign, how: _How) -> Found | N
 
 def _compute_alike(computation: Computation, campaign: Campaign, task: Task, how: _How) -> Table:
     """Compute a task on a worker that gives the same bits as the others."""
-    own, kind = made_by(how.device), how.kind
+    check_alike(how.device, how.kind)
+    return computation.compute(campaign, task, Worker(how.device, how.threads))
+
+
+def check_alike(device: str, kind: dict[str, str]) -> None:
+    """Check on a worker that it gives the same bits as the others.
+
+    Raises:
+        DeviceError: it is of another kind than `made_by` says.
+    """
+    own = made_by(device)
     if own != kind:
         name = next(name for name in kind if own[name] != kind[name])
         raise DeviceError(
             f'the workers differ: {name} is "{kind[name]}" on one and "{own[name]}" on another; a run needs one kind'
         )
-    return computation.compute(campaign, task, Worker(how.device, how.threads))
 
 
 def _looked_at(campaign: Campaign) -> Campaign:

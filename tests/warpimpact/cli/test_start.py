@@ -17,6 +17,7 @@ from warpimpact.cli.options import read_option
 from warpimpact.firing.reading import read_test
 from warpimpact.identification.reading import read_fit
 from warpimpact.identification.schema import fit_schema
+from warpimpact.optimisation.design import read_design
 from warpimpact.scene.units import Angle
 
 CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
@@ -28,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("in_tmp_path")
 def test_examples_are_listed_with_their_questions(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["examples"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    paths = [*CAMPAIGNS.glob("*.toml"), *CAMPAIGNS.glob("fits/*.toml"), *CAMPAIGNS.glob("firing/*.toml")]
+    paths = [path for kind in (".", "fits", "firing", "designs") for path in CAMPAIGNS.glob(f"{kind}/*.toml")]
     assert [line.split()[0] for line in lines] == sorted(path.stem for path in paths)
     assert all("?" in line for line in lines)
 
@@ -52,6 +53,12 @@ def test_a_new_fit_can_be_read() -> None:
     assert main(["new", "paper_fit"]) == 0
     assert read_fit("paper_fit.toml").observed == 10
     assert [path.name for path in Path().glob("*.json")] == ["warpimpact.fit.schema.json"]
+
+
+def test_a_new_design_can_be_read() -> None:
+    assert main(["new", "lightest_plate"]) == 0
+    assert len(read_design("lightest_plate.toml").objectives) == 2
+    assert [path.name for path in Path().glob("*.json")] == ["warpimpact.design.schema.json"]
 
 
 def test_a_new_firing_test_can_be_read_with_its_target() -> None:

@@ -13,6 +13,7 @@ import xarray
 
 from warpimpact import Campaign
 from warpimpact.campaign.text import CampaignError
+from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
 from warpimpact.optimisation.searcher import Searcher, hypervolume
@@ -160,3 +161,11 @@ def test_the_worst_threat_counts() -> None:
     slow, fast = (f'[[threats]]\nname = "{v}"\nimpact = {{ velocity = {v} }}' for v in (600, 900))
     both, alone = (optimise(design(HOLES, WEIGHT_AND_ENERGY, *some, SEARCH)) for some in ([slow, fast], [fast]))
     assert both[f.FRESH].values[0, 1] == pytest.approx(alone[f.FRESH].values[0, 1], rel=1e-6)
+
+
+def test_workers_do_not_change_the_front(tmp_path: Path) -> None:
+    one = design(*SEARCHED, SEARCH)
+    with cluster_crew(workers=2, device="cpu") as crew:
+        optimise_to_file(one, tmp_path / "many.nc", crew=crew)
+    optimise_to_file(one, tmp_path / "one.nc", crew=local_crew("cpu"))
+    _same(f.read(tmp_path / "many.nc"), f.read(tmp_path / "one.nc"))

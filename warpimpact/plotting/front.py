@@ -1,0 +1,159 @@
+"""Figure of a search for designs: the front with its plates, references and solid plates, and variables along it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import CampaignError
+from warpimpact.plotting.plate import hole_patches
+from warpimpact.plotting.style import BLUE, GREEN, GREY, VERMILION, hide_sides
+from warpimpact.results import attributes as attr
+from warpimpact.results import front as f
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
+
+    from warpimpact.scene import Plate
+
+DRAWN = 6
+"""Plates that are drawn, at most."""
+_THUMBNAIL = 30.0
+"""Side of the drawn part of a plate [mm]."""
+_LETTERS = "ABCDEFGHIJ"
+_MARKS: tuple[Any, ...] = ("*", "P", "X", "^", "v")
+
+
+def front_figure(dataset: xarray.Dataset, folder: Path = Path()) -> Figure:
+    """The front of a search by fresh hits with 95 % intervals, beside all designs that were computed; plates along it;
+    and their variables.
+
+    Args:
+        dataset: the result of `warpimpact optimise`.
+        folder: of the files that the design file names.
+    """
+    leaders = front_leaders(dataset)
+    drawn = leaders[np.unique(np.round(np.linspace(0, len(leaders) - 1, min(DRAWN, len(leaders)))).astype(int))]
+    names = {int(place): _LETTERS[number] for number, place in enumerate(drawn)}
+    figure = Figure(figsize=(12.0, 8.0 if names else 5.6), layout="constrained")
+    rows = figure.subfigures(2 if names else 1, 1, height_ratios=(1.0, 2.4) if names else None, squeeze=False)[:, 0]
+    if names:
+        _draw_plates(rows[0], dataset, names, folder)
+    left, right = rows[-1].subfigures(1, 2, width_ratios=(1.7, 1.0))
+    _draw_front(left.subplots(), dataset, names)
+    _draw_variables(right, dataset, leaders)
+    figure.suptitle(fill(str(dataset.attrs[attr.TITLE]), 110))
+    return figure
+
+
+def front_leaders(dataset: xarray.Dataset) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """Places on the front of the designs that fresh hits tell apart."""
+    group, kept = dataset[f.GROUP].values, dataset[f.KEPT].values
+    leads = (group == np.arange(len(group))) & (kept == 1)
+    return np.flatnonzero(leads)
+
+
+def _draw_plates(figure: SubFigure, dataset: xarray.Dataset, names: dict[int, str], folder: Path) -> None:
+    panels = figure.subplots(1, len(names), squeeze=False)[0]
+    for axes, (place, letter) in zip(panels, names.items(), strict=True):
+        plate = _plate(str(dataset[f.CAMPAIGN].values[place]), folder)
+        axes.set(xticks=[], yticks=[], aspect="equal")
+        if plate is None:
+            axes.set_axis_off()
+            continue
+        half = 0.5 * _THUMBNAIL
+        axes.set(xlim=(-half, half), ylim=(-half, half), facecolor="0.72")
+        for patch in hole_patches(plate, axes):
+            axes.add_patch(patch)
+        axes.set_title(f"{letter}: {1e3 * plate.thickness:.3g} mm, {plate.open_area:.0%} open", fontsize="medium")
+    panels[0].set_xlabel(f"{_THUMBNAIL:g} mm × {_THUMBNAIL:g} mm", fontsize="small", color="0.3")
+
+
+def _plate(text: str, folder: Path) -> Plate | None:
+    """The plate of a campaign; None where a file that it names is not there any more."""
+    try:
+        return Campaign.from_text(text, name="front", folder=folder).plate
+    except CampaignError:
+        return None
+
+
+def _draw_front(axes: Axes, dataset: xarray.Dataset, names: dict[int, str]) -> None:
+    labels, limits = dataset[f.LABEL].values, dataset[f.LIMIT].values
+    goals = [place for place in range(len(labels)) if np.isnan(limits[place])]
+    across, up = goals[0], goals[min(1, len(goals) - 1)]
+    every, fresh = dataset[f.FOUND].values, dataset[f.FRESH].values
+    axes.plot(every[:, across], every[:, up], ".", color="0.82", markersize=3, zorder=1, label="computed designs")
+    if len(fresh):
+        _draw_fresh(axes, dataset, (across, up), goals[2] if len(goals) == 3 else None)
+        solid = dataset[f.SOLID].values
+        if across != up and np.isfinite(solid[:, up]).any():
+            order = np.argsort(solid[:, across])
+            style: dict[str, Any] = {"color": GREY, "linestyle": "--", "marker": "D", "fillstyle": "none"}
+            axes.plot(solid[order, across], solid[order, up], **style, label="solid plate of the same weight", zorder=2)
+    for place, (name, mark) in enumerate(zip(dataset[f.REFERENCE].values, 4 * _MARKS, strict=False)):
+        at = dataset[f.REFERENCE_FOUND].values[place]
+        ends = _bars(dataset, (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH), up)[:, place : place + 1]
+        point: dict[str, Any] = {"color": VERMILION, "markersize": 11, "zorder": 5}
+        axes.errorbar(at[across], at[up], yerr=ends, fmt=mark, label=str(name), **point)
+    for place, letter in names.items():
+        at = fresh[place, across], fresh[place, up]
+        axes.annotate(letter, at, xytext=(6, 6), textcoords="offset points", weight="bold", zorder=6)
+    better = ["less is better" if dataset[f.SIGN].values[one] > 0 else "more is better" for one in (across, up)]
+    axes.set(xlabel=f"{labels[across]}, {better[0]}", ylabel=f"{labels[up]}, {better[1]}")
+    axes.grid(color="0.92")
+    hide_sides(axes, "top", "right")
+    axes.legend(frameon=False, fontsize="small")
+
+
+def _draw_fresh(axes: Axes, dataset: xarray.Dataset, shown: tuple[int, int], third: int | None) -> None:
+    """The front by fresh hits; designs that are no better than another one are hollow."""
+    across, up = shown
+    fresh, leaders = dataset[f.FRESH].values, front_leaders(dataset)
+    others = np.setdiff1d(np.arange(len(fresh)), leaders)
+    ends = _bars(dataset, (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH), up)
+    told = ((leaders, "o", "front, fresh hits, 95 %", BLUE), (others, "o", "not told from another design", "white"))
+    for some, mark, label, face in told:
+        if len(some):
+            style: dict[str, Any] = {"color": BLUE, "markerfacecolor": face, "markersize": 6, "capsize": 2, "zorder": 4}
+            axes.errorbar(fresh[some, across], fresh[some, up], yerr=ends[:, some], fmt=mark, label=label, **style)
+    if third is not None:
+        drawn = axes.scatter(fresh[:, across], fresh[:, up], c=fresh[:, third], s=36, zorder=5, cmap="viridis")
+        axes.figure.colorbar(drawn, ax=axes, label=str(dataset[f.LABEL].values[third]))
+
+
+def _bars(dataset: xarray.Dataset, names: tuple[str, str, str], asked: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Lengths of the bars below and above, shape [2, points]; 0 where there is no interval."""
+    value, low, high = (dataset[name].values[:, asked] for name in names)
+    return np.asarray(np.nan_to_num(np.maximum(np.array([value - low, high - value]), 0.0)))
+
+
+def _draw_variables(figure: SubFigure, dataset: xarray.Dataset, leaders: Any) -> None:
+    """Values of the variables over the first objective; not of those that count nowhere on the front."""
+    names, values = dataset[f.NAME].values, dataset[f.VALUE].values[dataset[f.NUMBER].values[leaders]]
+    shown = np.flatnonzero(np.isfinite(values).any(axis=0))
+    if not len(shown):
+        return
+    panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    over = dataset[f.FRESH].values[leaders, 0]
+    for place, axes in zip(shown, panels, strict=True):
+        axes.plot(over, values[:, place], "o-", color=GREEN, markersize=4, linewidth=0.8)
+        every = dataset[f.VALUE].values[:, place]
+        if np.isfinite(every).any() and np.nanmin(every) < np.nanmax(every):
+            axes.set_ylim(np.nanmin(every) - 0.05 * np.ptp(every[np.isfinite(every)]), None)
+            axes.set_ylim(None, np.nanmax(every) + 0.05 * np.ptp(every[np.isfinite(every)]))
+        labels, unit = str(dataset[f.LABELS].values[place]), str(dataset[f.UNIT].values[place])
+        if labels:
+            axes.set_yticks(range(len(json.loads(labels))), json.loads(labels), fontsize="small")
+        name = str(names[place]).removeprefix("plate.").removeprefix("pattern.")
+        axes.set_title(f"{name} [{unit}]" if unit else name, fontsize="small", loc="left", pad=2)
+        axes.tick_params(labelsize="small")
+        hide_sides(axes, "top", "right")
+    panels[-1].set_xlabel(str(dataset[f.LABEL].values[0]))
