@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,5 +152,5 @@ def _all_but(group: Places, count: int) -> Mask:
     return known
 
 
-def _labels(*columns: object) -> np.ndarray:
-    return np.array(["|".join(map(str, one)) for one in zip(*columns, strict=True)])  # type: ignore[call-overload]
+def _labels(*columns: Iterable[object]) -> np.ndarray:
+    return np.array(["|".join(map(str, one)) for one in zip(*columns, strict=True)])

@@ -43,7 +43,7 @@ def every_path(procedure: Procedure) -> tuple[Firings, Array]:
     """A test for every sequence of answers, and its probability for a normal response."""
     shots = procedure.most
     answers = np.arange(2**shots)[:, None] >> np.arange(shots) & 1
-    firings = fire(procedure, Answers(), answers, np.zeros(answers.shape))  # type: ignore[arg-type]
+    firings = fire(procedure, Answers(), answers, np.zeros(answers.shape))
     z = np.where(firings.perforated, 1.0, -1.0) * (firings.velocity - MEAN) / DEVIATION
     unused = (~firings.used).sum(axis=1)  # a path that ends early occurs 2^unused times
     return firings, np.where(firings.used, special.ndtr(z), 1.0).prod(axis=1) / 2.0**unused

@@ -188,7 +188,7 @@
     const same = shown && shown.stage === line.stage && JSON.stringify(shown.design) === JSON.stringify(line.design);
     shown = line;
     if (!same) chosen = null;
-    const status = document.createElement("strong"), more = line.stage === "full" ? "" : " It gets finer while nothing moves.";
+    const status = document.createElement("strong"), more = line.stage === "full" ? "" : " The map gets finer while nothing moves.";
     status.textContent = NAMES[line.stage];
     const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
     at("status").replaceChildren(status, `: ${of} hits. ${line.numerics}${more}`);

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal, Self, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from warpimpact.firing.steps import Count, Optimal, Shot, Steps, check_range, ends
+from warpimpact.firing.steps import Count, InRange, OfShots, Optimal, Shot, Steps, ends
 from warpimpact.firing.three_pod import ThreePod
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import PositiveSpeed
 
 
-class UpAndDown(Model):
+class UpAndDown(OfShots):
     """Up and down in equal steps (Bruceton): down after a perforation, up after a stop (W. J. Dixon and A. M. Mood,
     Journal of the American Statistical Association 43 (1948) 109).
 
@@ -26,17 +26,6 @@ class UpAndDown(Model):
     start: PositiveSpeed
     step: PositiveSpeed
     shots: Count = 30
-
-    prefixes: ClassVar[bool] = True
-
-    @property
-    def most(self) -> int:
-        """Shots of a test, at most."""
-        return self.shots
-
-    def of_size(self, size: int) -> Self:
-        """The procedure with so many shots."""
-        return self.model_copy(update={"shots": size})
 
     def steps(self) -> Steps:
         """The velocities of one test."""
@@ -101,7 +90,7 @@ def within_span(stops: list[float], perforations: list[float], pairs: int, span:
     return chosen if max(chosen) - min(chosen) <= span else None
 
 
-class Langlie(Model):
+class Langlie(InRange):
     """One-shot test of H. J. Langlie (A reliability test method for "one-shot" items, Aeronutronic U-1792, 1962).
 
     The next velocity is the middle of the last one and that of the nearest earlier shot from which on stops and
@@ -116,22 +105,6 @@ class Langlie(Model):
     lowest: PositiveSpeed
     highest: PositiveSpeed
     shots: Count = 12
-
-    @model_validator(mode="after")
-    def _rises(self) -> Self:
-        check_range(self.lowest, self.highest)
-        return self
-
-    prefixes: ClassVar[bool] = True
-
-    @property
-    def most(self) -> int:
-        """Shots of a test, at most."""
-        return self.shots
-
-    def of_size(self, size: int) -> Self:
-        """The procedure with so many shots."""
-        return self.model_copy(update={"shots": size})
 
     def steps(self) -> Steps:
         """The velocities of one test."""
@@ -149,7 +122,7 @@ class Langlie(Model):
             aim = 0.5 * (fired[-1].velocity + (end if other is None else other))
 
 
-class Neyer(Model):
+class Neyer(InRange):
     """D-optimal test (B. T. Neyer, Technometrics 36 (1994) 61): search until there are a stop and a perforation, halve
     their distance down to the guess of the spread, shrink this guess until the answers overlap; from then on the
     velocity that tells most about V50 and spread together.
@@ -165,22 +138,6 @@ class Neyer(Model):
     highest: PositiveSpeed
     spread: PositiveSpeed
     shots: Count = 20
-
-    @model_validator(mode="after")
-    def _rises(self) -> Self:
-        check_range(self.lowest, self.highest)
-        return self
-
-    prefixes: ClassVar[bool] = True
-
-    @property
-    def most(self) -> int:
-        """Shots of a test, at most."""
-        return self.shots
-
-    def of_size(self, size: int) -> Self:
-        """The procedure with so many shots."""
-        return self.model_copy(update={"shots": size})
 
     def steps(self) -> Steps:
         """The velocities of one test."""

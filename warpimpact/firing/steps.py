@@ -7,9 +7,12 @@ when the test is over. For a D-optimal velocity it yields Optimal: these are com
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, Self, TypeAlias
 
-from pydantic import Field
+from pydantic import Field, model_validator
+
+from warpimpact.scene.model import Model
+from warpimpact.scene.units import PositiveSpeed
 
 
 class Shot(NamedTuple):
@@ -55,6 +58,38 @@ def ends(fired: list[Shot]) -> tuple[float | None, float | None]:
     return max(stops, default=None), min(perforations, default=None)
 
 
-def check_range(lowest: float, highest: float) -> None:
-    if lowest >= highest:
-        raise ValueError(f"got lowest = {lowest:g} m/s and highest = {highest:g} m/s, but lowest must be less")
+class OfShots(Model):
+    """A procedure with a number of `shots`; its fields stand in the order in which it is read."""
+
+    if TYPE_CHECKING:
+        shots: Count
+
+    @property
+    def prefixes(self) -> bool:
+        """Whether the first shots of a test are those of a shorter one."""
+        return True
+
+    @property
+    def most(self) -> int:
+        """Shots of a test, at most."""
+        return self.shots
+
+    def of_size(self, size: int) -> Self:
+        """The procedure with so many shots."""
+        return self.model_copy(update={"shots": size})
+
+
+class InRange(OfShots):
+    """A procedure that begins within a range of velocities."""
+
+    if TYPE_CHECKING:
+        lowest: PositiveSpeed
+        highest: PositiveSpeed
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        if self.lowest >= self.highest:
+            raise ValueError(
+                f"got lowest = {self.lowest:g} m/s and highest = {self.highest:g} m/s, but lowest must be less"
+            )
+        return self

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 from scipy import special
 
-from warpimpact.firing.steps import Count, Estimate, Estimated, Optimal, Shot, Steps, check_range, ends
-from warpimpact.scene.model import Model
+from warpimpact.firing.steps import Count, Estimate, Estimated, InRange, Optimal, Shot, Steps, ends
 from warpimpact.scene.units import Number, PositiveSpeed
 
 
-class ThreePod(Model):
+class ThreePod(InRange):
     """Three-phase optimal design, 3pod (C. F. J. Wu and Y. Tian, Journal of Statistical Planning and Inference 149
     (2014) 1): a search until the answers overlap, D-optimal shots, then shots that approach a quantile (Robbins, Monro
     and Joseph: V. R. Joseph, Biometrika 91 (2004) 461).
@@ -35,24 +34,15 @@ class ThreePod(Model):
     quantile_shots: Annotated[int, Field(strict=True, ge=0, le=1000)] = 0
     quantile: Annotated[Number, Field(gt=0, lt=1)] = 0.5
 
-    @model_validator(mode="after")
-    def _rises(self) -> Self:
-        check_range(self.lowest, self.highest)
-        return self
-
     @property
     def prefixes(self) -> bool:
-        """Whether the first shots of a test are those of a shorter one."""
+        """Whether the first shots of a test are those of a shorter one: not where a third phase follows."""
         return self.quantile_shots == 0
 
     @property
     def most(self) -> int:
         """Shots of a test, at most."""
         return self.shots + self.quantile_shots
-
-    def of_size(self, size: int) -> Self:
-        """The procedure with so many shots in its first two phases."""
-        return self.model_copy(update={"shots": size})
 
     def steps(self) -> Steps:
         """The velocities of one test."""

@@ -20,7 +20,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import at_solid, outcomes_in
+from warpimpact.runs.compute import at_solid
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.units import Radians
 from warpimpact.solver.many import simulate_many
@@ -128,20 +128,13 @@ def _scene_of(design: Design, job: Job) -> tuple[Campaign, Scene, Shots]:
 def _marched(
     levels: Sequence[str], scenes: Sequence[tuple[Campaign, Scene, Shots]], worker: Worker
 ) -> tuple[list[Outcomes], float]:
-    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took. Draws
-    of a posterior may need scenes of their own, and are computed one campaign after another."""
+    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took."""
     found: dict[int, Outcomes] = {}
     begin = time.process_time()
     for level in dict.fromkeys(levels):
         numerics = Numerics.model_validate_json(level)
         same = [number for number, one in enumerate(levels) if one == level]
-        drawn = [number for number in same if scenes[number][0].drawn is not None]
-        for number in drawn:
-            campaign, scene, shots = scenes[number]
-            found[number] = outcomes_in(campaign.drawn, scene, shots, numerics, worker)[0]
-        rest = [number for number in same if number not in drawn]
-        if rest:
-            found |= zip(rest, simulate_many([scenes[number][1:] for number in rest], numerics, worker), strict=True)
+        found |= zip(same, simulate_many([scenes[number][1:] for number in same], numerics, worker), strict=True)
     return [found[number] for number in range(len(scenes))], time.process_time() - begin
 
 

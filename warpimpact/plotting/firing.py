@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from warpimpact.firing.text import verdict
 from warpimpact.plotting.style import BLUE, GREEN, VERMILION
@@ -175,8 +176,7 @@ def directions_figure(dataset: xarray.Dataset) -> Figure:
     Args:
         dataset: the result of `warpimpact test` with directions.
     """
-    figure = Figure(figsize=(8.2, 7.6), layout="constrained")
-    figure.get_layout_engine().set(w_pad=0.3)  # type: ignore[call-arg, union-attr]  # for "left"
+    figure = Figure(figsize=(8.2, 7.6), layout=ConstrainedLayoutEngine(w_pad=0.3))  # room for "left"
     axes: Any = figure.add_subplot(projection="polar")
     azimuth, elevation = np.meshgrid(
         np.radians(dataset[f.AZIMUTH].values), np.radians(dataset[f.ELEVATION].values), indexing="ij"

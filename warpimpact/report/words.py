@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import tomllib
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
@@ -21,6 +19,7 @@ from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effective
 from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
 from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note, slices, status_shares
 from warpimpact.analysis.survival import draws_note
+from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
 from warpimpact.plotting.comparison import comparison_figure
 from warpimpact.results import attributes as attr
@@ -169,9 +168,7 @@ def _caveats(dataset: xarray.Dataset) -> list[str]:
 def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
     """Tables of a campaign with its values as written; an inner table has a dotted name such as `plate.pattern`. A
     number of hits from the command line replaces the written one."""
-    campaign = dataset.attrs.get(attr.CAMPAIGN, "")
-    values = json.loads(campaign) if campaign.startswith("{") else tomllib.loads(campaign)
-    tables = dict(_flat(values, ""))
+    tables = dict(_flat(parsed(dataset.attrs.get(attr.CAMPAIGN, ""), "the campaign in the result"), ""))
     if attr.COUNT in dataset.attrs and "count" in tables.get("hits", {}):
         tables["hits"]["count"] = str(dataset.attrs[attr.COUNT])
     return tables
@@ -179,8 +176,10 @@ def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:
 
 def _flat(table: Mapping[str, Any], name: str) -> Iterator[tuple[str, dict[str, str]]]:
     """A table and its inner tables, by dotted names; the layers by their numbers."""
-    layers = {f"layer {number}": layer for number, layer in enumerate(table.get("layer") or (), 1)}
-    table = {key: value for key, value in table.items() if key != "layer"} | layers
+    layers = table.get("layer")
+    if isinstance(layers, list):
+        numbered = {f"layer {number}": layer for number, layer in enumerate(layers, 1)}
+        table = {key: value for key, value in table.items() if key != "layer"} | numbered
     plain = {key: _plain(value) for key, value in table.items() if not isinstance(value, dict) and value is not None}
     if name and plain:
         yield name, plain

@@ -130,7 +130,7 @@ def open_result(path: str | Path) -> xarray.Dataset:
         ResultError: the file is missing, is not netCDF, or is not a warpimpact result.
     """
     with opened(Path(path)):
-        pass  # it is a sound result
+        pass  # checked; the file that is returned stays open
     dataset = _opened(Path(path))
     found = dataset.set_xindex(v.HIT) if v.HIT in dataset.coords else numbered(dataset)
     found.set_close(dataset.close)

@@ -137,3 +137,9 @@ class Scene(Model):
         self.record.check_bending(self.core)
         self.record.check_standoffs(self.core, self.target)
         return self
+
+    @property
+    def free_behind(self) -> tuple[bool, ...]:
+        """Of each layer, whether a core that has left it touches no other yet, however it is turned: the gap behind it
+        is as wide as the core is long, or it is the last one."""
+        return *(gap >= 2.0 * self.core.bounding_radius for gap in self.target.gaps[1:]), True

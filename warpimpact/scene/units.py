@@ -70,7 +70,7 @@ class Radians(float):
     def __abs__(self) -> "Radians":
         return Radians(abs(float(self)))
 
-    def __round__(self, digits: int | None = None) -> Any:  # type: ignore[override]  # else it is a plain float
+    def __round__(self, digits: int | None = None) -> Any:  # type: ignore[override]  # a float would lose the unit
         return _angle(round(float(self), digits))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,10 +29,11 @@ def upper_errors(
     share: float,
     impact: Array | None = None,
     relative: tuple[float, float] = (0.0, 0.0),
+    free: Sequence[bool] | None = None,
 ) -> Array:
     """Changes of residual velocity [m/s], last tilt [rad] and depth [m] that a share of the shots stay within, but for
     RISK; NaN of what no shot has. The arguments are those of `changes`."""
-    known = [errors[~np.isnan(errors)] for errors in changes(coarse, fine, impact, relative)]
+    known = [errors[~np.isnan(errors)] for errors in changes(coarse, fine, impact, relative, free)]
     return np.array([upper_error(errors, at_a_plate, share) if len(errors) else math.nan for errors in known])
 
 
@@ -69,7 +71,11 @@ def _median(values: Array) -> float:
 
 
 def changes(
-    coarse: Outcomes, fine: Outcomes, impact: Array | None = None, relative: tuple[float, float] = (0.0, 0.0)
+    coarse: Outcomes,
+    fine: Outcomes,
+    impact: Array | None = None,
+    relative: tuple[float, float] = (0.0, 0.0),
+    free: Sequence[bool] | None = None,
 ) -> tuple[Array, Array, Array]:
     """What changes between the outcomes of the same shots, each of shape [shots]: the residual velocity [m/s], or that
     behind a layer if it changes by more; the tilt at the last stand-off [rad]; and the depth [m].
@@ -83,8 +89,9 @@ def changes(
         impact: velocities [m/s], shape [shots], to weigh the first two by the energy of slow cores (SLOW).
         relative: (s/m, 1/rad): an error of a speed v counts as if it were 1 + |v| × the first times smaller, and one of
             a tilt likewise. So an absolute bound stands for one with a relative part.
+        free: of each layer, whether residual velocities behind it count; None if all do.
     """
-    before, after = _speeds(coarse), _speeds(fine)
+    before, after = _speeds(coarse, free), _speeds(fine, free)
     weight = _weight(before, after, impact)
     failed = [one.status >= Status.UNFINISHED for one in (coarse, fine)]
     speed = (weight * np.abs(after - before) / (1.0 + relative[0] * np.abs(after))).max(axis=1)
@@ -107,13 +114,14 @@ def ended_otherwise(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
     return np.asarray((coarse.status != fine.status) | (coarse.stopped_in != fine.stopped_in))
 
 
-def _speeds(outcomes: Outcomes) -> Array:
-    """Residual velocities [m/s] behind the target, then behind its layers; of shape [shots, 1] or [shots, 1 + layers].
-    One that comes back is negative."""
+def _speeds(outcomes: Outcomes, free: Sequence[bool] | None) -> Array:
+    """Residual velocities [m/s] behind the target, then behind those of its layers that count; shape [shots, 1 or
+    more]. One that comes back is negative."""
     back = outcomes.status == Status.RICOCHETED
     speeds = np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity)[:, None]
     if LAYER_RESIDUAL_VELOCITY in outcomes:
-        speeds = np.concatenate([speeds, outcomes.layer_residual_velocity], axis=1)
+        behind = outcomes.layer_residual_velocity
+        speeds = np.concatenate([speeds, behind if free is None else behind[:, np.array(free)]], axis=1)
     return np.nan_to_num(speeds)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TypeAlias, TypeVar
 
@@ -90,7 +90,7 @@ def pilot_hits(
     outcomes_at: Callable[[int, Shots], Outcomes],
     pilot: Shots,
     numerics: Numerics,
-    layers: int = 1,
+    free: Sequence[bool] = (True,),
     excess_of: Excess | None = None,
 ) -> HitErrors:
     """Find the coarsest level whose outcomes have the accuracy that is asked for.
@@ -100,7 +100,8 @@ def pilot_hits(
         pilot: shots like those that are to be computed, some `pilot_size` of them, the first of which are like all. The
             rest is computed where the first leave the choice between two levels open.
         numerics: their accuracy, precision and layout count; other settings would promise nothing.
-        layers: of the target.
+        free: of each layer of the target, whether a core flies free behind it (`Scene.free_behind`). Residual
+            velocities behind others count in no error.
         excess_of: in place of the accuracy, from the coarsest level on.
 
     Returns:
@@ -130,7 +131,7 @@ def pilot_hits(
         for whole in (False, True) if len(rest) else (False,):
             shots = pilot if whole else some
             pair = computed(index, whole), computed(finer, whole)
-            found, excess, nearly = _judged(*pair, shots, at_level(index, numerics), accuracy, margin)
+            found, excess, nearly = _judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
             if excess_of is not None:
                 excess, nearly = excess_of(*pair, shots), False
                 found = replace(found, kept=excess <= 1.0)
@@ -143,7 +144,7 @@ def pilot_hits(
         tried[index] = found, *pair
         return found, excess, nearly
 
-    further = FURTHER if layers == 1 else FURTHER_LAYERED
+    further = FURTHER if len(free) == 1 else FURTHER_LAYERED
     levels = range(level, min(level + further, len(LADDER) - 2) + 1)
     found = _coarsest(judge, levels, len(LADDER) - 1, BEYOND)
     if found is None:
@@ -152,14 +153,20 @@ def pilot_hits(
 
 
 def _judged(
-    coarse: Outcomes, fine: Outcomes, shots: Shots, numerics: Numerics, accuracy: Accuracy, margin: float
+    coarse: Outcomes,
+    fine: Outcomes,
+    shots: Shots,
+    numerics: Numerics,
+    accuracy: Accuracy,
+    margin: float,
+    free: Sequence[bool],
 ) -> tuple[HitErrors, float, bool]:
     """What is known of a level from some shots: the finding, its errors over what is allowed, and whether it nearly
     keeps the promise."""
     layered = LAYER_RESIDUAL_VELOCITY in coarse
     relative = (accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt)
     told, counted, weighed = (
-        margin * upper_errors(coarse, fine, shots.at_a_plate, accuracy.share, impact, given)
+        margin * upper_errors(coarse, fine, shots.at_a_plate, accuracy.share, impact, given, free)
         for impact, given in (
             (None, (0.0, 0.0)),
             (None, relative if layered else (0.0, 0.0)),
@@ -175,10 +182,15 @@ def _judged(
 
 
 def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
-    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers."""
+    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers.
+    What is not asked for counts as 0, however large its error is."""
     velocity, tilt = np.nan_to_num(errors[:2], nan=math.inf)
     depth = np.nan_to_num(errors[2], nan=0.0) if layered else 0.0
-    return float(max(velocity / accuracy.residual_velocity, tilt / accuracy.tilt, depth / accuracy.depth))
+    allowed = accuracy.residual_velocity, accuracy.tilt, accuracy.depth
+    return max(
+        float(error) / bound if math.isfinite(bound) else 0.0
+        for error, bound in zip((velocity, tilt, depth), allowed, strict=True)
+    )
 
 
 def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:

@@ -57,8 +57,8 @@ def simulate(
 
     if numerics.explicit is None:
         pilot, asked = spread(shots, pilot_size(numerics.asked, len(shots))), numerics
-        layers = len(scene.target.layers)
-        numerics = pilot_hits(lambda level, some: outcomes(some, at_level(level, asked)), pilot, asked, layers).numerics
+        found = pilot_hits(lambda level, some: outcomes(some, at_level(level, asked)), pilot, asked, scene.free_behind)
+        numerics = found.numerics
     return outcomes(shots, numerics, progress)
 
 
@@ -101,7 +101,7 @@ def pilot_of(
         seconds[level] = (time.perf_counter() - begin) / len(some)
         return outcomes
 
-    found = pilot_hits(outcomes_at, pilot, numerics, len(scene.target.layers), excess_of)
+    found = pilot_hits(outcomes_at, pilot, numerics, scene.free_behind, excess_of)
     if not found.tried or found.numerics.level is None:
         return found
     first = found.tried[0][0]

@@ -138,7 +138,7 @@ def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> N
     assert [line["kind"] for line in lines] == ["maps", "numbers"] * 3
     computed = lines[::2]
     assert plate["plate"]["numbers"]["open area"] == "34.8%"
-    assert [(line["stage"], line["hits"]) for line in computed] == [("first", 256), ("draft", 1024), ("full", 1500)]
+    assert [(line["stage"], line["hits"]) for line in computed] == [("first", 1024), ("draft", 1024), ("full", 1500)]
     assert [line["numerics"][:26] for line in computed[1:]] == [
         "Numerics: draft keeps its ",
         "Numerics: standard keeps i",

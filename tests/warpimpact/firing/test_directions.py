@@ -10,7 +10,7 @@ from warpimpact import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.firing.directions import Directions, impact_azimuth, obliquity, protect, weighted_mean
 from warpimpact.firing.reading import firing_test
-from warpimpact.firing.requirements import REQUIREMENTS, requirement_line, threat_of, with_threat
+from warpimpact.firing.requirements import REQUIREMENTS, Requirement, requirement_line, threat_of, with_threat
 from warpimpact.firing.simulate import simulate_test
 from warpimpact.firing.text import report_lines
 from warpimpact.plotting.firing import directions_figure
@@ -117,9 +117,9 @@ def test_a_named_requirement_gives_threat_velocity_and_shots() -> None:
 
 
 @pytest.mark.parametrize("requirement", REQUIREMENTS, ids=lambda one: one.name)
-def test_every_requirement_has_a_threat_in_the_catalogue(requirement: object) -> None:
+def test_every_requirement_has_a_threat_in_the_catalogue(requirement: Requirement) -> None:
     names = {"STANAG 4569 L3": "7.62x54R B32 API"}
-    threat, velocity = threat_of(requirement, names.get(requirement.name))  # type: ignore[arg-type, attr-defined]
+    threat, velocity = threat_of(requirement, names.get(requirement.name))
     assert velocity.value > 0.0
     assert threat.known
 

@@ -218,6 +218,23 @@ def test_hits_without_values_or_cover_are_reported(make_result: ResultMaker, tmp
     assert (shown["columns"]["residual velocity"][0] is None) == (status == Status.ARRESTED)
 
 
+@pytest.mark.parametrize(
+    ("campaign", "sentence"),
+    [
+        ("a." * 10**5 + "a=1", "16 dots in a key"),  # tomllib takes the square of their number
+        ("x=" + "[" * 10**4 + "]" * 10**4, "nested more than 16 deep"),
+        ("null", "not valid TOML"),
+        ("layer = 5", ""),
+    ],
+)
+def test_a_damaged_campaign_is_told_at_once(
+    make_result: ResultMaker, tmp_path: Path, capsys: pytest.CaptureFixture[str], campaign: str, sentence: str
+) -> None:
+    files.write(make_result(8).assign_attrs(campaign=campaign), tmp_path / "a.nc")
+    assert main(["report", str(tmp_path / "a.nc"), "--trajectories", "0"]) == (2 if sentence else 0)
+    assert sentence in capsys.readouterr().err
+
+
 def test_what_is_missing_is_told_and_nothing_written(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,6 +13,7 @@ from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
 from warpimpact.scene import (
     PRESETS,
+    Accuracy,
     CirclePattern,
     Hits,
     Impact,
@@ -226,6 +227,19 @@ def test_errors_behind_layers_may_have_a_relative_part() -> None:
     assert (relative[0] >= plain[0] / (1.0 + 0.01 * behind) - 1e-9)[~np.isnan(plain[0])].all()
 
 
+@pytest.mark.parametrize(("gap", "free"), [(0.0, False), (20e-3, False), (40e-3, True)])
+def test_the_velocity_within_a_laminate_counts_in_no_error(gap: float, free: bool) -> None:
+    layers = (PLATE, BASE.model_copy(update={"gap": gap}))
+    assert SCENE.model_copy(update={"target": Target(layers=layers)}).free_behind == (free, True)
+    zero = np.zeros((4, 2))
+    coarse = simulate(STOPPING, make_shots(IMPACT, Hits(count=4, seed=5), PLATE), numerics=Numerics(level=0))
+    still = {"status": np.zeros(4, int), "stopped_in": np.full(4, -1), "residual_velocity": zero[:, 0]}
+    coarse = coarse.assign(layer_residual_velocity=zero, **still)
+    fine = coarse.assign(layer_residual_velocity=np.array([[9.0, 0.0]] * 4))
+    np.testing.assert_array_equal(changes(coarse, fine)[0], 9.0)
+    np.testing.assert_array_equal(changes(coarse, fine, free=(free, True))[0], 9.0 * free)
+
+
 @pytest.mark.parametrize(
     ("excess", "tried", "taken"),
     [
@@ -246,6 +260,16 @@ def test_levels_that_a_pilot_tries(excess: list[float], tried: list[int], taken:
     found = pilot._coarsest(judge, range(5), 9, 1)
     assert found is not None
     assert (seen, found.numerics.level) == (tried, taken)
+
+
+@pytest.mark.parametrize("error", [math.inf, math.nan, 1e300])
+@pytest.mark.parametrize(
+    ("asked", "place"), [({"tilt": 0.02}, 0), ({"residual_velocity": 1.0}, 1), ({"residual_velocity": 1.0}, 2)]
+)
+def test_what_an_accuracy_does_not_ask_for_counts_nothing(asked: dict[str, float], place: int, error: float) -> None:
+    errors = np.array([0.5, math.radians(0.01), 0.0])
+    errors[place] = error
+    assert pilot._excess(Accuracy(**asked), errors, layered=True) == 0.5
 
 
 @pytest.mark.parametrize(("share_of_allowed", "parts"), [(0.5, [16, 16]), (1.1, [16, 16, 16, 16])])
