@@ -267,7 +267,9 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def clear_sums(surface: Surface, touches: Touches, slot: wp.int32):
         """No layer has touched yet."""
-        for index in range(slot * surface.most_rings, slot * surface.most_rings + surface.rings):
+        for index in range(
+            use.core_surface.rings_before(surface, slot), use.core_surface.rings_before(surface, slot) + surface.rings
+        ):
             touches.total_area[index] = zero
             touches.sums[index] = Sums()
 
@@ -316,7 +318,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """
         load = Load()
         begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
-        base = slot * surface.most_patches - begin  # what a step touches stays in the fastest cache
+        base = use.core_surface.patches_before(surface, slot) - begin  # what a step touches stays in the fastest cache
         find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
         if wp.static(variant.burst):
             if window.pierced:
@@ -340,7 +342,7 @@ def build(variant: Variant) -> SimpleNamespace:
             area = zero
             if index >= found.first_closing and index <= found.last_closing:
                 area = meet(plate, touches, base + index * surface.around, surface.around)
-            touches.ring_area[slot * surface.most_rings + index] = area
+            touches.ring_area[use.core_surface.rings_before(surface, slot) + index] = area
             if area > zero:
                 first, last = wp.min(first, index), index
         if last >= 0:
@@ -350,15 +352,15 @@ def build(variant: Variant) -> SimpleNamespace:
                     # After all rings are found: a CPU has to wait before it reads single values that it has just
                     # stored as vectors.
                     for index in range(first, last + 1):
-                        if touches.ring_area[slot * surface.most_rings + index] > zero:
+                        if touches.ring_area[use.core_surface.rings_before(surface, slot) + index] > zero:
                             expose(surface, fields, window, touches, base + index * surface.around)
                     use.exposure.spread(plate, fields, window, found.box)
             sums = Sums()
             if wp.static(variant.bends):
                 for index in range(first, last + 1):
-                    if touches.ring_area[slot * surface.most_rings + index] > zero:
+                    if touches.ring_area[use.core_surface.rings_before(surface, slot) + index] > zero:
                         part = summed(surface, law, fields, window, touches, pose, base, index, index)
-                        keep_sums(touches, slot * surface.most_rings + index, part)
+                        keep_sums(touches, use.core_surface.rings_before(surface, slot) + index, part)
                         sums = use.damping.joined(sums, part)
             else:
                 sums = summed(surface, law, fields, window, touches, pose, base, first, last)
