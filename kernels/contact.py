@@ -313,7 +313,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def clear_sums(surface: Surface, touches: Touches, slot: wp.int32):
         """No layer has touched yet."""
-        for index in range(slot * surface.rings, (slot + 1) * surface.rings):
+        for index in range(slot * surface.most_rings, slot * surface.most_rings + surface.rings):
             touches.total_area[index] = zero
             touches.sums[index] = Sums()
 
@@ -363,7 +363,7 @@ def build(variant: Variant) -> SimpleNamespace:
         load = Load()
         box = found.box
         begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
-        base = slot * surface.rings * surface.around - begin  # what a step touches stays in the fastest cache
+        base = slot * surface.most_patches - begin  # what a step touches stays in the fastest cache
         find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
         if wp.static(variant.burst):
             if window.pierced:
@@ -387,7 +387,7 @@ def build(variant: Variant) -> SimpleNamespace:
             area = zero
             if index >= found.first_closing and index <= found.last_closing:
                 area = meet(plate, touches, base + index * surface.around, surface.around)
-            touches.ring_area[slot * surface.rings + index] = area
+            touches.ring_area[slot * surface.most_rings + index] = area
             if area > zero:
                 first, last = wp.min(first, index), index
         if last >= 0:
@@ -397,7 +397,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     # After all rings are found: a CPU has to wait before it reads single values that it has just
                     # stored as vectors.
                     for index in range(first, last + 1):
-                        if touches.ring_area[slot * surface.rings + index] > zero:
+                        if touches.ring_area[slot * surface.most_rings + index] > zero:
                             expose(surface, fields, window, touches, base + index * surface.around)
                     box = gained_box(
                         touches, found.box, base + first * surface.around, (last + 1 - first) * surface.around
@@ -407,9 +407,9 @@ def build(variant: Variant) -> SimpleNamespace:
             sums = Sums()
             if wp.static(variant.bends):
                 for index in range(first, last + 1):
-                    if touches.ring_area[slot * surface.rings + index] > zero:
+                    if touches.ring_area[slot * surface.most_rings + index] > zero:
                         part = summed(surface, law, fields, window, touches, pose, base, index, index)
-                        keep_sums(touches, slot * surface.rings + index, part)
+                        keep_sums(touches, slot * surface.most_rings + index, part)
                         sums = use.damping.joined(sums, part)
             else:
                 sums = summed(surface, law, fields, window, touches, pose, base, first, last)

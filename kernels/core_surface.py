@@ -30,7 +30,8 @@ def build(variant: Variant) -> SimpleNamespace:
         patch, so neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
         4. `profile` has radii [m] at even stations, `per_station` of them per metre, from the base's station `base` [m]
         on. `patches` repeats the members of a ring for each of its patches, one array behind the other: a CPU then goes
-        through the patches of all rings in one loop.
+        through the patches of all rings in one loop. A slot has room for `most_rings` and `most_patches`: those of the
+        largest surface of a launch.
         """
 
         station: wp.array(dtype=real)
@@ -50,8 +51,13 @@ def build(variant: Variant) -> SimpleNamespace:
         per_station: real
         rings: wp.int32
         around: wp.int32
+        most_rings: wp.int32
+        most_patches: wp.int32
         max_radius: real
         bounding_radius: real
+
+    # One surface comes by value, as one plate does (kernels/target.py).
+    Surfaces = wp.array(dtype=Surface) if variant.tabled else Surface
 
     @wp.struct
     class Pose:

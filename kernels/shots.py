@@ -27,7 +27,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """Arrays of shape [1] or [shots], SI and radians.
 
         Hit point, velocity and attitude on impact (docs/model.md §1); the members of Body, the strength of the core
-        [Pa], and the members of Pace that follow from them.
+        [Pa], the members of Pace that follow from them, and `onset_share` of Law. `plates` is the number of the
+        target's plates, and `surface` that of the core's surface, where these come from tables.
         """
 
         hit_y: wp.array(dtype=wp.float64)
@@ -42,7 +43,11 @@ def build(variant: Variant) -> SimpleNamespace:
         inertia_axial: wp.array(dtype=real)
         inertia_transverse: wp.array(dtype=real)
         strength: wp.array(dtype=real)
+        onset_share: wp.array(dtype=real)
+        plates: wp.array(dtype=wp.int32)
+        surface: wp.array(dtype=wp.int32)
         way: wp.array(dtype=wp.float64)
+        way_along: wp.array(dtype=wp.float64)
         longest_time: wp.array(dtype=wp.float64)
         longest_step: wp.array(dtype=wp.float64)
         longest_way: wp.array(dtype=wp.float64)
@@ -83,6 +88,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def pace_of(scene: Pace, shots: Shots, shot: wp.int32):
         pace = scene
         pace.way = own(shots.way, shot)
+        pace.way_along = own(shots.way_along, shot)
         pace.longest_time = own(shots.longest_time, shot)
         pace.longest_step = own(shots.longest_step, shot)
         pace.longest_way = own(shots.longest_way, shot)

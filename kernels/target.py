@@ -22,11 +22,12 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     Fields, open_blank = scheme.build(variant).Fields, scheme.build(variant).open_window
 
     # One plate comes by value, because CUDA does not know where a pointer leads that lies in memory.
-    Plates = wp.array(dtype=Plate) if variant.layered else Plate
+    Plates = wp.array(dtype=Plate) if variant.layered or variant.tabled else Plate
 
     @wp.struct
     class Target:
-        """The layers of the target, front to back; arrays of shape [layers].
+        """The layers of the target, front to back; arrays of shape [layers]. A table of `plates` has those of several
+        targets, one after the other, of which a shot has those from number `first` on.
 
         `front` is the front face behind that of the target [m]; `offset_y` and `offset_z` are the place of the layer's
         origin in the plane of the plate [m]. These, `thickness` [m] and the members of Law have one value for all shots
@@ -41,10 +42,10 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
 
         count: wp.int32
         plates: Plates
+        first: wp.int32
         weakens: wp.array(dtype=wp.bool)
         laminate: wp.array(dtype=wp.int32)
         by_path: wp.array(dtype=wp.bool)
-        a2: wp.array(dtype=real)
         standoffs: wp.array(dtype=real)
         ahead: real
         front: wp.array2d(dtype=wp.float64)
@@ -54,6 +55,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         offset_z: wp.array2d(dtype=wp.float64)
         a0: wp.array2d(dtype=real)
         a1: wp.array2d(dtype=real)
+        a2: wp.array2d(dtype=real)
         friction: wp.array2d(dtype=real)
         degradation: wp.array2d(dtype=real)
         decay_rate: wp.array2d(dtype=real)
@@ -66,9 +68,18 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         return values[layer, wp.min(shot, values.shape[1] - 1)]
 
     @wp.func
+    def of_shot(target: Target, shots: Shots, shot: wp.int32):
+        """The target with the plates of a shot."""
+        found = target
+        found.first = own(shots.plates, shot) * target.count
+        return found
+
+    @wp.func
     def plate_of(target: Target, layer: wp.int32):
         """The pattern of a layer."""
-        if wp.static(variant.layered):
+        if wp.static(variant.tabled):
+            plate = target.plates[target.first + layer]
+        elif wp.static(variant.layered):
             plate = target.plates[layer]
         else:
             plate = target.plates
@@ -79,9 +90,9 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         """The law of a layer; the onset of contact in a step is common to all."""
         law = common
         law.by_path = target.by_path[layer]
-        law.a2 = target.a2[layer]
         law.a0 = own_of(target.a0, layer, shot)
         law.a1 = own_of(target.a1, layer, shot)
+        law.a2 = own_of(target.a2, layer, shot)
         law.friction = own_of(target.friction, layer, shot)
         law.degradation = own_of(target.degradation, layer, shot)
         law.decay_rate = own_of(target.decay_rate, layer, shot)

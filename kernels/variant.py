@@ -32,6 +32,7 @@ class Variant:
         layered: the target has several layers.
         burst: several shots hit one and the same plate.
         deep: a plate is thicker than the depth over which its material weakens together.
+        tabled: shots have plates and surfaces of their own, from tables.
         window: nodes of a shot's window in shared memory, at most, in the block layout: one block of CUDA threads per
             shot (kernels/block.py). 0 is the simple layout: one thread per shot, windows in global memory.
     """
@@ -46,6 +47,7 @@ class Variant:
     layered: bool = False
     burst: bool = False
     deep: bool = False
+    tabled: bool = False
     window: int = 0
 
     @property

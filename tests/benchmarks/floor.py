@@ -68,7 +68,7 @@ def contacts(
     [rings, around]."""
     core, plate = campaign.core, campaign.plate
     prepared = prepare(campaign.scene, shots, numerics)
-    resolution, rings = prepared.resolution, prepared.rings
+    resolution, rings = prepared.resolution, prepared.surfaces[0].rings
     azimuth = (np.arange(resolution.patches_around) + 0.5) * (2.0 * np.pi / resolution.patches_around)
     circle = np.stack([np.zeros_like(azimuth), np.cos(azimuth), np.sin(azimuth)], axis=1)
     area = np.hypot(rings.area_axial, rings.area_radial)

@@ -39,7 +39,7 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
 )
-from warpimpact.solver import grid, replay, simulate
+from warpimpact.solver import replay, simulate, structs, windows
 from warpimpact.solver.rings import azimuths_of, rings_of
 
 from .probes import astride, plate_of, poisoned, poisoned_fields
@@ -140,7 +140,7 @@ def test_order_of_the_lanes_changes_no_outcome(order: str, in_blocks: pytest.Mon
     scene, shots = scene_of("slots", 12)
     first = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     in_blocks.setattr(lanes, "LANE", ORDERS[order])
-    in_blocks.setattr(grid, "SIZES", (2080 + 32 * list(ORDERS).index(order),))  # so that kernels are built anew
+    in_blocks.setattr(windows, "SIZES", (2080 + 32 * list(ORDERS).index(order),))  # so that kernels are built anew
     assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)
 
 
@@ -148,7 +148,7 @@ def test_lanes_that_do_not_wait_are_found(in_blocks: pytest.MonkeyPatch) -> None
     scene, shots = scene_of("slots", 12)
     simple = simulate.simulate(scene, shots, numerics=SIMPLE, device="cpu")
     in_blocks.setattr(lanes, "WAIT", "")
-    in_blocks.setattr(grid, "SIZES", (2144,))
+    in_blocks.setattr(windows, "SIZES", (2144,))
     without = simulate.simulate(scene, shots, numerics=BLOCK, device="cpu")
     with pytest.raises(AssertionError):
         assert_same(without, simple)
@@ -220,8 +220,7 @@ def probe_of(variant: Variant) -> Any:
 
 def stepped(variant: Variant, count: int) -> tuple[Any, Array]:
     """Loads of random poses, and the exposure of their plates."""
-    kernel, *structs = probe_of(variant)
-    Surface, Plate_, Fields, Law, Load, Touches = structs
+    kernel, Surface, Plate_, Fields, Law, Load, Touches = probe_of(variant)
     put = structs.Put("cpu", variant.real)
     around = 36  # so that a round of the lanes spans two rings
     surface = structs.surface_of(Surface, CORE, rings_of(CORE, 23, around), azimuths_of(around), put)

@@ -24,6 +24,7 @@ pytestmark = pytest.mark.skipif(
         Variant(bends=True),
         Variant(double=True, nodal=True),
         Variant(bends=True, burst=True, layered=True),
+        Variant(bends=True, tabled=True, layered=True),
     ],
 )
 def test_kernel_compiles_to_ptx(stage: Any, variant: Variant, tmp_path: Path) -> None:
@@ -35,7 +36,10 @@ def test_kernel_compiles_to_ptx(stage: Any, variant: Variant, tmp_path: Path) ->
     assert f" {kernel.key}_" in entries[0]
 
 
-@pytest.mark.parametrize("variant", [Variant(window=2048), Variant(window=512, degrades=False, rimmed=True)])
+@pytest.mark.parametrize(
+    "variant",
+    [Variant(window=2048), Variant(window=512, degrades=False, rimmed=True)],
+)
 def test_block_keeps_its_window_in_shared_memory(variant: Variant, tmp_path: Path) -> None:
     kernel = march.build(variant).kernel
     wp.compile_aot_module(kernel.module, arch=90, use_ptx=True, module_dir=tmp_path)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path as FilePath
@@ -19,17 +19,16 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from warpimpact.results import posterior_file
-from warpimpact.scene import Interaction, Plate, Sampler, Scene, Shots
+from warpimpact.scene import Interaction, Plate, Sampler, Shots
 from warpimpact.scene.quantities import QUANTITIES
-from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
+from warpimpact.solver.columns import Path, columns_of
 
 Array = NDArray[np.float64]
 
 OF_THE_MATERIAL: tuple[Path, ...] = tuple((one.table, name) for name, one in QUANTITIES.items() if one.drawn)
 """What a posterior gives; all else stays that of the campaign."""
 MOST_DRAWS = 64
-"""Draws that a run uses. Several hits of each tell what the parameters and what the hits scatter; a parameter such as
-the degradation length needs a scene for each."""
+"""Draws that a run uses. Several hits of each tell what the parameters and what the hits scatter."""
 _COLUMN = 2**20
 """Of the random numbers that choose the draws; those of quantities that scatter have small ones."""
 
@@ -54,11 +53,6 @@ class Posterior:
     def discrepancy(self) -> dict[str, float]:
         """Standard deviations by which the model misses, by units of a Dataset; empty in a file without them."""
         return {unit: float(size) for unit, size in self.found_with.get("discrepancy", {}).items()}
-
-    @property
-    def of_scene(self) -> tuple[Path, ...]:
-        """Parameters that need a scene of their own."""
-        return tuple(path for path in self.values if path not in COLUMNS and path not in UNITS_OF_EXPOSURE)
 
     def check(self, plate: Plate, interaction: Interaction) -> None:
         """Refuse a material that has other fixed values than that of the fit.
@@ -94,27 +88,6 @@ class Posterior:
         places = np.concatenate([ordered(block + 1, self.draws) for block in blocks])
         chosen: NDArray[np.int64] = used[places[first - blocks.start * self.draws :][:count]]
         return chosen
-
-    def scene(self, scene: Scene, draw: int) -> Scene:
-        """A scene with those parameters of a draw that need a scene of their own."""
-        own: dict[str, dict[str, float]] = {"plate": {}, "interaction": {}}
-        for table, key in self.of_scene:
-            own[str(table)][str(key)] = float(self.values[table, key][draw])
-        front, *behind = scene.target.layers
-        target = scene.target.model_copy(update={"layers": (front.model_copy(update=own["plate"]), *behind)})
-        return scene.model_copy(
-            update={"target": target, "interaction": scene.interaction.model_copy(update=own["interaction"])}
-        )
-
-
-def scenes_of(drawn: Posterior | None, scene: Scene, shots: Shots) -> Iterator[tuple[NDArray[np.int64], Scene]]:
-    """Places of the shots that share a scene, and that scene: one for all, but where draws need scenes of their own."""
-    draw = shots.posterior_draw
-    if drawn is None or draw is None or not drawn.of_scene:
-        yield np.arange(len(shots)), scene
-        return
-    for one in np.unique(draw):
-        yield np.flatnonzero(draw == one), drawn.scene(scene, int(one))
 
 
 class DrawnSampler(Sampler):

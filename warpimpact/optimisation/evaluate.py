@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from warpimpact.analysis.effects import EFFECT_VARIABLES, Effect, effects
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.optimisation.design import Design, Threat
+from warpimpact.optimisation.limits import limits_level, limits_said
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import narrow_table
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import at_solid, outcomes_in
+from warpimpact.runs.compute import at_solid
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.units import Radians
-from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.many import simulate_many
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of
@@ -82,7 +82,7 @@ def campaign_of(design: Design, tables: Mapping[str, Any], threat: Threat, seed:
     """
     seed = design.search.seed if seed is None else seed
     sampling = {"sampling": "sobol", "count": MOST_HITS, "seed": seed, "irreducible": is_even(tables)}
-    kept = {key: value for key, value in tables.get("hits", {}).items() if key in ("area", "replicates")}
+    kept = {key: value for key, value in tables.get("hits", {}).items() if key == "area"}
     return design.campaign(dict(tables) | {"hits": kept | sampling}, threat)
 
 
@@ -111,6 +111,11 @@ def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: 
     for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
         table = narrow_table(scene, shots, one, EFFECT_VARIABLES)
         said.append(Said(said_of(design, table), np.array([shots.hit_y, shots.hit_z]), seconds / len(jobs)))
+    for job, of, (_, scene, shots) in zip(jobs, said, scenes, strict=True):
+        numerics = Numerics.model_validate_json(job.level)
+        for row, key in enumerate(design.keys):
+            if key.is_limit and not (job.solid and key.layer):
+                of.values[row] = limits_said(scene, shots, key, numerics, Worker(device, threads))
     return said
 
 
@@ -123,20 +128,13 @@ def _scene_of(design: Design, job: Job) -> tuple[Campaign, Scene, Shots]:
 def _marched(
     levels: Sequence[str], scenes: Sequence[tuple[Campaign, Scene, Shots]], worker: Worker
 ) -> tuple[list[Outcomes], float]:
-    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took. Draws
-    of a posterior may need scenes of their own, and are computed one campaign after another."""
+    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took."""
     found: dict[int, Outcomes] = {}
     begin = time.process_time()
     for level in dict.fromkeys(levels):
         numerics = Numerics.model_validate_json(level)
         same = [number for number, one in enumerate(levels) if one == level]
-        drawn = [number for number in same if scenes[number][0].drawn is not None]
-        for number in drawn:
-            campaign, scene, shots = scenes[number]
-            found[number] = outcomes_in(campaign.drawn, scene, shots, numerics, worker)[0]
-        rest = [number for number in same if number not in drawn]
-        if rest:
-            found |= zip(rest, simulate_many([scenes[number][1:] for number in rest], numerics, worker), strict=True)
+        found |= zip(same, simulate_many([scenes[number][1:] for number in same], numerics, worker), strict=True)
     return [found[number] for number in range(len(scenes))], time.process_time() - begin
 
 
@@ -145,7 +143,7 @@ def said_of(design: Design, table: Table) -> Array:
     as a solid plate has no base."""
     said = np.full((len(design.keys), table.sizes["hit"]), np.nan)
     for row, key in enumerate(design.keys):
-        if (effect := effects_in(table, *key[1:]).get(key[0])) is not None:
+        if (effect := effects_in(table, key.angle, key.standoff).get(key.effect)) is not None:
             said[row] = effect.values(table)
     return said
 
@@ -184,5 +182,8 @@ def level_of(design: Design, job: Job, device: str = "auto") -> str:
     if campaign.numerics.explicit is not None:
         return campaign.numerics.model_dump_json()
     asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
-    found: HitErrors = pilot_of(campaign.scene, hits_of(campaign, 0, pilot_size(asked.asked)), asked, Worker(device))
-    return found.numerics.model_dump_json()
+    shots, worker = hits_of(campaign, 0, pilot_size(asked.asked)), Worker(device)
+    found = [limits_level(campaign.scene, shots, key, asked, worker) for key in design.keys if key.is_limit]
+    if len(found) < len(design.keys):
+        found.append(pilot_of(campaign.scene, shots, asked, worker).numerics)
+    return max(found, key=lambda one: one.level or 0).model_dump_json()

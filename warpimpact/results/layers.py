@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpimpact.results import variables as v
-from warpimpact.scene.quantities import BY_LAYER
+from warpimpact.scene.quantities import BY_LAYER, OF_A_DRAW
 
 if TYPE_CHECKING:
     import xarray
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 def own_columns(target: Target, shots: Shots) -> dict[str, NDArray[Any]]:
     """What differs from shot to shot under the names of a result: of what every layer has, the plate's own as
     `thickness`; those of all layers as `layer_thickness`, if a layer behind the plate differs."""
-    columns: dict[str, NDArray[Any]] = {name: own for name, own in shots.columns.items() if name not in BY_LAYER}
+    elsewhere = (*BY_LAYER, *OF_A_DRAW)  # the latter in the posterior, at `posterior_draw`
+    columns: dict[str, NDArray[Any]] = {name: own for name, own in shots.columns.items() if name not in elsewhere}
     for name in BY_LAYER:
         own = [shots.own_of(target, name, k) for k in range(len(target.layers))]
         if shots.differs(name, 0):

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import finer_columns, solid_columns
@@ -88,12 +87,12 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     Raises:
         DeviceError: the device is absent.
     """
-    images, numerics, drawn = len(campaign.symmetries), numerics_of(campaign, task.found), campaign.drawn
+    images, numerics = len(campaign.symmetries), numerics_of(campaign, task.found)
     progress = of_images(progress, images)
-    outcomes, elapsed = outcomes_in(drawn, campaign.scene, task.shots[::images], numerics, worker, progress)
+    outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, progress)
     beside = _finer(campaign, task.found)
     if task.solid is not None:
-        beside |= solid_columns(outcomes_in(drawn, *at_solid(campaign, task.solid), numerics, worker)[0])
+        beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
     attributes |= found_attributes(campaign, task.found) | _errors(task.found)
     attributes |= {attr.LEVEL_FOR: campaign.stop.quantity} if campaign.stop and seeks_measure(campaign) else {}
@@ -119,11 +118,6 @@ def numerics_of(campaign: Campaign, found: Found | None) -> Numerics:
 def of_images(progress: Progress | None, images: int) -> Progress | None:
     """Progress in hits of which so many are computed as one."""
     return progress and (lambda done, total: progress(done * images, total * images))
-
-
-def part_of(progress: Progress | None, before: int, total: int) -> Progress | None:
-    """Progress of some shots, behind so many others, in that of all."""
-    return progress and (lambda done, _: progress(before + done, total))
 
 
 def found_in(result: Result) -> tuple[Numerics, bool, float]:
@@ -187,23 +181,12 @@ def _pilot_places(campaign: Campaign, most: int) -> NDArray[np.int64]:
     return np.arange(count) if campaign.hits.sampling in ("sobol", "random") else spread_places(groups, count)
 
 
-def outcomes_in(
-    drawn: Posterior | None,
-    scene: Scene,
-    shots: Shots,
-    numerics: Numerics,
-    worker: Worker,
-    progress: Progress | None = None,
+def _outcomes(
+    scene: Scene, shots: Shots, numerics: Numerics, worker: Worker, progress: Progress | None = None
 ) -> tuple[Outcomes, float]:
     """Outcomes of shots, and the time [s] that it took to prepare and to compute them, but not to build kernels."""
-    places, parts, building, done = list[NDArray[np.int64]](), list[Outcomes](), 0.0, 0
     begin = time.perf_counter()
-    for which, own in scenes_of(drawn, scene, shots):
-        prepared = prepare(own, shots[which], numerics)
-        memory = Memory(prepared, find_device(worker.device))
-        building += memory.build()
-        parts.append(marched(memory, worker, part_of(progress, done, len(shots))))
-        places.append(which)
-        done += len(which)
-    elapsed = time.perf_counter() - begin - building
-    return Outcomes.joined(parts)[np.argsort(np.concatenate(places), kind="stable")], elapsed
+    memory = Memory(prepare(scene, shots, numerics), find_device(worker.device))
+    building = memory.build()
+    outcomes = marched(memory, worker, progress)
+    return outcomes, time.perf_counter() - begin - building

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.posterior import scenes_of
 from warpimpact.scene import Numerics
 from warpimpact.solver.prepare import prepare
 
@@ -48,11 +47,10 @@ def cost_of(campaign: Campaign, numerics: Numerics) -> str | None:
     """A sentence about what hits take; None where that is little."""
     sampler, images = campaign.sampler(), len(campaign.symmetries)
     shots = sampler.shots(0, images * campaign.at_a_plate)[::images]
-    which, scene = next(iter(scenes_of(campaign.drawn, campaign.scene, shots)))
-    prepared = prepare(scene, shots[which], numerics)
+    prepared = prepare(campaign.scene, shots, numerics)
     nodes = sum(prepared.nodes((prepared.cells,) * 2)) if prepared.variant.degrades else 0
     size = 2 * (8 if prepared.variant.double else 4) * nodes
-    patches = len(prepared.rings.station) * prepared.resolution.patches_around
+    patches = len(prepared.surfaces[0].rings.station) * prepared.resolution.patches_around
     seconds, hits = PER_BYTE * size + PER_PATCH * patches * prepared.steps, len(sampler) // images
     if seconds < SLOW:
         return None

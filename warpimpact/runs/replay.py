@@ -8,7 +8,6 @@ import numpy as np
 import xarray
 
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.posterior import scenes_of
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import history_dataset, hit_numbers, numbered, to_dataset
@@ -67,7 +66,6 @@ def replay(result: xarray.Dataset, hit: int, *, folder: str | Path = ".", snapsh
     drawn = sampler.shots(hit - image - before, len(group) + before)
     images = _at_their_limit(scene, drawn, result, place)
     computed, shot = images[: 1 + before], images[image + before :][:1]
-    ((_, scene),) = scenes_of(campaign.drawn, scene, computed)
     again = solver.replay(scene, computed, numerics=_numerics(campaign, result), snapshots=snapshots)
     home, away = ((float(at.hit_y[-1]), float(at.hit_z[-1])) for at in (computed, shot))
     again = image_of(again, group[image], home=home, image=away)

@@ -184,7 +184,7 @@ class PolynomialCore(Core):
             )
         return self
 
-    @property
+    @cached_property
     def max_radius(self) -> float:
         return float(self.radius(np.array([0.0, self.length, *self._extremes()])).max())
 

@@ -1,8 +1,10 @@
 """Localized interaction: normal stress on an advancing surface element (docs/model.md §4, Ben-Dor et al.)."""
 
+from typing import Any
+
 import numpy as np
 
-from .model import Array, Model
+from .model import Model
 from .units import NonNegativeNumber
 
 
@@ -27,11 +29,15 @@ class Interaction(Model):
     quadratic: NonNegativeNumber = 0.0
     onset: NonNegativeNumber = 0.005
 
-    def coefficients(self, resistance: Array, density: float) -> tuple[Array, Array, float]:
-        """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material.
 
-        Args:
-            resistance: Y [Pa], of any shape, which a0 and a1 have, too.
-            density: ρ [kg/m³].
-        """
-        return self.static * resistance, self.linear * np.sqrt(density * resistance), self.quadratic * density
+def coefficients(static: Any, linear: Any, quadratic: Any, resistance: Any, density: float) -> tuple[Any, Any, Any]:
+    """(a0 [Pa], a1 [Pa s/m], a2 [Pa s²/m²]) of σ = a0 + a1·v_n + a2·v_n² in undegraded material.
+
+    All but the density may be of any shapes that go together.
+
+    Args:
+        static, linear, quadratic: as in `Interaction`.
+        resistance: Y [Pa].
+        density: ρ [kg/m³].
+    """
+    return static * resistance, linear * np.sqrt(density * resistance), quadratic * density

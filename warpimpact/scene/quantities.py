@@ -103,6 +103,9 @@ LISTED = tuple(name for name, quantity in QUANTITIES.items() if quantity.listed)
 BY_LAYER = tuple(name for name, quantity in QUANTITIES.items() if quantity.by_layer)
 OF_THE_SCENE = tuple(name for name, quantity in SCATTERED.items() if quantity.table in ("plate", "core"))
 """Quantities of plate and core that may differ from shot to shot."""
+OF_A_DRAW = ("degradation_length", "degradation_depth", "static", "linear", "quadratic", "onset")
+"""Quantities of plate and interaction that a shot has of its own only where a posterior draws them. A unit of exposure
+becomes a degradation."""
 
 _IN_FRONT = [name for name, quantity in SCATTERED.items() if quantity.table != "layer"]
 _BEHIND = ("thickness", "resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")

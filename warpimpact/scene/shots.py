@@ -178,6 +178,8 @@ class Shots:
         pitch, yaw: of the axis, beyond those of the line of flight [rad].
         spin: about the axis [rad/s].
         mass [kg], strength [Pa]: of the core; None where all shots have the scene's own value.
+        degradation_length, degradation_depth [m]: of the plate, likewise, as a posterior draws them.
+        static, linear, quadratic, onset: of the interaction, likewise.
         resistance [Pa], shear_coefficient, degradation, thickness [m], offset_y, offset_z [m]: of the layers, shape
             [shots, layers]; NaN where a layer has the scene's own value, None where all layers have. Layers behind
             those of the column have the scene's own; a column of shape [shots] is that of the plate alone.
@@ -204,6 +206,12 @@ class Shots:
     strength: Array | None = None
     offset_y: Array | None = None
     offset_z: Array | None = None
+    degradation_length: Array | None = None
+    degradation_depth: Array | None = None
+    static: Array | None = None
+    linear: Array | None = None
+    quadratic: Array | None = None
+    onset: Array | None = None
     sample: NDArray[np.int64] | None = None
     burst_order: NDArray[np.int64] | None = None
     nearest_earlier_hit: Array | None = None

@@ -27,6 +27,8 @@ FINER = 5
 """Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the cell under its centre."""
 FINEST = 15.0
 """Fewest cells of the tile per degradation length: the edge of a hole decides more about tilt than the grid does."""
+SHARED = 4
+"""Cells of shared tiles per factor of two."""
 BLUR = 3
 """Cells of the tile over which its material is averaged, in each direction: a patch then crosses an edge gradually.
 Odd."""
@@ -73,6 +75,13 @@ class Tile:
         return np.asarray(np.repeat(np.repeat(kept, block[0], axis=0), block[1], axis=1)[:rows, :columns])
 
 
+class Lengths(NamedTuple):
+    """Over which a layer weakens together: `length` in its plane and `depth` through its thickness [m]."""
+
+    length: float
+    depth: float
+
+
 class Planes(NamedTuple):
     """Planes of a window through the thickness: their number, the `spacing` between two [m], and how many of them a
     degradation depth has. One stands for the whole thickness."""
@@ -111,31 +120,43 @@ class Grid:
 
 
 def grids_of(
-    layers: Sequence[Plate], materials: Sequence[Materials], resolution: Resolution, *, deep: bool
+    layers: Sequence[Plate],
+    materials: Sequence[Materials],
+    resolution: Resolution,
+    lengths: Sequence[Lengths],
+    *,
+    deep: bool,
+    shared: bool,
 ) -> list[Grid]:
     """The grids of some layers, whose cells are as wide as their degradation lengths have it.
 
     Args:
+        lengths: over which the layers weaken, in the place of their own.
         deep: whether windows have planes through the thickness.
+        shared: whether plates of other degradation lengths have the same tiles, in finer cells than they need.
 
     Raises:
         MemoryError: as `tile_of`.
     """
     return [
-        _grid(
-            plate,
-            resolution,
-            plate.degradation_length / layers[0].degradation_length,
-            _planes(plate, material, resolution) if deep else WHOLE,
-        )
-        for plate, material in zip(layers, materials, strict=True)
+        _grid(plate, resolution, own, own.length / lengths[0].length, material if deep else None, shared)
+        for plate, own, material in zip(layers, lengths, materials, strict=True)
     ]
 
 
-def _grid(plate: Plate, resolution: Resolution, wider: float, planes: Planes) -> Grid:
-    """The grid of a layer, whose cells are so many times as wide as those of the plate."""
+def _grid(
+    plate: Plate, resolution: Resolution, own: Lengths, wider: float, deep: Materials | None, shared: bool
+) -> Grid:
+    """The grid of a layer with some degradation lengths, whose cells are so many times as wide as those of the plate.
+
+    Args:
+        deep: its material, where windows have planes through the thickness.
+    """
     nodal, spacing = resolution.nodal, wider * resolution.grid_spacing
-    tile = tile_of(plate, spacing if nodal else min(spacing / FINER, plate.degradation_length / FINEST), sharp=nodal)
+    cells = spacing if nodal else min(spacing / FINER, own.length / FINEST)
+    if shared:
+        cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
+    tile = tile_of(plate, cells, sharp=nodal)
     if nodal:  # its nodes are the tile's cells, which fit the period
         spacing = min(tile.dy, tile.dz)
     size_y, size_z = plate.size or (math.inf, math.inf)
@@ -144,8 +165,8 @@ def _grid(plate: Plate, resolution: Resolution, wider: float, planes: Planes) ->
         period=plate.pattern.period,
         half_size=(0.5 * size_y, 0.5 * size_z),
         spacing=spacing,
-        taps=half_taps(0.0 if nodal else plate.degradation_length, spacing),
-        planes=planes,
+        taps=half_taps(0.0 if nodal else own.length, spacing),
+        planes=WHOLE if deep is None else _planes(own.depth, deep, resolution),
     )
 
 
@@ -155,10 +176,9 @@ def half_taps(length: float, spacing: float) -> Array:
     return np.append(taps[len(taps) // 2 :], 0.0)
 
 
-def _planes(plate: Plate, material: Materials, resolution: Resolution) -> Planes:
-    """Those of a layer, which the step of a plate as thick as the degradation depth refines."""
-    depth = plate.degradation_depth
-    way = resolution.travel * float(resolution.passage(depth, plate, weakens=True))
+def _planes(depth: float, material: Materials, resolution: Resolution) -> Planes:
+    """Those of a layer with a degradation depth [m], which the step of a plate as thick as that refines."""
+    way = resolution.travel * float(resolution.passage(depth, depth, weakens=True))
     reach = max(FEWEST_PLANES, math.ceil(PLANES * math.sqrt(depth / way)))
     most = float(material.together.max()) / depth if material.weakens else 0.0
     return Planes(math.floor(most * reach + ROUNDING) + SPARE, depth / reach, reach)

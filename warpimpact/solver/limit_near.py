@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from warpimpact.records.outcomes import Outcomes
@@ -46,14 +44,14 @@ def velocities_from_neighbours(
         done = end
         if progress is not None:
             progress(done, len(shots))
-    return joined_limits(parts)
+    return _joined(parts)
 
 
-def joined_limits(parts: list[Limits], order: Any = slice(None)) -> Limits:
-    """Limits one behind the other, in an order."""
+def _joined(parts: list[Limits]) -> Limits:
+    """Limits one behind the other."""
     numbers = ("value", "lower", "upper", "runs", "converged")
     return Limits(
-        **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
-        shots=Shots.joined([part.shots for part in parts])[order],
-        outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in numbers},
+        shots=Shots.joined([part.shots for part in parts]),
+        outcomes=Outcomes.joined([part.outcomes for part in parts]),
     )

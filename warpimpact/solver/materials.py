@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.scene.interaction import coefficients
+
 if TYPE_CHECKING:
     from warpimpact.scene import Core, Plate, Scene, Shots, Target
 
@@ -20,6 +22,8 @@ ONSET = 0.02
 FASTEST_DECAY = 1.0e30
 """Of the resistance [1/s]: β = 0 takes all of it at the first touch, a rate beyond any exposure, yet finite (0 × it
 is 0)."""
+OWN_LENGTHS = ("degradation_length", "degradation_depth")
+"""Of the plate, which a shot may have of its own."""
 ROUNDING = 1e-9
 """Of a thickness in degradation depths, which may be a sum."""
 
@@ -32,12 +36,12 @@ class Materials:
         front: its front face behind that of the target.
         thickness: of the layer.
         together: thickness of its laminate.
+        depth: over which its material weakens together.
         deep: 1 where that is more than the degradation depth, so that it remembers how deep a contact was, else 0.
         offset_y, offset_z: place of its origin in the plane of the plate.
-        a0, a1, friction, degradation, decay_rate: of the law (kernels/interaction.py).
+        a0, a1, a2, friction, degradation, decay_rate: of the law (kernels/interaction.py).
         onset_jump: of the law if the core touches this layer alone; all the layers that it touches add theirs.
         most_jump: that of a layer of this material as thick as the core is long, which is the most that all can add.
-        a2: likewise, one number.
         by_path: whether exposure counts the path of the core, not the time.
         laminate: the first layer of those with which it shares the memory of contact.
         weakens: whether it keeps such a memory.
@@ -46,17 +50,18 @@ class Materials:
     front: Array
     thickness: Array
     together: Array
+    depth: Array
     deep: Array
     offset_y: Array
     offset_z: Array
     a0: Array
     a1: Array
+    a2: Array
     friction: Array
     degradation: Array
     decay_rate: Array
     onset_jump: Array
     most_jump: Array
-    a2: float
     by_path: bool
     laminate: int
     weakens: bool
@@ -67,7 +72,7 @@ def materials_of(scene: Scene, shots: Shots) -> list[Materials]:
     target = scene.target
     weakening = weakens(target, shots)
     thickness = [shots.own_of(target, "thickness", k) for k in range(len(target.layers))]
-    fronts, laminates = target.fronts(thickness), _laminates(target, weakening)
+    fronts, laminates = target.fronts(thickness), _laminates(target, weakening, shots)
     rears = {k: front + h for k, front, h in zip(laminates, fronts, thickness, strict=True)}  # those of the last layers
     return [
         _material(scene, shots, k, fronts[k], thickness[k], rears[first] - fronts[first], first, weakens)
@@ -83,12 +88,13 @@ def weakens(target: Target, shots: Shots | None = None) -> list[bool]:
     ]
 
 
-def _laminates(target: Target, weakening: Sequence[bool]) -> list[int]:
+def _laminates(target: Target, weakening: Sequence[bool], shots: Shots) -> list[int]:
     """For every layer, the first one of its laminate: of layers that weaken, touch each other and remember alike. A
-    laminate of one material is the plate of its thickness."""
+    laminate of one material is the plate of its thickness. A plate that remembers as each shot has it is in none."""
+    own = any(name in shots.columns for name in OWN_LENGTHS)
     first = [0]
     for k, (before, layer) in enumerate(pairwise(target.layers), start=1):
-        both = weakening[k - 1] and weakening[k] and target.gaps[k] == 0.0
+        both = weakening[k - 1] and weakening[k] and target.gaps[k] == 0.0 and not (own and k == 1)
         first.append(first[-1] if both and _memory(before) == _memory(layer) else k)
     return first
 
@@ -112,22 +118,28 @@ def _material(
         shots.own_of(scene.target, name, layer)
         for name in ("resistance", "shear_coefficient", "degradation", "offset_y", "offset_z")
     )
-    a0, a1, a2 = scene.interaction.coefficients(resistance, plate.density)
+    interaction, own = scene.interaction, layer == 0
+    static, linear, quadratic = (
+        shots.own(name, getattr(interaction, name)) for name in ("static", "linear", "quadratic")
+    )
+    a0, a1, a2 = coefficients(static, linear, quadratic, resistance, plate.density)
+    depth = shots.own("degradation_depth", plate.degradation_depth) if own else np.array([plate.degradation_depth])
     return Materials(
         front=front,
         thickness=thickness,
         together=together,
-        deep=np.asarray(weakens & (together > (1.0 + ROUNDING) * plate.degradation_depth), dtype=np.float64),
+        depth=depth,
+        deep=np.asarray(weakens & (together > (1.0 + ROUNDING) * depth), dtype=np.float64),
         offset_y=offset_y,
         offset_z=offset_z,
         a0=a0,
         a1=a1,
+        a2=a2,
         friction=friction,
         degradation=degradation,
         decay_rate=decay_rate(degradation, plate.degradation_unit),
         onset_jump=onset_jump(core, thickness, mass, a0),
         most_jump=onset_jump(core, np.array([core.length]), mass, a0),
-        a2=a2,
         by_path=plate.degradation_distance is not None,
         laminate=laminate,
         weakens=weakens,

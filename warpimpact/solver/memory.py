@@ -19,7 +19,7 @@ from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import free_memory, load
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.structs import Put, plate_of, surface_of
+from warpimpact.solver.structs import Put, plate_of, plates_of, surface_of, table_of
 from warpimpact.solver.windows import Cells
 
 if TYPE_CHECKING:
@@ -53,12 +53,16 @@ class Memory:
         self.stage, self.flight = built(variant)
         self.put = Put(device.alias, variant.real)
         self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
-        self.surface = surface_of(self.stage.Surface, scene.core, prepared.rings, prepared.azimuths, self.put)
+        surfaces = [
+            surface_of(self.stage.Surface, scene.core, own.rings, own.azimuths, self.put) for own in prepared.surfaces
+        ]
+        self.rings, self.patches = (max(getattr(own, n) for own in surfaces) for n in ("most_rings", "most_patches"))
+        most = {"most_rings": self.rings, "most_patches": self.patches}
+        self.surface = table_of(self.stage.Surface, surfaces, self.put, **most) if variant.tabled else surfaces[0]
         self.target, self.sections, self.shots = self._target(prepared), self._sections(prepared), self._shots(prepared)
         self.law, self.pace = self.stage.Law(), self.stage.Pace()
-        self.law.onset_share, self.law.onset_limit = scene.interaction.onset, LARGEST_ONSET
-        self.pace.time_step, self.pace.way_along = prepared.resolution.time_step or 0.0, prepared.resolution.way_along
-        self.pace.rows = prepared.rows
+        self.law.onset_limit = LARGEST_ONSET
+        self.pace.time_step, self.pace.rows = prepared.resolution.time_step or 0.0, prepared.rows
         self.free = scene.record.flies_free(scene.core, scene.target)
         self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)
@@ -72,13 +76,14 @@ class Memory:
         target, materials = self.stage.Target(), prepared.materials
         target.count = len(materials)
         # Kept, as an array of structs does not keep what its members point to.
-        self.plates = [plate_of(self.stage.Plate, grid, self.put) for grid in prepared.grids]
-        layered = prepared.variant.layered
-        target.plates = wp.array(self.plates, dtype=self.stage.Plate, device=self.device) if layered else self.plates[0]
+        if prepared.variant.layered or prepared.variant.tabled:
+            grids = [grid for plates in prepared.plates for grid in plates]
+            target.plates, self.plates = plates_of(self.stage.Plate, grids, self.put)
+        else:
+            target.plates = plate_of(self.stage.Plate, prepared.grid, self.put)
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
         target.laminate = self.put(np.array([one.laminate for one in materials]), wp.int32)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
-        target.a2 = self.put(np.array([one.a2 for one in materials]))
         record = prepared.scene.record
         target.standoffs, target.ahead = self.put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
         for name, variable in self.stage.Target.vars.items():
@@ -88,11 +93,13 @@ class Memory:
         return target
 
     def _sections(self, prepared: Prepared) -> Any:
-        struct = self.stage.Sections()
-        if prepared.sections is not None:
-            for name in self.stage.Sections.vars:
-                setattr(struct, name, self.put(getattr(prepared.sections, name)))
-        return struct
+        structs = [self.stage.Sections() for _ in prepared.surfaces]
+        for struct, own in zip(structs, prepared.surfaces, strict=True):
+            for name in self.stage.Sections.vars if own.sections is not None else ():
+                setattr(struct, name, self.put(getattr(own.sections, name)))
+        self.kept = structs
+        tabled = prepared.variant.tabled and prepared.variant.bends
+        return table_of(self.stage.Sections, structs, self.put) if tabled else structs[0]
 
     def _shots(self, prepared: Prepared) -> Any:
         shots = self.stage.Shots()
@@ -145,7 +152,7 @@ class Memory:
     @property
     def _patches(self) -> int:
         """Patches of a slot's touches."""
-        return 0 if self.variant.nodal else self.surface.rings * self.surface.around
+        return 0 if self.variant.nodal else self.patches
 
     def slots(self, cells: Cells, threads: int) -> int:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
@@ -190,7 +197,7 @@ class Memory:
             sections = sum(earlier_hits.planes(self.prepared)) * wp.types.type_size_in_bytes(self.stage.Section)
             earlier = (count * nodes + (1 + count) * self._pierced(cells)) * size + each + sections
         patches = self._patches * (8 * size + 3 * 4)
-        return int(len(self.fields) * nodes * size + earlier + patches + self.surface.rings * per_ring)
+        return int(len(self.fields) * nodes * size + earlier + patches + self.rings * per_ring)
 
     def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
         """Fields, touches, layers and earlier hits of some slots."""
@@ -201,7 +208,7 @@ class Memory:
         fields.cells_y, fields.cells_z = (put(column, wp.int32) for column in np.array(self.prepared.windows(cells)).T)
         for name in self.fields:
             setattr(fields, name, empty(slots * fields.nodes))
-        patches, rings = slots * self._patches, slots * self.surface.rings
+        patches, rings = slots * self._patches, slots * self.rings
         members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep, "ahead" * self.variant.burst]
         for name in filter(None, members):
             setattr(touches, name, empty(patches))

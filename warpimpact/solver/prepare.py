@@ -4,24 +4,34 @@ made, for those who build, march or describe."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
-from warpimpact.solver.grid import Grid, grids_of
-from warpimpact.solver.materials import Materials, materials_of
+from warpimpact.solver.grid import Grid, Lengths, grids_of
+from warpimpact.solver.materials import OWN_LENGTHS, Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
 from warpimpact.solver.windows import Cells, block_window, first_windows, windows_behind
 
 if TYPE_CHECKING:
-    from warpimpact.scene import Numerics, Scene, Shots
+    from warpimpact.scene import Numerics, Plate, Scene, Shots
 
 Array = NDArray[np.float64]
+
+
+class Surface(NamedTuple):
+    """A core in patches: its rings, the azimuths of the patches of even rings, then of odd rings [rad], shape
+    [2 around], and the sections behind the rings; None where it does not bend."""
+
+    rings: Rings
+    azimuths: Array
+    sections: Sections | None
 
 
 @dataclass(frozen=True)
@@ -32,10 +42,8 @@ class Prepared:
         scene, shots: what was prepared.
         resolution: its numerics with every choice made.
         variant: the build of the kernels that the scene needs.
-        rings: the surface of the core.
-        azimuths: of the patches of even rings, then of odd rings [rad], shape [2 around].
-        sections: of the core behind the rings; None where it does not bend.
-        grids: the plate, and the layers behind it.
+        surfaces: of the core, of which each shot has one.
+        plates: the plate, and the layers behind it; likewise several where shots have degradation lengths of their own.
         materials: of the plate, and of the layers behind it.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
         steps: of a passage that nothing hinders, at most.
@@ -48,15 +56,18 @@ class Prepared:
     shots: Shots
     resolution: Resolution
     variant: Variant
-    rings: Rings
-    azimuths: Array
-    sections: Sections | None
-    grids: list[Grid]
+    surfaces: list[Surface]
+    plates: list[list[Grid]]
     materials: list[Materials]
-    conditions: dict[str, Array]
+    conditions: dict[str, NDArray[Any]]
     steps: int
     first_cells: NDArray[np.int64]
     rows: int = 0
+
+    @property
+    def grids(self) -> list[Grid]:
+        """The plate, and the layers behind it, of the first plates."""
+        return self.plates[0]
 
     @property
     def grid(self) -> Grid:
@@ -76,14 +87,16 @@ class Prepared:
     def windows_behind(self, plate: NDArray[np.int64]) -> NDArray[np.int64]:
         """`windows.windows_behind` of what was prepared."""
         core, burst = self.scene.core, self.variant.burst
-        return windows_behind(core, self.shots, self.materials, self.grids, plate, burst=burst)
+        return windows_behind(
+            core, self.shots, self.materials, self.plates, self.conditions["plates"], plate, burst=burst
+        )
 
     def nodes(self, cells: Cells) -> list[int]:
         """Nodes that a shot has in the windows of all layers, likewise; those of a laminate are those of its first
         layer."""
         return [
-            grid.planes.number * math.prod(own) if material.laminate == k else 0
-            for k, (material, grid, own) in enumerate(zip(self.materials, self.grids, self.windows(cells), strict=True))
+            max(grids[k].planes.number for grids in self.plates) * math.prod(own) if material.laminate == k else 0
+            for k, (material, own) in enumerate(zip(self.materials, self.windows(cells), strict=True))
         ]
 
 
@@ -104,8 +117,11 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         raise ValueError("got numerics with an accuracy, but this needs a resolution: give a level or single settings")
     materials = materials_of(scene, shots)
     weakening = [one.weakens for one in materials]
-    resolution = resolve(scene, numerics, weakening)
-    conditions = conditions_of(core, target, shots, materials, resolution)
+    lengths, which = _lengths(target.layers, shots)
+    resolutions = [resolve(scene, numerics, weakening, [own.length for own in layers]) for layers in lengths]
+    shared = "degradation_length" in shots.columns
+    resolution, tabled = resolutions[0], any(name in shots.columns for name in OWN_LENGTHS)
+    conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, resolution)
     steps = int(steps_of(shots, resolution, conditions).max())
     deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
@@ -123,34 +139,61 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     )
     # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.
     deep |= not simple and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
-    grids = grids_of(target.layers, materials, resolution, deep=deep)
-    first_cells = first_windows(core, shots, materials[0], grids[0], nodal=resolution.nodal)
+    deep |= not simple and weakening[0] and "degradation_depth" in shots.columns
+    grids = [
+        grids_of(target.layers, materials, one, own, deep=deep, shared=shared)
+        for own, one in zip(lengths, resolutions, strict=True)
+    ]
+    first_cells = first_windows(core, shots, materials[0], grids, which, nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,
         nodal=resolution.nodal,
         degrades=any(weakening),
         rubs=any(one.shear_coefficient > 0.0 or shots.differs("shear_coefficient", k) for k, one in plates),
-        rate_dependent=interaction.linear > 0.0 or interaction.quadratic > 0.0,
+        rate_dependent=any(
+            getattr(interaction, name) > 0.0 or name in shots.columns for name in ("linear", "quadratic")
+        ),
         rimmed=any(one.size is not None for _, one in plates),
         bends=record.bending,
         layered=len(plates) > 1,
         deep=deep,
+        tabled=tabled,
         burst=burst,  # also of one shot, as a replay of the first one of several is
         window=block_window(int(first_cells.max())) if resolution.block else 0,
     )
-    axial, around = resolution.patches_axial, resolution.patches_around
-    rings = rings_of(core, axial, around, resolution.patch_width, discs=not resolution.nodal)
+    rings = [
+        rings_of(core, one.patches_axial, one.patches_around, one.patch_width, discs=not one.nodal)
+        for one in resolutions
+    ]
+    around = {own: one.patches_around for own, one in zip(rings, resolutions, strict=True)}
+    conditions |= {
+        "plates": which,
+        "surface": np.array([list(around).index(own) for own in rings])[which],
+        "way_along": np.array([one.way_along for one in resolutions])[which],
+    }
     return Prepared(
         scene=scene,
         shots=shots,
         resolution=resolution,
         variant=variant,
-        rings=rings,
-        azimuths=azimuths_of(around),
-        sections=sections_of(core, rings) if record.bending else None,
-        grids=grids,
+        surfaces=[
+            Surface(own, azimuths_of(count), sections_of(core, own) if record.bending else None)
+            for own, count in around.items()
+        ],
+        plates=grids,
         materials=materials,
         conditions=conditions,
         steps=steps,
         first_cells=first_cells,
     )
+
+
+def _lengths(layers: Sequence[Plate], shots: Shots) -> tuple[list[list[Lengths]], NDArray[np.int64]]:
+    """Over which the layers weaken, in each way that the shots have of their own; and which of them each shot has,
+    shape [1] where they all have the same."""
+    front, *behind = [Lengths(layer.degradation_length, layer.degradation_depth) for layer in layers]
+    if not any(name in shots.columns for name in OWN_LENGTHS):
+        return [[front, *behind]], np.zeros(1, dtype=np.int64)
+    columns = [np.broadcast_to(shots.own(name, at), len(shots)) for name, at in zip(OWN_LENGTHS, front, strict=True)]
+    own, which = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
+    return [[Lengths(*row), *behind] for row in own.tolist()], np.asarray(which.reshape(-1), dtype=np.int64)

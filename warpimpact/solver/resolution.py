@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Core, Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.materials import Materials, decay_rate
 
@@ -140,9 +140,9 @@ class Resolution:
     patch_width: float
     """No ring is wider than this radially [m]."""
 
-    def passage(self, thickness: ArrayLike, plate: Plate, *, weakens: bool) -> Array:
-        """Way [m] on which the plate acts on a core, for some thicknesses [m], of their shape."""
-        acting = np.minimum(thickness, DEEP * plate.degradation_depth) if weakens else thickness
+    def passage(self, thickness: ArrayLike, depth: ArrayLike, *, weakens: bool) -> Array:
+        """Way [m] on which a plate acts on a core, for some thicknesses and degradation depths [m], of their shape."""
+        acting = np.minimum(thickness, DEEP * np.asarray(depth)) if weakens else thickness
         return np.minimum(acting, self.slender)
 
     def longest_time(
@@ -170,7 +170,7 @@ class Resolution:
         stress = self.static * plate.resistance
         decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
         longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
-        passage = self.passage(plate.thickness, plate, weakens=plate.degradation < 1.0)
+        passage = self.passage(plate.thickness, plate.degradation_depth, weakens=plate.degradation < 1.0)
         return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time))
 
     def step_in(self, impact: Impact, target: Target) -> float:
@@ -178,22 +178,24 @@ class Resolution:
         return min(self.step_of(impact, plate) for plate in target.layers)
 
 
-def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Resolution:
+def resolve(
+    scene: Scene, numerics: Numerics, weakening: Sequence[bool], lengths: Sequence[float] | None = None
+) -> Resolution:
     """Fill in what the numerics do not give.
 
     Args:
         weakening: whether each layer weakens.
+        lengths: over which the layers weaken [m], in the place of those of the scene.
     """
-    core, plate = scene.core, scene.target.layers[0]
+    core, every = scene.core, lengths or [layer.degradation_length for layer in scene.target.layers]
     nodal, level = numerics.scheme == "nodal", LADDER[base_level(numerics)]
-    lengths = [one.degradation_length for one, does in zip(scene.target.layers, weakening, strict=True) if does]
-    finest = min(lengths, default=plate.degradation_length)
-    width = level.patch_width * finest if lengths else math.inf
+    finest = min((length for length, does in zip(every, weakening, strict=True) if does), default=every[0])
+    width = level.patch_width * finest if any(weakening) else math.inf
     defaults: dict[str, Any] = {
         "time_step": None,
         "patches_axial": level.patches_axial,
         "patches_around": max(level.patches_around, 4 * math.ceil(0.25 * math.pi * core.max_radius / width)),
-        "grid_spacing": plate.degradation_length / level.cells_per_length,
+        "grid_spacing": every[0] / level.cells_per_length,
     }
     if nodal:
         defaults = NODAL
@@ -216,17 +218,17 @@ def resolve(scene: Scene, numerics: Numerics, weakening: Sequence[bool]) -> Reso
 
 
 def conditions_of(
-    core: Core, target: Target, shots: Shots, materials: Sequence[Materials], resolution: Resolution
+    scene: Scene, shots: Shots, materials: Sequence[Materials], resolution: Resolution
 ) -> dict[str, Array]:
     """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
 
     The layer that needs the shortest step sets the step.
     """
+    core, target = scene.core, scene.target
     body = core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
     passage = _least(
-        resolution.passage(material.thickness, layer, weakens=material.weakens)
-        for material, layer in zip(materials, target.layers, strict=True)
+        resolution.passage(material.thickness, material.depth, weakens=material.weakens) for material in materials
     )
     times = (
         resolution.longest_time(material.decay_rate, layer, shots.velocity, mass, material.a0)
@@ -239,6 +241,7 @@ def conditions_of(
         "inertia_axial": scale * body.inertia_axial,
         "inertia_transverse": scale * body.inertia_transverse,
         "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
+        "onset_share": shots.own("onset", scene.interaction.onset),
         "way": resolution.travel * passage,
         "longest_time": _least(times),
         "longest_step": passage,

@@ -72,9 +72,10 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
     """
     if not discs:
         return _rings(Itself(core), np.linspace(0.0, core.length, axial + 1).tobytes(), 0, 0, around)
-    edges, (nose, base), across = _stations(Itself(core), axial), _ends(Itself(core)), min(widest, core.length / axial)
-    divided = _divided(core, edges, widest)
-    return _rings(Itself(core), divided.tobytes(), _discs(nose, across), _discs(base, across), around)
+    (edges, rise), (nose, base) = _stations(Itself(core), axial), _ends(Itself(core))
+    parts, across = np.maximum(1, np.ceil(rise / widest - 1e-9)).astype(int), min(widest, core.length / axial)
+    divided = edges.tobytes() if parts.max() == 1 else _divided(edges.tobytes(), parts.tobytes())
+    return _rings(Itself(core), divided, _discs(nose, across), _discs(base, across), around)
 
 
 @lru_cache(maxsize=64)
@@ -111,9 +112,12 @@ def _ends(itself: Itself[Core]) -> tuple[float, float]:
 
 
 @lru_cache(maxsize=16)
-def _stations(itself: Itself[Core], count: int) -> Array:
-    """Edges of the profile's rings: length/count apart ahead of the widest station, BEHIND times this distance behind
-    it. The widest station is an edge. Jumps of the slope are edges, too, if they are fewer than `count`."""
+def _stations(itself: Itself[Core], count: int) -> tuple[Array, Array]:
+    """Edges of the profile's rings, and how much the radius changes from one to the next [m].
+
+    They are length/count apart ahead of the widest station, BEHIND times this distance behind it. The widest station is
+    an edge. Jumps of the slope are edges, too, if they are fewer than `count`.
+    """
     core = itself.value
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
     inner = np.unique([*breaks, widest])
@@ -122,14 +126,16 @@ def _stations(itself: Itself[Core], count: int) -> Array:
     apiece = np.where(knots[:-1] < widest - 1e-6 * core.length, 1.0, BEHIND) * core.length / count
     shares = np.maximum(1, np.round(np.diff(knots) / apiece)).astype(int)
     edges = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(knots[:-1], knots[1:], shares, strict=True)]
-    return np.append(np.concatenate(edges), core.length)
+    joined = np.append(np.concatenate(edges), core.length)
+    return joined, np.abs(np.diff(core.radius(joined)))
 
 
-def _divided(core: Core, edges: Array, widest: float) -> Array:
-    """The edges, with more of them where the radius changes by more than `widest` [m] from one to the next."""
-    counts = np.maximum(1, np.ceil(np.abs(np.diff(core.radius(edges))) / widest - 1e-9)).astype(int)
-    finer = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True)]
-    return np.append(np.concatenate(finer), core.length)
+@lru_cache(maxsize=64)
+def _divided(edges: bytes, parts: bytes) -> bytes:
+    """Edges with so many parts from one to the next."""
+    ends, counts = np.frombuffer(edges), np.frombuffer(parts, dtype=int)
+    finer = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(ends[:-1], ends[1:], counts, strict=True)]
+    return np.append(np.concatenate(finer), ends[-1]).tobytes()
 
 
 def _widest_station(core: Core) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -58,6 +59,7 @@ def _surface(struct: Any, itself: Itself[Core], rings: Rings, azimuth: bytes, pu
         setattr(surface, name, put(array))
     surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
     surface.rings, surface.around = len(area), around
+    surface.most_rings, surface.most_patches = len(area), len(area) * around
     surface.max_radius, surface.bounding_radius = core.max_radius, core.bounding_radius
     return surface
 
@@ -74,6 +76,35 @@ _OF_A_PATCH = (
     "turn_radial",
 )
 _OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "turn_radial")
+
+
+def table_of(struct: Any, values: Sequence[Any], put: Put, **members: Any) -> Any:
+    """An array of structs, which does not keep what their members point to; some members have another value."""
+    table = np.array([value.numpy_value() for value in values], dtype=struct.numpy_dtype())
+    for name, value in members.items():
+        table[name] = value
+    return wp.array(table, dtype=struct, device=put.device)
+
+
+def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
+    """An array of the Plates of some grids, and what has to be kept of them."""
+    firsts = {(grid.tile, grid.period, grid.half_size): grid for grid in grids}
+    kept = [plate_of(struct, grid, put) for grid in firsts.values()]
+    values = dict(zip(firsts, (plate.numpy_value() for plate in kept), strict=True))
+    table = np.array([values[grid.tile, grid.period, grid.half_size] for grid in grids], dtype=struct.numpy_dtype())
+    taps, counts = put(np.concatenate([grid.taps for grid in grids])), [len(grid.taps) for grid in grids]
+    table["taps"]["data"] = taps.ptr + taps.strides[0] * np.cumsum([0, *counts[:-1]])
+    table["taps"]["shape"][:, 0] = counts
+    members = {
+        "spacing": [grid.spacing for grid in grids],
+        "reach": [grid.reach for grid in grids],
+        "planes": [grid.planes.number for grid in grids],
+        "per_plane": [1.0 / grid.planes.spacing for grid in grids],
+        "plane_reach": [grid.planes.reach for grid in grids],
+    }
+    for name, values_of in members.items():
+        table[name] = values_of
+    return wp.array(table, dtype=struct, device=put.device), (kept, taps)
 
 
 def plate_of(struct: Any, grid: Grid, put: Put) -> Any:

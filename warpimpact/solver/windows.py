@@ -28,12 +28,16 @@ DEEP = 0.6
 the core's surface from its centre of mass: the core arrives turned."""
 
 
-def first_windows(core: Core, shots: Shots, material: Materials, grid: Grid, *, nodal: bool) -> Counts:
+def first_windows(
+    core: Core, shots: Shots, material: Materials, plates: Sequence[Sequence[Grid]], which: Counts, *, nodal: bool
+) -> Counts:
     """Nodes of a window, in each direction, that holds the footprint of a core that keeps its attitude through the
     plate, or the laminate that it begins; shape [shots]. Layers farther away have windows of their own.
 
     Args:
-        material, grid: of the plate.
+        material: of the plate.
+        plates: the grids of all layers, one way or several.
+        which: of these, shape [1] or [shots].
     """
     slack = NODAL_SLACK if nodal else SLACK
     turned = np.minimum(1.0, np.sin(np.hypot(shots.pitch, shots.yaw)))
@@ -42,23 +46,35 @@ def first_windows(core: Core, shots: Shots, material: Materials, grid: Grid, *, 
         + material.together * np.tan(shots.obliquity)
         + core.bounding_radius * turned
     )
-    return 2 * (np.ceil(half / grid.spacing).astype(np.int64) + 2 * grid.reach + 3)
+    spacing, reach = (np.array([getattr(grids[0], name) for grids in plates])[which] for name in ("spacing", "reach"))
+    return np.asarray(2 * (np.ceil(half / spacing).astype(np.int64) + 2 * reach + 3))
 
 
 def windows_behind(
-    core: Core, shots: Shots, materials: Sequence[Materials], grids: Sequence[Grid], plate: Counts, *, burst: bool
+    core: Core,
+    shots: Shots,
+    materials: Sequence[Materials],
+    plates: Sequence[Sequence[Grid]],
+    which: Counts,
+    plate: Counts,
+    *,
+    burst: bool,
 ) -> Counts:
     """Nodes of the windows of all layers, in each direction, shape [layers, shots], if those of the plate have so many;
     0 where a layer keeps no field. A layer that earlier hits pierce keeps their channels.
 
     Args:
+        plates, which: as in `first_windows`.
         plate: shape [1] or [shots].
     """
     steep, own = np.tan(shots.obliquity), [np.broadcast_to(plate, len(shots))]
-    for material, grid in zip(materials[1:], grids[1:], strict=True):
+    wide = np.array([grids[0].spacing for grids in plates])[which]
+    for k, material in enumerate(materials[1:], start=1):
+        spacing = np.array([grids[k].spacing for grids in plates])[which]
+        taps = np.array([len(grids[k].taps) for grids in plates])[which]
         thicker = np.maximum(0.0, material.together - materials[0].together)
-        half = 0.5 * own[0] * grids[0].spacing + DEEP * core.bounding_radius + thicker * steep
-        count = 2 * (np.ceil(half / grid.spacing).astype(np.int64) + 2 * len(grid.taps) + 3)
+        half = 0.5 * own[0] * wide + DEEP * core.bounding_radius + thicker * steep
+        count = 2 * (np.ceil(half / spacing).astype(np.int64) + 2 * taps + 3)
         own.append(count if material.weakens or burst else np.zeros_like(own[0]))
     return np.stack([own[material.laminate] for material in materials])
 

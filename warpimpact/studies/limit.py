@@ -14,17 +14,16 @@ from numpy.typing import NDArray
 
 from warpimpact.analysis.survival import by_draws, over_draws
 from warpimpact.campaign.campaign import Campaign
-from warpimpact.campaign.posterior import Posterior, scenes_of
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import failed
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, part_of, pilot_shots
+from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.task import Task
-from warpimpact.scene import Numerics, Scene, Shots, Target, exclusions
+from warpimpact.scene import Numerics, Shots, Target, exclusions
 from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit import (
     HIGHEST_VELOCITY,
@@ -40,7 +39,7 @@ from warpimpact.solver.limit import (
     with_thickness,
     with_velocity,
 )
-from warpimpact.solver.limit_near import joined_limits, velocities_from_neighbours
+from warpimpact.solver.limit_near import velocities_from_neighbours
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
@@ -112,10 +111,10 @@ class LimitMap:
             progress: as in `simulate`.
         """
         sought, images, found = self.sought, len(campaign.symmetries), task.found
-        numerics, drawn = numerics_of(campaign, found), campaign.drawn
+        numerics, search = numerics_of(campaign, found), velocities_from_neighbours if self.near else limits
         progress, shots = of_images(progress, images), task.shots[::images]
         begin = time.perf_counter()
-        searched = _searched(drawn, campaign.scene, shots, sought, numerics, worker, progress, near=self.near)
+        searched = search(campaign.scene, shots, sought, numerics, worker, progress)
         elapsed = time.perf_counter() - begin
         attributes = {
             **computed_by(campaign, worker.device, len(shots), elapsed),
@@ -145,7 +144,7 @@ class LimitMap:
         if sought.quantity == "thickness":
             sought = replace(sought, highest=thickest(scene, 0))
         begin = time.perf_counter()
-        searched = _searched(campaign.drawn, scene, shots, sought, numerics, worker)
+        searched = limits(scene, shots, sought, numerics, worker)
         return {v.SOLID_LIMITS[sought.quantity]: searched.value}, {
             attr.SOLID_LIMIT_TIME: time.perf_counter() - begin,
             attr.SOLID_LIMIT_DENSITY: scene.target.layers[0].density,
@@ -183,27 +182,6 @@ class LimitMap:
             return with_velocity(shots, np.repeat(limits.shots.velocity, images))
         tried = limits.shots.own_of(campaign.target, "thickness", self.sought.layer)
         return with_thickness(self.sought.layer, shots, np.repeat(tried, images))
-
-
-def _searched(
-    drawn: Posterior | None,
-    scene: Scene,
-    shots: Shots,
-    sought: Sought,
-    numerics: Numerics,
-    worker: Worker,
-    progress: Progress | None = None,
-    near: bool = False,
-) -> Limits:
-    """Limits of shots. Draws of a posterior may need scenes of their own."""
-    search = velocities_from_neighbours if near else limits
-    places, parts, done = list[NDArray[np.int64]](), list[Limits](), 0
-    for which, own in scenes_of(drawn, scene, shots):
-        parts.append(search(own, shots[which], sought, numerics, worker, part_of(progress, done, len(shots))))
-        places.append(which)
-        done += len(which)
-    order = np.argsort(np.concatenate(places), kind="stable")
-    return joined_limits(parts, order)
 
 
 def warning_of(campaign: Campaign, quantity: str) -> str | None:

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import netCDF4
@@ -21,7 +22,8 @@ from warpimpact.results import posterior_file
 from warpimpact.results.files import read
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import Interaction, Plate, Shots
+from warpimpact.scene import Interaction, Plate, Scene, Shots
+from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.simulate import simulate
 
 DRAWS = 50
@@ -53,8 +55,8 @@ time_step = "2 us"
 """
 
 
-def posterior(folder: Path, interval: str = "degradation_interval", **of_scene: float) -> Path:
-    """A posterior of resistance, friction and interval, where each tells the others; `of_scene` scatters lengths."""
+def posterior(folder: Path, interval: str = "degradation_interval", **of_draw: float) -> Path:
+    """A posterior of resistance, friction and interval, where each tells the others; `of_draw` scatters others, too."""
     rng = np.random.default_rng(0)
     share = rng.random(DRAWS)
     columns = {
@@ -64,7 +66,7 @@ def posterior(folder: Path, interval: str = "degradation_interval", **of_scene: 
         "spacing_y": (["plate", "pattern", "spacing", 0], 0.02 + share),
         "discrepancy_velocity": (["discrepancy", "velocity"], share),
     }
-    columns |= {name: (["plate", name], size * (1.0 + share)) for name, size in of_scene.items()}
+    columns |= {name: ([QUANTITIES[name].table, name], size * (1.0 + share)) for name, size in of_draw.items()}
     draws = xarray.Dataset(
         {
             name: (("chain", "draw"), values[None], {"path": json.dumps(path), "units": "1"})
@@ -174,22 +176,43 @@ def test_a_result_holds_its_draws_and_replays(tmp_path: Path) -> None:
     assert replay(result, 17, folder=tmp_path).attrs["agreement"] == "bit-identical"
 
 
-def test_lengths_make_scenes_of_their_own(tmp_path: Path) -> None:
-    path = posterior(tmp_path, degradation_length=3e-4)
+def with_own(scene: Scene, name: str, value: float) -> Scene:
+    """A scene with the value of a draw."""
+    if QUANTITIES[name].table == "plate":
+        plate = scene.target.layers[0].model_copy(update={name: value})
+        return scene.model_copy(update={"target": scene.target.model_copy(update={"layers": (plate,)})})
+    return scene.model_copy(update={"interaction": scene.interaction.model_copy(update={name: value})})
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "apart"),
+    [
+        ("degradation_length", 3e-4, 0.3),  # the tile of a length of its own has finer cells
+        ("degradation_depth", 1e-3, 1e-3),
+        ("static", 0.8, 1e-3),
+        ("quadratic", 0.2, 1e-3),
+        ("onset", 4e-3, 1e-3),
+    ],
+)
+def test_shots_of_all_draws_are_computed_together(tmp_path: Path, name: str, size: float, apart: float) -> None:
+    path = posterior(tmp_path, **{name: size})
     drawn = campaign(path, ("count = 256", "count = 16"))
     assert drawn.drawn is not None
     shots, result = drawn.sampler().shots(0, 16), run(drawn, device="cpu")
-    lengths = drawn.drawn.values["plate", "degradation_length"]
+    values = drawn.drawn.values[QUANTITIES[name].table, name]
     for place in (0, 9):
-        length = float(lengths[int(result["posterior_draw"][place])])
-        plate = drawn.plate.model_copy(update={"degradation_length": length})
-        alone = simulate(
-            drawn.scene.model_copy(update={"target": plate}),
-            shots[place : place + 1],
-            numerics=drawn.numerics,
-            device="cpu",
+        shot = shots[place : place + 1]
+        alone = simulate(drawn.scene, shot, numerics=drawn.numerics, device="cpu")
+        assert float(result["residual_velocity"][place]) == float(np.float32(alone.residual_velocity[0]))
+        scene = with_own(drawn.scene, name, float(values[int(result["posterior_draw"][place])]))
+        own = simulate(scene, replace(shot, **{name: None}), numerics=drawn.numerics, device="cpu")
+        assert alone.residual_velocity == pytest.approx(own.residual_velocity, abs=apart)
+        assert alone.residual_velocity != pytest.approx(
+            simulate(
+                drawn.scene, replace(shot, **{name: None}), numerics=drawn.numerics, device="cpu"
+            ).residual_velocity,
+            abs=1e-2,
         )
-        assert float(result["residual_velocity"][place]) == pytest.approx(alone.residual_velocity[0], abs=1e-3)
     assert replay(result, 9, folder=tmp_path).attrs["agreement"] == "bit-identical"
 
 

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from warpimpact.scene import CirclePattern, Hits, Impact, Interaction, NoPattern, Plate, SlotPattern, make_shots
+from warpimpact.scene.interaction import coefficients
 from warpimpact.scene.symmetry import symmetries
 
 STEEL = {"thickness": "4 mm", "resistance": "2600 MPa"}
@@ -62,9 +63,10 @@ def test_a_value_out_of_bounds_is_refused(field: str, value: object, complaint: 
 
 def test_interaction_scales_with_resistance_and_density() -> None:
     plate = Plate(thickness=1, resistance=4e8, density=2500)
-    assert Interaction().coefficients(plate.resistance, plate.density) == (4e8, 0.0, 0.0)
-    law = Interaction(static=3, linear=0.5, quadratic=1.5)
-    assert law.coefficients(plate.resistance, plate.density) == pytest.approx((1.2e9, 0.5e6, 3750.0), rel=1e-14)
+    assert coefficients(1.0, 0.0, 0.0, plate.resistance, plate.density) == (4e8, 0.0, 0.0)
+    assert coefficients(3.0, 0.5, 1.5, plate.resistance, plate.density) == pytest.approx(
+        (1.2e9, 0.5e6, 3750.0), rel=1e-14
+    )
     with pytest.raises(ValidationError, match="greater than or equal to 0"):
         Interaction(linear=-1)
 
