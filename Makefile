@@ -11,6 +11,7 @@ demo: $(INSTALLED)
 
 gallery: $(INSTALLED)
 	$(VENV)/bin/python campaigns/gallery.py
+	$(VENV)/bin/python tests/benchmarks/design_film.py
 
 # Figures of docs/benchmarks.md; on a quiet machine, some 10 minutes on two cores.
 benchmark: $(INSTALLED)

@@ -24,6 +24,7 @@ RUNS: Mapping[str, Sequence[str]] = {
     "throughput": ("throughput.py",),
     "roads": ("roads.py",),
     "overheads": ("overheads.py",),
+    "design_page": ("design_page.py",),
     "statistics_cost": (
         "statistics_cost.py",
         "--seeds",
@@ -71,6 +72,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[Row]:
         ("peers", _peers),
         ("roads", _roads),
         ("overheads", _overheads),
+        ("design_page", _design_page),
         ("statistics_cost", _statistics),
     ):
         if name in found:
@@ -162,6 +164,18 @@ def _overheads(values: Mapping[str, Any]) -> Iterator[Row]:
             f"{one['peak_memory'] / 2**20:.0f} MiB",
             "wall time of the command",
             "one run",
+        )
+
+
+def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
+    before = {"rested": "the map before complete", "refining": "the map before being refined"}
+    for key, seconds in values["seconds"].items():
+        yield Row(
+            f"`warpimpact design`, from a change to the first map, {before[key]}",
+            "slotted plate",
+            f"{seconds['median']:.2f} s (median), {seconds['p95']:.2f} s (95 %)",
+            "wall time in a headless Chromium, until it is drawn; at most 0.3 s is wanted",
+            f"{values['changes']} changes; load {values['load_before']:.1f} before",
         )
 
 

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from .mistakes import folder_told
-from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_result
+from .options import Commands, add_campaign_folder, add_command, add_output, add_overwrite, add_result, at_least
 from .paths import check_output, check_suffix
 
 
@@ -24,6 +24,13 @@ def add_replay(commands: Commands) -> None:
     add_output(parser, "HIT.nc", "history file (default: RESULT_hitN.nc in the folder of the result)")
     add_campaign_folder(
         parser, "folder of the files that the campaign names, such as a hit list (default: the result's folder)"
+    )
+    parser.add_argument(
+        "--snapshots",
+        type=at_least(2),
+        default=6,
+        metavar="N",
+        help="instants at which the history shows what is left of the target, each of which takes memory and time",
     )
     parser.add_argument(
         "--animation", type=Path, metavar="HIT.gif", help="also write a film of the hit; HIT.mp4 needs FFmpeg"
@@ -49,7 +56,8 @@ def _replay(arguments: argparse.Namespace) -> None:
         writer_for(film)
         check_output(film, overwrite=arguments.overwrite)
     with folder_told():
-        history = replay(result, arguments.hit, folder=arguments.campaign_folder or path.parent)
+        folder = arguments.campaign_folder or path.parent
+        history = replay(result, arguments.hit, folder=folder, snapshots=arguments.snapshots)
     files.write(history, output)
     print(hit_text(history))
     for written in (output, *save_figures(history, output.parent, output.stem)):

@@ -3,6 +3,7 @@
 (async () => {
   const at = (id) => document.getElementById(id);
   const PATIENCE = 400;  // [ms] for a map of an older design, which then is given up
+  const SLOW = 3000;  // [ms] without a map, after which the page says why
   const SETTLED = 350;  // [ms] without a change, after which a design can be undone
   const narrow = matchMedia("(max-width: 45rem)");
   const state = { design: {}, pins: [], variable: "residual velocity" };
@@ -110,6 +111,10 @@
     running = own;
     waiting = false;
     const text = JSON.stringify(state.design), pins = JSON.parse(JSON.stringify(state.pins));
+    setTimeout(() => {
+      if (running !== own || own.answered) return;
+      at("status").textContent = "Computing… The first map of a new kind of target takes up to a minute, once: its kernels are built.";
+    }, SLOW);
     try {
       const response = await ask("compute", { design: state.design, pins, level }, own.abort.signal);
       if (!response.ok) throw new Error(await response.text());
@@ -188,7 +193,7 @@
     const same = shown && shown.stage === line.stage && JSON.stringify(shown.design) === JSON.stringify(line.design);
     shown = line;
     if (!same) chosen = null;
-    const status = document.createElement("strong"), more = line.stage === "full" ? "" : " It gets finer while nothing moves.";
+    const status = document.createElement("strong"), more = line.stage === "full" ? "" : " The map gets finer while nothing moves.";
     status.textContent = NAMES[line.stage];
     const of = line.stage !== "full" && line.total > line.hits ? `${line.hits} of ${line.total}` : line.hits;
     at("status").replaceChildren(status, `: ${of} hits. ${line.numerics}${more}`);

@@ -24,7 +24,8 @@ Tables = dict[str, Any]
 FILE_KEYS = ("file", "posterior", "catalogue")
 """Keys of a campaign that name files."""
 FEW, SOME = 256, 1024
-"""Hits at most of the first map after a change, and of the draft."""
+"""Hits at most of the first map after a change, and of the draft. A first map has as many as the draft where
+at least four of them are images of each other."""
 _MOST_ADDRESS = 2**20
 """Characters of a design in an address, unpacked."""
 FOLDER = Path("/")
@@ -161,33 +162,45 @@ def stages(shelf: Shelf, design: Design, level: int) -> list[Stage]:
     """The stages in which a design is computed: few hits at one level of resolution, which need no pilot; more hits at
     draft; and the campaign as it is. A stage that the campaign cannot have is left out.
 
+    The hits of the first stage are those of the irreducible part of the cell with their images, where there is one: as
+    many hits for a part of the time.
+
     Args:
         level: resolution of the first stage, as the last draft has found it.
     """
     campaign, numerics = design.campaign, dict(design.tables.get("numerics", {}))
+    coarse, draft = numerics, None
     if campaign.numerics.explicit is None:
         kept = {key: numerics[key] for key in ("scheme", "precision", "layout") if key in numerics}
-        wanted = {"first": (FEW, kept | {"level": level}), "draft": (SOME, kept | {"fidelity": "draft"})}
-    else:
-        wanted = {"first": (FEW, numerics)}
-    before: list[Stage] = []
-    for name, (most, coarse) in wanted.items():
-        tables = _of_few_hits(design, most) | {"numerics": coarse}
-        try:
-            before.append(Stage(name, shelf.checked(tables)))
-        except CampaignError:
-            continue
-    return [*(stage for stage in before if stage.design.text != design.text), Stage("full", design)]
+        coarse, draft = kept | {"level": level}, kept | {"fidelity": "draft"}
+    whole = _of_few_hits(design, FEW) | {"numerics": coarse}
+    part = _of_few_hits(design, SOME, irreducible=True) | {"numerics": coarse}
+    first = _valid(shelf, part)
+    if first is None or FEW * len(first.campaign.symmetries) < SOME:
+        first = _valid(shelf, whole)
+    drafted = None if draft is None else _valid(shelf, _of_few_hits(design, SOME) | {"numerics": draft})
+    before = {"first": first, "draft": drafted}
+    found = [Stage(name, one) for name, one in before.items() if one is not None and one.text != design.text]
+    return [*found, Stage("full", design)]
 
 
-def _of_few_hits(design: Design, most: int) -> Tables:
+def _valid(shelf: Shelf, tables: Tables) -> Design | None:
+    """A design, if it is valid."""
+    try:
+        return shelf.checked(tables)
+    except CampaignError:
+        return None
+
+
+def _of_few_hits(design: Design, most: int, *, irreducible: bool = False) -> Tables:
     """Tables of a design with so many hits at most, without a stop rule; a list has the hits of its file."""
     tables = {key: value for key, value in design.tables.items() if key != "stop"}
     count, together = design.campaign.hits.count, design.campaign.at_a_plate
     if count is None:
         return tables
     few = max(together, min(most, count) // together * together)
-    return tables | {"hits": dict(design.tables.get("hits", {})) | {"count": few}}
+    part = {"irreducible": True} if irreducible else {}
+    return tables | {"hits": dict(design.tables.get("hits", {})) | {"count": few} | part}
 
 
 def stage_of(shelf: Shelf, design: Design, level: int, name: str) -> Design:

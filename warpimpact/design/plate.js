@@ -108,7 +108,7 @@ function plateView(plate, section, drag) {
 
   function drawSection({ half, layers, handles }) {
     const deep = layers.at(-1).rear, { drawn } = views.get(section);
-    const wide = Math.max(deep * 1.15, 2 * half * 0.5), size = 0.08 * Math.max(wide / 3, 2 * half);
+    const wide = Math.max(deep * 1.15, 2 * half * 0.5), size = 0.065 * Math.max(wide / 3, 2 * half);
     frame(section, [(deep - wide) / 2, -half - 2.2 * size, wide, 2 * half + 3 * size]);
     const parts = [];
     layers.forEach(({ front, rear, parts: solid, text }, k) => {

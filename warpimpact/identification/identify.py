@@ -15,11 +15,8 @@ from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.results import posterior_file
-from warpimpact.results.files import OutputError
 from warpimpact.runs.describe import made_by
-from warpimpact.runs.run import Interrupted
-from warpimpact.runs.shards import claimed
-from warpimpact.runs.store import Store
+from warpimpact.runs.store import Store, stored
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
@@ -73,20 +70,9 @@ def identify_to_file(
         Interrupted: by the keyboard; what is saved can be resumed.
     """
     made = made_by(device)
-    with claimed(output):
-        store = Store(output, {"fit": fit.text, **made}, "fit")
-        store.begin(resume=resume, overwrite=overwrite)
-        try:
-            sampled = sample(fit, device=device, store=store, progress=progress)
-            posterior_file.write(to_datatree(fit, sampled, made), output)
-        except KeyboardInterrupt:
-            kept = f"{store.count} batches are saved in {store.folder}; continue with --resume"
-            raise Interrupted(f"interrupted; {kept if store.count else 'nothing is saved'}") from None
-        except (FitError, OutputError):
-            if not store.count:
-                store.discard()
-            raise
-        store.discard()
+    with stored(output, {"fit": fit.text, **made}, "fit", resume=resume, overwrite=overwrite) as store:
+        sampled = sample(fit, device=device, store=store, progress=progress)
+        posterior_file.write(to_datatree(fit, sampled, made), output)
 
 
 def sample(fit: Fit, *, device: str = "auto", store: Store | None = None, progress: Follow | None = None) -> Sampled:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.confirm import check_references, confirm
 from warpimpact.optimisation.crew import Crew, local_crew
 from warpimpact.optimisation.design import Design, read_design
@@ -13,10 +12,7 @@ from warpimpact.optimisation.outcome import to_dataset, write_campaigns
 from warpimpact.optimisation.search import Follow, SearchProgress, search
 from warpimpact.optimisation.work import Work
 from warpimpact.results import front as f
-from warpimpact.results.files import OutputError
-from warpimpact.runs.run import Interrupted
-from warpimpact.runs.shards import claimed
-from warpimpact.runs.store import Store
+from warpimpact.runs.store import Store, stored
 
 if TYPE_CHECKING:
     import xarray
@@ -66,20 +62,10 @@ def optimise_to_file(
         Interrupted: by the keyboard; what is saved can be resumed.
     """
     crew = crew or local_crew(device)
-    with claimed(output):
-        store = Store(output, {"design": design.text, **crew.made_by}, "search")
-        store.begin(resume=resume, overwrite=overwrite)
-        try:
-            dataset, campaigns = _found(design, crew, store, progress or (lambda now: None), folder_of(output))
-            f.write(dataset, output)
-        except KeyboardInterrupt:
-            kept = f"{store.count} batches are saved in {store.folder}; continue with --resume"
-            raise Interrupted(f"interrupted; {kept if store.count else 'nothing is saved'}") from None
-        except (CampaignError, OutputError):
-            if not store.count:
-                store.discard()
-            raise
-        store.discard()
+    content = {"design": design.text, **crew.made_by}
+    with stored(output, content, "search", resume=resume, overwrite=overwrite) as store:
+        dataset, campaigns = _found(design, crew, store, progress or (lambda now: None), folder_of(output))
+        f.write(dataset, output)
     return campaigns
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,34 @@ from numpy.typing import NDArray
 
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.runs.shards import difference, fingerprint, folder_of
+from warpimpact.runs.run import Interrupted
+from warpimpact.runs.shards import claimed, difference, fingerprint, folder_of
 
 _MANIFEST = "manifest.json"
+
+
+@contextmanager
+def stored(output: Path, content: Mapping[str, Any], kind: str, *, resume: bool, overwrite: bool) -> Iterator[Store]:
+    """The `Store` of a computation while it runs. It is empty when the result is written; whatever ends the computation
+    before leaves what can be resumed.
+
+    Raises:
+        OutputError: something is there that must be neither resumed nor overwritten, or another computation is at work.
+        Interrupted: by the keyboard; the message says what is saved.
+    """
+    with claimed(output):
+        store = Store(output, content, kind)
+        store.begin(resume=resume, overwrite=overwrite)
+        try:
+            yield store
+        except KeyboardInterrupt:
+            kept = f"{store.count} batches are saved in {store.folder}; continue with --resume"
+            raise Interrupted(f"interrupted; {kept if store.count else 'nothing is saved'}") from None
+        except Exception:
+            if not store.count:
+                store.discard()
+            raise
+        store.discard()
 
 
 class Store:

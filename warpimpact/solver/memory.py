@@ -219,7 +219,8 @@ class Memory:
         members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep, "ahead" * self.variant.burst]
         for name in filter(None, members):
             setattr(touches, name, empty(patches))
-        for name in filter(None, ["tile", "cell", "place" * self.variant.burst]):
+        places = ["row", "column", "plane"] if self.variant.deep else []
+        for name in filter(None, ["tile", "cell", "place" * self.variant.burst, *places]):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         touches.ring_area = empty(rings)
         if self.variant.bends:

@@ -15,6 +15,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.cli import main
+from warpimpact.design.answers import Answers
 from warpimpact.design.changes import SHAPES, changed
 from warpimpact.design.designs import FILE_KEYS, shelf_of, stages
 from warpimpact.results import attributes as attr
@@ -101,6 +102,16 @@ def test_what_makes_no_sense_is_refused_in_a_sentence(address: str, body: Any, s
     assert sentence in json.loads(text)["sentence"]
 
 
+def test_a_bug_is_told(address: str, small: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any) -> None:
+    def broken(*_: Any) -> None:
+        raise ZeroDivisionError("of a test")
+
+    monkeypatch.setattr(Answers, "plate", broken)
+    (line,) = compute(address, tables_of(small))
+    assert line["sentence"].endswith("ZeroDivisionError: of a test")
+    assert "in broken" in capfd.readouterr().err
+
+
 def test_every_key_that_names_a_file_is_known() -> None:
     def models(base: type[Model]) -> list[type[Model]]:
         return [base, *(inner for one in base.__subclasses__() for inner in models(one))]
@@ -138,7 +149,7 @@ def test_stages_go_from_few_hits_to_the_campaign(address: str, small: Path) -> N
     assert [line["kind"] for line in lines] == ["maps", "numbers"] * 3
     computed = lines[::2]
     assert plate["plate"]["numbers"]["open area"] == "34.8%"
-    assert [(line["stage"], line["hits"]) for line in computed] == [("first", 256), ("draft", 1024), ("full", 1500)]
+    assert [(line["stage"], line["hits"]) for line in computed] == [("first", 1024), ("draft", 1024), ("full", 1500)]
     assert [line["numerics"][:26] for line in computed[1:]] == [
         "Numerics: draft keeps its ",
         "Numerics: standard keeps i",

@@ -59,10 +59,11 @@ def test_a_choice_made_with_plain_xarray_is_still_a_result(
     assert main(["plot", path]) == 0
     assert main(["report", path, "--trajectories", "1"]) == 0
     capsys.readouterr()
-    assert main(["replay", path, "--hit", str(hit)]) == 0
+    assert main(["replay", path, "--hit", str(hit), "--snapshots", "2"]) == 0
     assert "The end is bit-identical to the stored outcome." in capsys.readouterr().out
     with xarray.open_dataset(tmp_path / f"few_hit{hit}.nc") as history:
         np.testing.assert_array_equal(history["tilt"], result["tilt"].sel(hit=hit))
+        assert history.sizes["snapshot"] == 2
     missing = int(np.setdiff1d(result["hit"], few["hit"])[0])
     assert main(["replay", path, "--hit", str(missing)]) == 2
     assert f"hit: got {missing}, but the result has {few.sizes['hit']} of the hits" in capsys.readouterr().err
