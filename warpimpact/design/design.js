@@ -149,6 +149,9 @@
     if (line.kind === "refused") {
       own.answered = true;
       refuse(line.sentence);
+      toml = "";
+      at("save").disabled = true;
+      at("status").textContent = shown ? "No map of this design. The one below is of the design before." : "No map.";
     } else if (line.kind === "plate") {
       showPlate(line);
     } else if (line.kind === "numbers") {
@@ -172,6 +175,7 @@
 
   function showPlate({ plate, groups, choices, toml: file, title, notes }) {
     toml = file;
+    at("save").disabled = false;
     if (document.activeElement !== at("title")) at("title").value = title;
     document.title = `${title} · warpimpact design`;
     controls(groups, choices);

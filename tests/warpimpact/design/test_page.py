@@ -84,6 +84,8 @@ def test_an_impossible_plate_shows_the_sentence(page: Any) -> None:
     page.wait(lambda: page.text("#sentence"))
     sentence = "plate.pattern: got length = 12 mm, but the length must be at least the width, 14 mm"
     assert page.text("#sentence") == sentence
+    assert page.text("#status").startswith("No map of this design.")
+    assert page.find("#save")[0].get_property("disabled")  # there is no campaign that run takes
     move(page, "control-plate-pattern-width", 4.0)
     page.wait(lambda: not page.text("#sentence"))
     assert page.errors() == []
