@@ -25,7 +25,7 @@ from warpimpact.optimisation.judged import Record, objectives
 from warpimpact.optimisation.searcher import front_of, hypervolume
 from warpimpact.optimisation.space import Space, Variable
 
-BUDGET, BATCH, SEEDS = 240, 20, (0, 1, 2)
+BUDGET, BATCH, SEEDS = 160, 20, (0, 1, 2)
 LEVEL, HITS = '{"level": 0}', 64
 CHECKOUT = Path(__file__).parents[2]
 STORED = Path(__file__).with_name("results") / "optimisers.json"

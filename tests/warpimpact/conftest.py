@@ -233,3 +233,39 @@ class Browser:
 
     def errors(self) -> list[str]:
         return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
+
+
+SEARCHED = """
+title = "plates"
+core = { shape = "cone", diameter = "6 mm", length = "20 mm", cone_length = "8 mm", mass = "4 g" }
+impact = { velocity = "825 m/s" }
+numerics = { level = 0 }
+plate = { thickness = "4 mm", resistance = "2600 MPa" }
+objectives = [{ measure = "areal_density" }, { measure = "residual_energy_fraction" }]
+search = { designs = 6, hits = 16, most_hits = 16, confirm_hits = 64 }
+[[references]]
+name = "published"
+[references.plate]
+thickness = "3 mm"
+resistance = "2600 MPa"
+pattern = { shape = "circle", diameter = "4 mm", spacing = "8 mm" }
+[variables]
+thickness = ["2 mm", "3 mm", "4 mm"]
+[[variables."plate.pattern"]]
+name = "holes"
+shape = "circle"
+diameter = "5 mm"
+spacing = "8 mm"
+[[variables."plate.pattern"]]
+name = "solid"
+shape = "none"
+"""
+
+
+@pytest.fixture(scope="session")
+def searched() -> xarray.Dataset:
+    """A small search for designs, with its front."""
+    from warpimpact.optimisation.design import design_from
+    from warpimpact.optimisation.optimise import optimise
+
+    return optimise(design_from(SEARCHED, "design", Path()))

@@ -66,7 +66,8 @@ def add_report(commands: Commands) -> None:
         summary="write a report as one HTML file",
         description="Write a report of one or several results as one HTML file that works offline. It shows the "
         "campaign, the plates, interactive maps and trajectories, numbers with intervals, and the limits of the model. "
-        "A posterior is reported alone: its parameters, what they explain, and its figures.",
+        "A posterior is reported alone: its parameters, what they explain, and its figures. So is a search for "
+        "designs: a click on a point of its front shows the plate, its map and its campaign.",
         example="report slotted.nc -o slotted.html",
     )
     add_results(parser)
@@ -86,6 +87,7 @@ def add_report(commands: Commands) -> None:
 def _report(arguments: argparse.Namespace) -> None:
     from warpimpact.report.report import write_report
     from warpimpact.results import files
+    from warpimpact.results.front import is_front
     from warpimpact.results.posterior_file import is_posterior
 
     paths = arguments.results
@@ -94,6 +96,9 @@ def _report(arguments: argparse.Namespace) -> None:
     check_output(output, overwrite=arguments.overwrite)
     if any(map(is_posterior, paths)):
         _report_posterior(paths, output)
+        return
+    if any(map(is_front, paths)):
+        _report_front(paths, output, arguments.campaign_folder)
         return
     by_name = named(paths)
     with ExitStack() as stack:
@@ -121,4 +126,14 @@ def _report_posterior(paths: list[Path], output: Path) -> None:
             f"got {len(paths)} files, one of which is a posterior, but a posterior is reported alone"
         )
     write_posterior_report(posterior_file.read(paths[0]), output)
+    print(output)
+
+
+def _report_front(paths: list[Path], output: Path, folder: Path | None) -> None:
+    from warpimpact.report.front import write_front_report
+    from warpimpact.results import files, front
+
+    if len(paths) > 1:
+        raise files.ResultError(f"got {len(paths)} files, one of which is a search, but a search is reported alone")
+    write_front_report(front.read(paths[0]), output, folder or paths[0].parent)
     print(output)

@@ -43,12 +43,14 @@ class _Asked(Model):
         angle: inclination beyond which a core counts as tilted [rad].
         standoff: distance behind the rear face [m]; the largest of the campaign unless given.
         threats: over several threats the "worst" one counts, or their weighted "mean".
+        layer: whose thickness a limit thickness is; 0 is the plate.
     """
 
     measure: str
     angle: Annotated[Obliquity, Field(validate_default=True)] = "30 deg"
     standoff: PositiveLength | None = None
     threats: Literal["worst", "mean"] = "worst"
+    layer: Annotated[int, Field(strict=True, ge=0)] = 0
 
     @model_validator(mode="after")
     def _is_known(self) -> _Asked:
@@ -59,9 +61,9 @@ class _Asked(Model):
         return self
 
     @property
-    def key(self) -> tuple[str, float, float | None]:
-        """What tells two effects apart."""
-        return measures.effect_of(self.measure), float(self.angle), self.standoff
+    def key(self) -> measures.Key:
+        """The effect that it is made of."""
+        return measures.Key(measures.effect_of(self.measure), float(self.angle), self.standoff, self.layer)
 
 
 class Objective(_Asked):
@@ -231,7 +233,7 @@ class Design:
     references: tuple[Reference, ...]
     constraints: Constraints
     search: Search
-    keys: tuple[tuple[str, float, float | None], ...] = field(default=())
+    keys: tuple[measures.Key, ...] = field(default=())
 
     @property
     def asked(self) -> tuple[Objective | Bound, ...]:
@@ -287,6 +289,7 @@ def design_from(text: str, name: str, folder: Path) -> Design:
     names = [one.name for one in threats] + [one.name for one in asking.references]
     if twice := next((one for one in names if names.count(one) > 1), None):
         raise CampaignError(f'{name}: got the name "{twice}" twice, but each threat and reference needs its own')
+    _check_needs(asking, data, space, name)
     keys = dict.fromkeys(
         one.key for one in (*asking.objectives, *asking.bounds) if one.measure != measures.AREAL_DENSITY
     )
@@ -305,3 +308,24 @@ def design_from(text: str, name: str, folder: Path) -> Design:
         search=asking.search,
         keys=tuple(keys),
     )
+
+
+def _check_needs(asking: Asking, data: Mapping[str, Any], space: Space, name: str) -> None:
+    """Refuse a measure that the campaign does not have.
+
+    Raises:
+        CampaignError: names it, and what it needs.
+    """
+    output = data.get("output", {})
+    layered = "layer" in data or any(one.place == "layer" for one in space.variables)
+    missing = {
+        "layer": "" if layered else "a table [[layer]]",
+        "bending": "" if output.get("bending") is True else "output.bending = true and core.strength",
+        "standoff": "output.standoffs" if output.get("standoffs") == [] else "",
+    }
+    for table in ("objectives", "bounds"):
+        for place, one in enumerate(getattr(asking, table)):
+            if one.measure != measures.AREAL_DENSITY:
+                needs = missing.get(measures.EFFECTS[one.key.effect].needs, "")
+                if needs:
+                    raise CampaignError(f'{name}: {table}[{place}].measure = "{one.measure}" needs {needs}')

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from warpimpact.analysis.effects import EFFECT_VARIABLES, Effect, effects
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.optimisation.design import Design, Threat
+from warpimpact.optimisation.limits import limits_level, limits_said
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -22,7 +23,6 @@ from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.units import Radians
-from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.many import simulate_many
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of
@@ -82,7 +82,7 @@ def campaign_of(design: Design, tables: Mapping[str, Any], threat: Threat, seed:
     """
     seed = design.search.seed if seed is None else seed
     sampling = {"sampling": "sobol", "count": MOST_HITS, "seed": seed, "irreducible": is_even(tables)}
-    kept = {key: value for key, value in tables.get("hits", {}).items() if key in ("area", "replicates")}
+    kept = {key: value for key, value in tables.get("hits", {}).items() if key == "area"}
     return design.campaign(dict(tables) | {"hits": kept | sampling}, threat)
 
 
@@ -111,6 +111,11 @@ def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: 
     for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
         table = narrow_table(scene, shots, one, EFFECT_VARIABLES)
         said.append(Said(said_of(design, table), np.array([shots.hit_y, shots.hit_z]), seconds / len(jobs)))
+    for job, of, (_, scene, shots) in zip(jobs, said, scenes, strict=True):
+        numerics = Numerics.model_validate_json(job.level)
+        for row, key in enumerate(design.keys):
+            if key.is_limit and not (job.solid and key.layer):
+                of.values[row] = limits_said(scene, shots, key, numerics, Worker(device, threads))
     return said
 
 
@@ -138,7 +143,7 @@ def said_of(design: Design, table: Table) -> Array:
     as a solid plate has no base."""
     said = np.full((len(design.keys), table.sizes["hit"]), np.nan)
     for row, key in enumerate(design.keys):
-        if (effect := effects_in(table, *key[1:]).get(key[0])) is not None:
+        if (effect := effects_in(table, key.angle, key.standoff).get(key.effect)) is not None:
             said[row] = effect.values(table)
     return said
 
@@ -177,5 +182,8 @@ def level_of(design: Design, job: Job, device: str = "auto") -> str:
     if campaign.numerics.explicit is not None:
         return campaign.numerics.model_dump_json()
     asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
-    found: HitErrors = pilot_of(campaign.scene, hits_of(campaign, 0, pilot_size(asked.asked)), asked, Worker(device))
-    return found.numerics.model_dump_json()
+    shots, worker = hits_of(campaign, 0, pilot_size(asked.asked)), Worker(device)
+    found = [limits_level(campaign.scene, shots, key, asked, worker) for key in design.keys if key.is_limit]
+    if len(found) < len(design.keys):
+        found.append(pilot_of(campaign.scene, shots, asked, worker).numerics)
+    return max(found, key=lambda one: one.level or 0).model_dump_json()

@@ -14,6 +14,7 @@ from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import campaign_of
 from warpimpact.scene import EllipsePattern, Plate
 from warpimpact.scene.patterns.lattice import LatticePattern
+from warpimpact.solver.limit import check_arrests
 
 INVALID = "a campaign that is valid"
 
@@ -56,6 +57,11 @@ def checked(design: Design, tables: Mapping[str, Any]) -> Checked:
     except CampaignError as error:
         text = str(error).removeprefix(f"{design.name}: ")
         return Checked(None, (Violation(INVALID, 1.0, text),))
+    try:
+        if any(key.is_limit for key in design.keys):
+            check_arrests(campaign.scene)
+    except ValueError as error:
+        return Checked(campaign, (Violation(INVALID, 1.0, str(error)),))
     return Checked(campaign, tuple(_violations(design, campaign)))
 
 

@@ -15,11 +15,27 @@ class Kind(NamedTuple):
         higher_is_better: for whoever is behind the plate.
         is_share: whether it is a share of the shots, which has no worst tenth.
         needs: what a campaign needs to have it: "standoff", "layer", "bending" or "".
+        is_limit: whether a search of limits tells it.
     """
 
     higher_is_better: bool
     is_share: bool
     needs: str = ""
+    is_limit: bool = False
+
+
+class Key(NamedTuple):
+    """What tells two effects of a design file apart: the name, the angle [rad] and the stand-off [m] of what is tilted,
+    and the layer whose thickness is a limit."""
+
+    effect: str
+    angle: float
+    standoff: float | None
+    layer: int
+
+    @property
+    def is_limit(self) -> bool:
+        return EFFECTS[self.effect].is_limit
 
 
 EFFECTS = {
@@ -32,6 +48,9 @@ EFFECTS = {
     "base_perforated_share": Kind(False, True, "layer"),
     "base_pierced_share": Kind(False, True, "layer"),
     "base_depth": Kind(False, False, "layer"),
+    "limit_velocity": Kind(True, False, is_limit=True),
+    "limit_thickness": Kind(False, False, is_limit=True),
+    "limit_areal_density": Kind(False, False, is_limit=True),
 }
 """Measures of analysis/effects.py by their names."""
 

@@ -37,6 +37,9 @@ LABELS = {
     "base_perforated_share": ("P(base perforated)", ""),
     "base_pierced_share": ("P(base pierced)", ""),
     "base_depth": ("depth in the base", "mm"),
+    "limit_velocity": ("limit velocity", "m/s"),
+    "limit_thickness": ("limit thickness", "mm"),
+    "limit_areal_density": ("areal density needed", "kg/m²"),
 }
 
 
@@ -46,6 +49,7 @@ def label_of(one: Objective | Bound) -> str:
     text = name.format(angle=np.degrees(float(one.angle)))
     if one.standoff is not None:
         text += f" at {1e3 * one.standoff:g} mm"
+    text += f" of layer {one.layer}" if one.layer else ""
     text += ", worst tenth" if one.measure.endswith(WORST_TENTH) else ""
     return f"{text} [{unit}]" if unit else text
 

@@ -25,24 +25,18 @@ def front_lines(dataset: xarray.Dataset) -> Iterator[str]:
     if told[f.OUTCOME] == f.NONE_FEASIBLE:
         yield from _nearest(dataset)
         return
-    asked = list(dataset[f.LABEL].values)
     on_front, confirmed = int(dataset[f.ON_FRONT].sum()), dataset.sizes["front"]
     yield f"front: {on_front} designs, of which {confirmed} were computed again with fresh hits"
     for place in range(confirmed):
-        numbers = [_number(dataset, f.FRESH, f.FRESH_LOW, f.FRESH_HIGH, place, one) for one in range(len(asked))]
         notes = []
         if (group := int(dataset[f.GROUP][place])) != place:
             notes.append(f"cannot be told from {dataset[f.FILE].values[group]}")
         if not int(dataset[f.KEPT][place]):
             notes.append("not on the front by fresh hits")
-        yield f"{dataset[f.FILE].values[place]}: {', '.join(numbers)}{''.join(f'; {note}' for note in notes)}"
+        yield f"{dataset[f.FILE].values[place]}: {'; '.join([', '.join(numbers_of_front(dataset, place)), *notes])}"
         yield f"    {design_text(dataset, int(dataset[f.NUMBER][place]))}"
     for place, name in enumerate(dataset[f.REFERENCE].values):
-        numbers = [
-            _number(dataset, f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH, place, one)
-            for one in range(len(asked))
-        ]
-        yield f"{name}: {', '.join(numbers)}"
+        yield f"{name}: {', '.join(numbers_of_reference(dataset, place))}"
         yield from _against(dataset, place)
     yield from _shrinkage(dataset)
 
@@ -67,14 +61,22 @@ def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:
             )
 
 
-def _number(dataset: xarray.Dataset, value: str, low: str, high: str, place: int, asked: int) -> str:
-    label = str(dataset[f.LABEL].values[asked])
-    name, _, unit = label.removesuffix("]").partition(" [")
-    found, ends = (
-        float(dataset[value][place, asked]),
-        (float(dataset[low][place, asked]), float(dataset[high][place, asked])),
-    )
-    within = "" if ends[0] == ends[1] else f" ({interval_text(*ends, '{:.4g}'.format)})"
+def numbers_of_front(dataset: xarray.Dataset, place: int) -> list[str]:
+    """Objectives and bounds of a design of the front by fresh hits, with their intervals."""
+    names = (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)
+    return [_number(dataset, names, place, asked) for asked in range(dataset.sizes["asked"])]
+
+
+def numbers_of_reference(dataset: xarray.Dataset, place: int) -> list[str]:
+    """The same of a target to compare with."""
+    names = (f.REFERENCE_FOUND, f.REFERENCE_LOW, f.REFERENCE_HIGH)
+    return [_number(dataset, names, place, asked) for asked in range(dataset.sizes["asked"])]
+
+
+def _number(dataset: xarray.Dataset, names: tuple[str, str, str], place: int, asked: int) -> str:
+    name, _, unit = str(dataset[f.LABEL].values[asked]).removesuffix("]").partition(" [")
+    found, low, high = (float(dataset[one][place, asked]) for one in names)
+    within = "" if low == high else f" ({interval_text(low, high, '{:.4g}'.format)})"
     return f"{name} {number_text(found)}{within}{' ' + unit if unit else ''}"
 
 

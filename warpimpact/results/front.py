@@ -13,6 +13,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import netCDF4
 import numpy as np
 
 from warpimpact.records.variable import Variable
@@ -136,3 +137,12 @@ def read(path: Path) -> xarray.Dataset:
     if DESIGN not in found.attrs or not {FOUND, VALUE, HITS} <= {*found.variables}:
         raise ResultError(f"{path}: is no search for designs, as warpimpact optimise writes")
     return found
+
+
+def is_front(path: Path) -> bool:
+    """Whether a file is a search for designs."""
+    try:
+        with netCDF4.Dataset(path) as file:
+            return DESIGN in file.ncattrs()
+    except OSError:
+        return False

@@ -12,7 +12,10 @@ import pytest
 import xarray
 
 from warpimpact import Campaign
+from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
+from warpimpact.cli import main
+from warpimpact.optimisation.confirm import fresh_seed
 from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import read_design
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
@@ -20,7 +23,7 @@ from warpimpact.optimisation.searcher import Searcher, hypervolume
 from warpimpact.optimisation.space import Space, Variable
 from warpimpact.optimisation.text import front_lines
 from warpimpact.results import front as f
-from warpimpact.results.files import OutputError
+from warpimpact.results.files import OutputError, read
 from warpimpact.runs.shards import folder_of as folder_of_parts
 
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
@@ -169,3 +172,23 @@ def test_workers_do_not_change_the_front(tmp_path: Path) -> None:
         optimise_to_file(one, tmp_path / "many.nc", crew=crew)
     optimise_to_file(one, tmp_path / "one.nc", crew=local_crew("cpu"))
     _same(f.read(tmp_path / "many.nc"), f.read(tmp_path / "one.nc"))
+
+
+@pytest.mark.parametrize("measure", ["limit_velocity", "limit_thickness", "limit_areal_density"])
+def test_a_limit_is_that_of_the_command(measure: str, tmp_path: Path) -> None:
+    asked = f'[[objectives]]\nmeasure = "{measure}"\n'
+    one = design(HOLES, asked, SEARCH.replace("most_hits = 64", "most_hits = 16"), folder=tmp_path)
+    (path,) = optimise_to_file(one, tmp_path / "front.nc")
+    found = f.read(tmp_path / "front.nc")
+    hits = f'[hits]\nsampling = "sobol"\ncount = 256\nirreducible = true\nseed = {fresh_seed(one)}'
+    path.write_text(path.read_text().partition("[hits]")[0] + hits)
+    quantity = "velocity" if measure == "limit_velocity" else "thickness"
+    assert main(["limit", str(path), "--quantity", quantity, "-o", str(tmp_path / "limit.nc"), "-q"]) == 0
+    (told,) = [effect for effect in effectiveness(read(tmp_path / "limit.nc")) if effect.name == measure]
+    assert float(found[f.FRESH][0, 0]) == pytest.approx(told.value, rel=1e-6)
+
+
+def test_a_limit_of_what_weakens_by_time_is_refused() -> None:
+    asked = '[[objectives]]\nmeasure = "limit_velocity"\n'
+    with pytest.raises(CampaignError, match="weakens by time"):
+        optimise(design("degradation = 0.8", HOLES, asked, SEARCH))

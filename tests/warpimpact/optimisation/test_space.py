@@ -66,6 +66,8 @@ def test_points_of_a_finite_space_each_once() -> None:
         (("[variables]",), "objectives: is missing, but must be given"),
         ((WEIGHT_AND_ENERGY, '[[bounds]]\nmeasure = "stopped_share"'), "needs at_most or at_least"),
         ((WEIGHT_AND_ENERGY, '[[bounds]]\nmeasure = "stopped_share"\nat_most = "much"'), "bounds[0].at_most"),
+        (('[[objectives]]\nmeasure = "base_depth"',), "needs a table [[layer]]"),
+        (('[[objectives]]\nmeasure = "broken_share"',), "needs output.bending = true"),
         ((WEIGHT_AND_ENERGY, "[search]\nhits = 64\nmost_hits = 32"), "most_hits = 32"),
         ((WEIGHT_AND_ENERGY, "[stop]\nhalf_width = 1"), "a design file takes no [stop]"),
         ((WEIGHT_AND_ENERGY, '[[threats]]\nname = "a"\n[[threats]]\nname = "a"'), 'the name "a" twice'),

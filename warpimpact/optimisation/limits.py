@@ -1,0 +1,51 @@
+"""Limits of the hits of a design: what they say where a search asks for a limit velocity or a limit thickness."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.kernels.status import Status
+from warpimpact.optimisation.measures import Key
+from warpimpact.scene import Numerics, Scene, Shots
+from warpimpact.solver.limit import (
+    HIGHEST_VELOCITY,
+    THICKNESS_TOLERANCE,
+    VELOCITY_TOLERANCE,
+    Sought,
+    limits,
+    pilot_of_limits,
+    thickest,
+)
+from warpimpact.solver.pilot import limits_pilot_size
+from warpimpact.solver.worker import Worker
+
+Array = NDArray[np.float64]
+
+
+def sought_by(scene: Scene, key: Key) -> Sought:
+    """The limit that a measure is made of, with the tolerance of `warpimpact limit`."""
+    if key.effect == "limit_velocity":
+        return Sought("velocity", VELOCITY_TOLERANCE, HIGHEST_VELOCITY)
+    return Sought("thickness", THICKNESS_TOLERANCE, thickest(scene, key.layer), key.layer)
+
+
+def limits_said(scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker: Worker) -> Array:
+    """What the limits of shots say, as the measures of analysis/effects.py have it: m/s, mm or kg/m², shape [shots];
+    NaN where the computation failed."""
+    sought = sought_by(scene, key)
+    found = limits(scene, shots, sought, numerics, worker)
+    value = np.minimum(found.value, sought.highest)
+    value = np.where(found.outcomes.status >= Status.UNFINISHED, np.nan, value)
+    if key.effect == "limit_velocity":
+        return np.asarray(value)
+    if key.effect == "limit_thickness":
+        return np.asarray(1e3 * value)
+    layer = scene.target.layers[key.layer]
+    return np.asarray(scene.target.areal_density + layer.areal_density * (value / layer.thickness - 1.0))
+
+
+def limits_level(scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker: Worker) -> Numerics:
+    """The numerics that a pilot finds for a limit."""
+    some = shots[: limits_pilot_size(numerics.asked)]
+    return pilot_of_limits(scene, some, sought_by(scene, key), numerics, worker).numerics

@@ -1,0 +1,213 @@
+"""A report of a search for designs: one HTML file in which a click on a point shows its plate, its map and its
+campaign; it works without a network."""
+
+from __future__ import annotations
+
+from base64 import b64encode
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from numpy.typing import NDArray
+
+from warpimpact.campaign.campaign import Campaign
+from warpimpact.campaign.text import CampaignError, parsed
+from warpimpact.optimisation.evaluate import is_even
+from warpimpact.optimisation.text import design_text, front_lines, numbers_of_front, numbers_of_reference
+from warpimpact.plotting.front import front_figure, front_leaders
+from warpimpact.report.words import svg_path
+from warpimpact.results import attributes as attr
+from warpimpact.results import front as f
+from warpimpact.results.files import aside
+from warpimpact.scene.symmetry import IDENTITY, symmetries
+
+Array = NDArray[np.float64]
+
+_WIDTH, _HEIGHT, _LEFT, _TOP, _ROOM = 900.0, 520.0, 70.0, 10.0, 44.0
+"""Of the chart [px], and what is left of it for labels."""
+_SIDE = 30e-3
+"""Of the drawn part of a plate [m]."""
+_PIXELS = 160
+"""Of a map along its longer side."""
+
+
+def write_front_report(dataset: xarray.Dataset, path: Path, folder: Path) -> None:
+    """Write the report of a search, whole or not at all.
+
+    Args:
+        folder: of the files that its campaigns name.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    goals = np.flatnonzero(np.isnan(dataset[f.LIMIT].values))
+    across, up = int(goals[0]), int(goals[min(1, len(goals) - 1)])
+    chart = _Chart(dataset, across, up)
+    leaders = {*front_leaders(dataset).tolist()}
+    designs = [
+        _design(dataset, place, chart, folder) | {"leads": place in leaders} for place in range(dataset.sizes["front"])
+    ]
+    references = [
+        {"name": str(name), "numbers": numbers_of_reference(dataset, place)}
+        | chart.at(dataset[f.REFERENCE_FOUND].values[place])
+        for place, name in enumerate(dataset[f.REFERENCE].values)
+    ]
+    environment = Environment(
+        loader=PackageLoader("warpimpact.report", ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    )
+    page = environment.get_template("front.html").render(
+        title=str(dataset.attrs[attr.TITLE]),
+        made=str(dataset.attrs[attr.HISTORY]),
+        version=str(dataset.attrs[attr.WARPIMPACT_VERSION]),
+        chart=chart.drawn(),
+        designs=designs,
+        references=references,
+        picture=_picture(dataset, folder),
+        text="\n".join(front_lines(dataset)),
+        design=str(dataset.attrs[f.DESIGN]),
+    )
+    with aside(path) as file:
+        file.write_text(page, encoding="utf-8")
+
+
+class _Chart:
+    """Two objectives as places of an SVG."""
+
+    def __init__(self, dataset: xarray.Dataset, across: int, up: int) -> None:
+        from matplotlib.ticker import MaxNLocator
+
+        self._dataset, self._shown = dataset, [across, up]
+        names = (f.FOUND, f.FRESH, f.FRESH_LOW, f.FRESH_HIGH, f.SOLID, f.REFERENCE_FOUND)
+        every = np.concatenate([dataset[name].values[:, self._shown] for name in names])
+        every = every[np.isfinite(every).all(axis=1)]
+        low, high = every.min(axis=0), every.max(axis=0)
+        room = np.where(high > low, 0.04 * (high - low), 1.0)
+        self._low, self._high = low - room, high + room
+        self._ticks = [MaxNLocator(7).tick_values(*ends) for ends in zip(low, high, strict=True)]
+
+    def at(self, found: Array) -> dict[str, float]:
+        """Place of objectives and bounds, shape [asked]."""
+        x, y = self._place(np.asarray(found)[self._shown])
+        return {"x": x, "y": y}
+
+    def _place(self, shown: Array) -> tuple[float, float]:
+        share = (shown - self._low) / (self._high - self._low)
+        right, bottom = _WIDTH - 10.0, _HEIGHT - _ROOM
+        return round(_LEFT + float(share[0]) * (right - _LEFT), 1), round(bottom - float(share[1]) * (bottom - _TOP), 1)
+
+    def drawn(self) -> dict[str, Any]:
+        """What the page draws beside the front."""
+        dataset, labels = self._dataset, self._dataset[f.LABEL].values
+        found, solid = dataset[f.FOUND].values[:, self._shown], dataset[f.SOLID].values[:, self._shown]
+        every = (self._place(one) for one in found if np.isfinite(one).all())
+        line = [self._place(one) for one in solid[np.argsort(solid[:, 0])] if np.isfinite(one).all()]
+        ticks = [
+            [one for one in at if low <= one <= high]
+            for at, low, high in zip(self._ticks, self._low, self._high, strict=True)
+        ]
+        middle = 0.5 * (self._low + self._high)
+        return {
+            "width": _WIDTH,
+            "height": _HEIGHT,
+            "left": _LEFT,
+            "right": _WIDTH - 10.0,
+            "top": _TOP,
+            "bottom": _HEIGHT - _ROOM,
+            "across": [(self._place(np.array([one, middle[1]]))[0], f"{one:g}") for one in ticks[0]],
+            "up": [(self._place(np.array([middle[0], one]))[1], f"{one:g}") for one in ticks[1]],
+            "label_across": str(labels[self._shown[0]]),
+            "label_up": str(labels[self._shown[1]]),
+            "every": "".join(f"M{x},{y}h0" for x, y in every),
+            "solid": "M" + "L".join(f"{x},{y}" for x, y in line)
+            if len(line) > 1 and self._shown[0] != self._shown[1]
+            else "",
+        }
+
+    def bar(self, place: int) -> str:
+        """The interval of a design of the front as a path."""
+        ends = [self._dataset[name].values[place, self._shown] for name in (f.FRESH, f.FRESH_LOW, f.FRESH_HIGH)]
+        if not np.isfinite(ends).all():
+            return ""
+        (x, _), (_, low), (_, high) = (self._place(one) for one in ends)
+        return f"M{x},{low}V{high}"
+
+
+def _design(dataset: xarray.Dataset, place: int, chart: _Chart, folder: Path) -> dict[str, Any]:
+    """What the page shows of a design of the front; no drawing where a file of its campaign is not there any more."""
+    text = str(dataset[f.CAMPAIGN].values[place])
+    try:
+        campaign: Campaign | None = Campaign.from_text(text, name="front", folder=folder)
+    except CampaignError:
+        campaign = None
+    return {
+        "file": str(dataset[f.FILE].values[place]),
+        "numbers": numbers_of_front(dataset, place),
+        "variables": design_text(dataset, int(dataset[f.NUMBER][place])),
+        "campaign": text,
+        "bar": chart.bar(place),
+        "plate": None if campaign is None else _plate(campaign),
+        "map": None if campaign is None or f.HIT_VALUE not in dataset else _map(dataset, place, campaign, text),
+        **chart.at(dataset[f.FRESH].values[place]),
+    }
+
+
+def _plate(campaign: Campaign) -> dict[str, Any]:
+    half = 0.5 * _SIDE
+    outlines = campaign.plate.pattern.outlines((-half, half), (-half, half))
+    return {"path": svg_path(outlines), "y": 1e3 * _SIDE, "z": 1e3 * _SIDE}
+
+
+def _map(dataset: xarray.Dataset, place: int, campaign: Campaign, text: str) -> dict[str, Any]:
+    """The unit cell, coloured by what the nearest hit says of the first effect."""
+    from PIL import Image
+
+    values = dataset[f.HIT_VALUE].values[place, 0]
+    y, z = dataset[f.HIT_Y].values[place], dataset[f.HIT_Z].values[place]
+    cell = campaign.plate.pattern.unit_cell
+    group = symmetries(campaign.plate, campaign.impact) if is_even(parsed(text, "front")) else (IDENTITY,)
+    images = np.concatenate([np.transpose(one.image(y, z, cell)) for one in group])
+    shown, low, high = _coloured(images, np.tile(values, len(group)), cell)
+    buffer = BytesIO()
+    Image.fromarray(shown).save(buffer, "PNG")
+    half = [0.5 * side for side in cell]
+    effects = [
+        str(label)
+        for label, name in zip(dataset[f.LABEL].values, dataset[f.ASKED].values, strict=True)
+        if not str(name).startswith("areal_density")
+    ]
+    return {
+        "image": f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}",
+        "path": svg_path(campaign.plate.pattern.outlines((-half[0], half[0]), (-half[1], half[1]))),
+        "y": 1e3 * cell[0],
+        "z": 1e3 * cell[1],
+        "scale": 360.0 / (1e3 * max(cell)),
+        "label": effects[0].removesuffix(", worst tenth"),
+        "low": low,
+        "high": high,
+    }
+
+
+def _coloured(places: Array, values: Array, cell: tuple[float, float]) -> tuple[NDArray[np.uint8], float, float]:
+    """Pixels of a cell by the nearest of some places in it, z up, and the ends of the scale."""
+    from matplotlib import colormaps
+    from scipy.spatial import KDTree
+
+    known = np.isfinite(values)
+    low, high = (float(values[known].min()), float(values[known].max())) if known.any() else (0.0, 1.0)
+    counts = [max(8, round(_PIXELS * side / max(cell))) for side in cell]
+    y, z = (((np.arange(count) + 0.5) / count - 0.5) * side for count, side in zip(counts, cell, strict=True))
+    at = np.stack(np.meshgrid(y, z[::-1]), axis=-1).reshape(-1, 2)
+    sides = np.array(cell)
+    nearest = KDTree(places % sides % sides, boxsize=sides).query(at % sides % sides)[1]
+    share = (values[nearest] - low) / ((high - low) or 1.0)
+    colours = colormaps["viridis"](np.ma.masked_invalid(share), bytes=True)[:, :3]
+    return np.asarray(colours, dtype=np.uint8).reshape(counts[1], counts[0], 3), low, high
+
+
+def _picture(dataset: xarray.Dataset, folder: Path) -> str:
+    buffer = BytesIO()
+    front_figure(dataset, folder).savefig(buffer, format="png", dpi=90)
+    return f"data:image/png;base64,{b64encode(buffer.getvalue()).decode()}"
