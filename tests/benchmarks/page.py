@@ -23,6 +23,7 @@ RUNS: Mapping[str, Sequence[str]] = {
     "peers": ("peers.py", "--hits", "256"),
     "throughput": ("throughput.py",),
     "roads": ("roads.py",),
+    "many": ("many.py",),
     "overheads": ("overheads.py",),
     "design_page": ("design_page.py",),
     "statistics_cost": (
@@ -71,6 +72,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[Row]:
         ("throughput", _throughput),
         ("peers", _peers),
         ("roads", _roads),
+        ("many", _many),
         ("overheads", _overheads),
         ("design_page", _design_page),
         ("statistics_cost", _statistics),
@@ -144,6 +146,18 @@ def _roads(values: Mapping[str, Any]) -> Iterator[Row]:
             f"pilot {one['pilot_share']:.0%}" + ("" if one["kept"] else "; promise not kept"),
             f"processor time of a run of {values['run']} hits with its pilot",
             f"least of {values['rounds']} rounds, {values['hits']} hits",
+        )
+
+
+def _many(values: Mapping[str, Any]) -> Iterator[Row]:
+    for name, one in values["contenders"].items():
+        yield Row(
+            f"level {values['level']}, hits per second of many scenes in one call",
+            name,
+            f"{_rounded(one['one_core'])} on one core ({one['share']:.0%} of one scene), "
+            f"{_rounded(one['all_cores'])} on all",
+            "processor time of one core; wall time on all",
+            f"least of {values['rounds']} rounds",
         )
 
 
