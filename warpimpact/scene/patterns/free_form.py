@@ -68,7 +68,7 @@ class Wave(Model):
     Attributes:
         along_y, along_z: k and l, periods in the cell.
         amplitude: as a multiple of those of the others.
-        phase: [rad].
+        phase: how far the wave is shifted [rad].
     """
 
     along_y: Annotated[int, Field(strict=True, ge=-6, le=6)]
