@@ -149,6 +149,9 @@
     if (line.kind === "refused") {
       own.answered = true;
       refuse(line.sentence);
+      toml = "";
+      at("save").disabled = true;
+      at("status").textContent = shown ? "No map of this design. The one below is of the design before." : "No map.";
     } else if (line.kind === "plate") {
       showPlate(line);
     } else if (line.kind === "numbers") {
@@ -172,6 +175,7 @@
 
   function showPlate({ plate, groups, choices, toml: file, title, notes }) {
     toml = file;
+    at("save").disabled = false;
     if (document.activeElement !== at("title")) at("title").value = title;
     document.title = `${title} · warpimpact design`;
     controls(groups, choices);
@@ -379,7 +383,11 @@
   async function opened() {
     try {
       const held = await address.unpacked(location.hash.slice(1));
-      Object.assign(state, { design: held.design, pins: held.pins ?? [], variable: held.variable ?? state.variable });
+      if (typeof held.design !== "object") return false;
+      const pins = (Array.isArray(held.pins) ? held.pins : []).filter((one) => typeof one?.design === "object");
+      state.design = held.design;
+      state.pins = pins.map(({ name, design }) => ({ name: String(name).slice(0, 80), design }));
+      state.variable = String(held.variable ?? state.variable);
       return true;
     } catch {
       return false;

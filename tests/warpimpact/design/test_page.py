@@ -84,6 +84,8 @@ def test_an_impossible_plate_shows_the_sentence(page: Any) -> None:
     page.wait(lambda: page.text("#sentence"))
     sentence = "plate.pattern: got length = 12 mm, but the length must be at least the width, 14 mm"
     assert page.text("#sentence") == sentence
+    assert page.text("#status").startswith("No map of this design.")
+    assert page.find("#save")[0].get_property("disabled")  # there is no campaign that run takes
     move(page, "control-plate-pattern-width", 4.0)
     page.wait(lambda: not page.text("#sentence"))
     assert page.errors() == []
@@ -139,6 +141,32 @@ def test_nothing_leaves_this_machine(page: Any) -> None:
         "return performance.getEntriesByType('resource').map((e) => new URL(e.name).host)"
     )
     assert set(hosts) == {urlsplit(page.driver.current_url).netloc}
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        {"design": "no table", "pins": 3},
+        {"pins": "<img src=x>", "variable": ["<img src=x>"]},
+        {"pins": [None, {"name": "<img src=x onerror='document.title=1'>"}]},
+    ],
+)
+def test_an_address_of_others_is_only_text(page: Any, small: Path, held: dict[str, Any]) -> None:
+    own = tomllib.loads(small.read_text()) | {"title": "of others"}
+    held = {"design": own} | held
+    if isinstance(held["pins"], list):
+        held["pins"][1]["design"] = own
+    packed = page.driver.execute_async_script("address.packed(arguments[0]).then(arguments[1])", held)
+    address = page.driver.current_url.partition("#")[0]
+    page.open("about:blank")
+    page.open(f"{address}#{packed}")
+    page.wait(lambda: "Complete" in page.text("#status"), 120.0)
+    assert page.values("#title") == [
+        "of others" if held["design"] is own else "7.62 mm P80 core against a slotted plate"
+    ]
+    assert ("<img src=x" in page.text("#maps")) == isinstance(held["pins"], list)
+    assert not page.find("img[src=x]")
+    assert page.errors() == []
 
 
 @pytest.mark.parametrize("width", [1400, 390])
