@@ -43,8 +43,6 @@ def build(variant: Variant) -> SimpleNamespace:
         second: wp.array(dtype=real)
         rotary: wp.array(dtype=real)
 
-    AllSections = wp.array(dtype=Sections) if variant.tabled and variant.bends else Sections
-
     @wp.struct
     class Bending:
         """The largest bending moment [N m] and nominal stress [Pa] so far, and where behind the nose [m].
@@ -114,7 +112,7 @@ def build(variant: Variant) -> SimpleNamespace:
         force, moment = vec3(), vec3()
         ahead = zero
         for index in range(surface.rings):
-            here = slot * surface.most_rings + index
+            here = use.core_surface.rings_before(surface, slot) + index
             area = zero
             if index >= found.first_ring and index <= found.last_ring:
                 area = touches.total_area[here]

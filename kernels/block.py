@@ -121,7 +121,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """As in the simple layout (kernels/contact.py), by all lanes of a block."""
         load = Load()
         begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
-        base = slot * surface.most_patches - begin
+        base = use.core_surface.patches_before(surface, slot) - begin
         use.contact.find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
         load.touching = use.lanes.any_of(use.contact.meet(plate, touches, base + begin, end - begin) > zero)
         if load.touching:

@@ -40,6 +40,7 @@ def build(variant: Variant) -> SimpleNamespace:
     Footprint, Sums = use.footprint.Footprint, use.damping.Sums
     Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
     Plate, Fields, Window = use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
+    Box, far = use.plate_grid.Box, 2**20  # nodes away: beyond any window
     Law, Load = use.interaction.Law, use.rigid_body.Load
     ring_of, patch_at = use.core_surface.ring_of, use.core_surface.patch_at
     read, write = memory.build(real).read, memory.build(real).write
@@ -52,8 +53,8 @@ def build(variant: Variant) -> SimpleNamespace:
         `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
         that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
         of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
-        planes. `ring_area` is the area of all
-        patches of a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
+        planes. There `row`, `column` and `plane` are those of the cell, too. `ring_area` is the area of all patches of
+        a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
         `total_area` is the area of a ring in all layers of the target. `place` and `ahead` are the patch's place in the
         channels of earlier hits (kernels/channel.py).
         """
@@ -70,6 +71,9 @@ def build(variant: Variant) -> SimpleNamespace:
         ring_area: wp.array(dtype=real)
         sums: wp.array(dtype=Sums)
         total_area: wp.array(dtype=real)
+        row: wp.array(dtype=wp.int32)
+        column: wp.array(dtype=wp.int32)
+        plane: wp.array(dtype=wp.int32)
         place: wp.array(dtype=wp.int32)
         ahead: wp.array(dtype=real)
 
@@ -116,6 +120,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 plane = use.plate_grid.planes_at(window, patch.x)
                 write(touches.x, base + j, plane - wp.floor(plane))
                 index += wp.int32(wp.floor(plane)) * window.nodes
+                write_index(touches.row, base + j, cell.row)
+                write_index(touches.column, base + j, cell.column)
+                write_index(touches.plane, base + j, wp.int32(wp.floor(plane)))
             write_index(touches.cell, base + j, index)
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
@@ -151,6 +158,45 @@ def build(variant: Variant) -> SimpleNamespace:
                     gain -= ahead
                 use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, gain)
             j += 1
+
+    def extreme(sign: str, least: int) -> Any:
+        """The largest sign × place of the patches that give exposure to their nodes, at least `least`."""
+
+        # Native, because a compiler vectorises it only so.
+        @wp.func_native(
+            """
+        assert(start >= 0 && start + count <= gain.shape[0] && start + count <= place.shape[0]);
+        const auto* __restrict__ given = gain.data + start;
+        const int* __restrict__ at = place.data + start;
+        int found = LEAST;
+        for (int j = 0; j < count; ++j) {
+            const int here = given[j] > 0 ? SIGN at[j] : LEAST;
+            found = here > found ? here : found;
+        }
+        return found;
+        """.replace("SIGN", sign).replace("LEAST", str(least))
+        )
+        def extreme_of(
+            gain: wp.array(dtype=real), place: wp.array(dtype=wp.int32), start: wp.int32, count: wp.int32
+        ) -> wp.int32: ...
+
+        return extreme_of
+
+    farthest_up, farthest_down = extreme("+", -far), extreme("-", -far)
+
+    @wp.func
+    def gained_box(touches: Touches, whole: Box, start: wp.int32, count: wp.int32):
+        """The nodes to which patches give exposure, of the nodes that a step can touch. What spreads over several
+        planes costs more than to look at the patches."""
+        box = whole
+        if wp.static(variant.deep):
+            box.y_low = -farthest_down(touches.gain, touches.row, start, count)
+            box.y_high = farthest_up(touches.gain, touches.row, start, count) + 1
+            box.z_low = -farthest_down(touches.gain, touches.column, start, count)
+            box.z_high = farthest_up(touches.gain, touches.column, start, count) + 1
+            box.plane_low = -farthest_down(touches.gain, touches.plane, start, count)
+            box.plane_high = farthest_up(touches.gain, touches.plane, start, count) + 1
+        return box
 
     def summing(weakened: bool) -> Any:
         """The second pass, in a layer that weakens or in one that does not: without a branch inside."""
@@ -267,7 +313,9 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def clear_sums(surface: Surface, touches: Touches, slot: wp.int32):
         """No layer has touched yet."""
-        for index in range(slot * surface.most_rings, slot * surface.most_rings + surface.rings):
+        for index in range(
+            use.core_surface.rings_before(surface, slot), use.core_surface.rings_before(surface, slot) + surface.rings
+        ):
             touches.total_area[index] = zero
             touches.sums[index] = Sums()
 
@@ -315,8 +363,9 @@ def build(variant: Variant) -> SimpleNamespace:
         stress depends on the rate, and stable where a wall lies on the steep ramp of the contact.
         """
         load = Load()
+        box = found.box
         begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
-        base = slot * surface.most_patches - begin  # what a step touches stays in the fastest cache
+        base = use.core_surface.patches_before(surface, slot) - begin  # what a step touches stays in the fastest cache
         find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
         if wp.static(variant.burst):
             if window.pierced:
@@ -340,7 +389,7 @@ def build(variant: Variant) -> SimpleNamespace:
             area = zero
             if index >= found.first_closing and index <= found.last_closing:
                 area = meet(plate, touches, base + index * surface.around, surface.around)
-            touches.ring_area[slot * surface.most_rings + index] = area
+            touches.ring_area[use.core_surface.rings_before(surface, slot) + index] = area
             if area > zero:
                 first, last = wp.min(first, index), index
         if last >= 0:
@@ -350,15 +399,19 @@ def build(variant: Variant) -> SimpleNamespace:
                     # After all rings are found: a CPU has to wait before it reads single values that it has just
                     # stored as vectors.
                     for index in range(first, last + 1):
-                        if touches.ring_area[slot * surface.most_rings + index] > zero:
+                        if touches.ring_area[use.core_surface.rings_before(surface, slot) + index] > zero:
                             expose(surface, fields, window, touches, base + index * surface.around)
-                    use.exposure.spread(plate, fields, window, found.box)
+                    box = gained_box(
+                        touches, found.box, base + first * surface.around, (last + 1 - first) * surface.around
+                    )
+                    if box.y_high > box.y_low:
+                        use.exposure.spread(plate, fields, window, box)
             sums = Sums()
             if wp.static(variant.bends):
                 for index in range(first, last + 1):
-                    if touches.ring_area[slot * surface.most_rings + index] > zero:
+                    if touches.ring_area[use.core_surface.rings_before(surface, slot) + index] > zero:
                         part = summed(surface, law, fields, window, touches, pose, base, index, index)
-                        keep_sums(touches, slot * surface.most_rings + index, part)
+                        keep_sums(touches, use.core_surface.rings_before(surface, slot) + index, part)
                         sums = use.damping.joined(sums, part)
             else:
                 sums = summed(surface, law, fields, window, touches, pose, base, first, last)
@@ -371,7 +424,8 @@ def build(variant: Variant) -> SimpleNamespace:
             load.damping_ww = half * use.damping.damping_ww(slopes)
             if wp.static(variant.degrades):
                 if weakens(window):
-                    use.exposure.settle(plate, fields, window, found.box)
+                    if box.y_high > box.y_low:
+                        use.exposure.settle(plate, fields, window, box)
         return load
 
     own_fields = use.exposure.own_fields

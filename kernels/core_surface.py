@@ -56,8 +56,21 @@ def build(variant: Variant) -> SimpleNamespace:
         max_radius: real
         bounding_radius: real
 
-    # One surface comes by value, as one plate does (kernels/target.py).
-    Surfaces = wp.array(dtype=Surface) if variant.tabled else Surface
+    @wp.func
+    def rings_before(surface: Surface, slot: wp.int32):
+        """Rings of all slots before one."""
+        before = slot * surface.rings
+        if wp.static(variant.tabled):
+            before = slot * surface.most_rings
+        return before
+
+    @wp.func
+    def patches_before(surface: Surface, slot: wp.int32):
+        """Patches of all slots before one."""
+        before = slot * surface.rings * surface.around
+        if wp.static(variant.tabled):
+            before = slot * surface.most_patches
+        return before
 
     @wp.struct
     class Pose:

@@ -58,12 +58,11 @@ def build(variant: Variant) -> SimpleNamespace:
     scheme = nodal if variant.nodal else block if variant.window else contact
     loads, plates = scheme.build(variant), target.build(variant, scheme)
     reaches = (layers if variant.layered else one_plate).build(variant, scheme)
-    Surface, Surfaces, Pose = use.core_surface.Surface, use.core_surface.Surfaces, use.core_surface.Pose
-    Law = use.interaction.Law
+    Surface, Pose, Law = use.core_surface.Surface, use.core_surface.Pose, use.interaction.Law
     Body, State = use.rigid_body.Body, use.rigid_body.State
     Load, Change = use.rigid_body.Load, use.rigid_body.Change
     Fields, Footprint, Touches = loads.Fields, use.footprint.Footprint, loads.Touches
-    Sections, AllSections, Bending = use.bending.Sections, use.bending.AllSections, use.bending.Bending
+    Sections, Bending = use.bending.Sections, use.bending.Bending
     Shots, Pace, own = use.shots.Shots, use.shots.Pace, use.shots.own
     Target, Stack, Passage, Earlier = plates.Target, reaches.Stack, use.passage.Passage, use.earlier.Earlier
     Channels, Section, Box = use.channel.Channels, use.channel.Section, use.plate_grid.Box
@@ -126,8 +125,10 @@ def build(variant: Variant) -> SimpleNamespace:
         first: wp.int32,
         slots: wp.int32,
         order: wp.array(dtype=wp.int32),
-        surfaces: Surfaces,
-        all_sections: AllSections,
+        surface: Surface,
+        sections: Sections,
+        surfaces: wp.array(dtype=Surface),
+        all_sections: wp.array(dtype=Sections),
         target: Target,
         law: Law,
         shots: Shots,
@@ -146,20 +147,16 @@ def build(variant: Variant) -> SimpleNamespace:
         """March one shot per thread, or per block of threads: number k computes shot order[first + k] in slot k mod
         slots.
 
-        Shots at one plate are numbered in a row, and are computed one after another in one slot.
+        Shots at one plate are numbered in a row, and are computed one after another in one slot. All shots have one
+        surface, by value as one plate is (kernels/target.py), or each has one of the table.
         """
         shot = order[first + wp.tid()]
         slot = wp.tid() % slots
         body = use.shots.body_of(shots, shot)
         if wp.static(variant.tabled):
             surface = surfaces[own(shots.surface, shot)]
-            target = plates.of_shot(target, shots, shot)
-        else:
-            surface = surfaces
-        if wp.static(variant.tabled and variant.bends):
             sections = all_sections[own(shots.surface, shot)]
-        else:
-            sections = all_sections
+            target = plates.of_shot(target, shots, shot)
         law = plates.law_of(target, law, 0, shot)
         law.onset_share = own(shots.onset_share, shot)
         pace = use.shots.pace_of(pace, shots, shot)

@@ -92,9 +92,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.struct
     class Cell:
-        """The four nodes around a point: index of the first, and the point's place between them, 0 to 1."""
+        """The four nodes around a point: index, row and column of the first, and the point's place between them, 0 to
+        1."""
 
         index: wp.int32
+        row: wp.int32
+        column: wp.int32
         y: real
         z: real
 
@@ -212,6 +215,8 @@ def build(variant: Variant) -> SimpleNamespace:
         row, column = wp.floor(across), wp.floor(along)
         cell = Cell()
         cell.index = window.home + wp.int32(row) * window.cells_z + wp.int32(column)
+        cell.row = wp.int32(row) + window.cells_y // 2
+        cell.column = wp.int32(column) + window.cells_z // 2
         cell.y = across - row
         cell.z = along - column
         return cell

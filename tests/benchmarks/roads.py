@@ -122,11 +122,22 @@ def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics) -> Road:
     return Road(scene, shots, found.numerics, found.kept, time.process_time() - begin)
 
 
-def named(text: str, hits: int) -> Road:
-    """A road of ROADS."""
+def _campaign(text: str) -> Campaign:
+    """The campaign of a text of ROADS."""
     bending = "bending = true\n" if "strength" in text else ""
     whole = f'title = "road"\n{text}[hits]\ncount = {RUN}\nseed = 1\n[output]\nstandoffs = ["130 mm"]\n{bending}'
-    campaign = Campaign.from_text(whole, name="road", folder=Path())
+    return Campaign.from_text(whole, name="road", folder=Path())
+
+
+def scene_and_shots(text: str, hits: int) -> tuple[Scene, Shots]:
+    """The scene of a text of ROADS, and its first shots."""
+    campaign = _campaign(text)
+    return campaign.scene, campaign.sampler().shots(0, hits * campaign.at_a_plate)
+
+
+def named(text: str, hits: int) -> Road:
+    """A road of ROADS."""
+    campaign = _campaign(text)
     each = campaign.at_a_plate
     shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], RUN)) * each)
     return road(campaign.scene, shots[: hits * each], shots, campaign.numerics)

@@ -15,7 +15,7 @@ function controlsOf(place, { set, change }) {
   function slider(control, id) {
     const { label, unit, low, step, meaning, path } = control;
     const range = make("input", { type: "range", id, min: low, max: control.high, step, title: meaning });
-    const number = make("input", { type: "number", step: "any", title: meaning });
+    const number = make("input", { type: "number", id: `${id}-number`, step: "any", title: meaning });
     number.setAttribute("aria-label", `${label}${unit ? ` in ${unit}` : ""}`);
     const take = (value, from) => {
       if (!Number.isFinite(value)) return;

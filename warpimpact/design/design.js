@@ -3,6 +3,7 @@
 (async () => {
   const at = (id) => document.getElementById(id);
   const PATIENCE = 400;  // [ms] for a map of an older design, which then is given up
+  const SLOW = 3000;  // [ms] without a map, after which the page says why
   const SETTLED = 350;  // [ms] without a change, after which a design can be undone
   const narrow = matchMedia("(max-width: 45rem)");
   const state = { design: {}, pins: [], variable: "residual velocity" };
@@ -110,6 +111,10 @@
     running = own;
     waiting = false;
     const text = JSON.stringify(state.design), pins = JSON.parse(JSON.stringify(state.pins));
+    setTimeout(() => {
+      if (running !== own || own.answered) return;
+      at("status").textContent = "Computing… The first map of a new kind of target takes up to a minute, once: its kernels are built.";
+    }, SLOW);
     try {
       const response = await ask("compute", { design: state.design, pins, level }, own.abort.signal);
       if (!response.ok) throw new Error(await response.text());
@@ -144,6 +149,9 @@
     if (line.kind === "refused") {
       own.answered = true;
       refuse(line.sentence);
+      toml = "";
+      at("save").disabled = true;
+      at("status").textContent = shown ? "No map of this design. The one below is of the design before." : "No map.";
     } else if (line.kind === "plate") {
       showPlate(line);
     } else if (line.kind === "numbers") {
@@ -167,6 +175,7 @@
 
   function showPlate({ plate, groups, choices, toml: file, title, notes }) {
     toml = file;
+    at("save").disabled = false;
     if (document.activeElement !== at("title")) at("title").value = title;
     document.title = `${title} · warpimpact design`;
     controls(groups, choices);
@@ -374,7 +383,11 @@
   async function opened() {
     try {
       const held = await address.unpacked(location.hash.slice(1));
-      Object.assign(state, { design: held.design, pins: held.pins ?? [], variable: held.variable ?? state.variable });
+      if (typeof held.design !== "object") return false;
+      const pins = (Array.isArray(held.pins) ? held.pins : []).filter((one) => typeof one?.design === "object");
+      state.design = held.design;
+      state.pins = pins.map(({ name, design }) => ({ name: String(name).slice(0, 80), design }));
+      state.variable = String(held.variable ?? state.variable);
       return true;
     } catch {
       return false;

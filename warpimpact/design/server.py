@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 import socket
+import traceback
 import warnings
 from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
@@ -31,6 +32,7 @@ from warpimpact.results.files import ResultError
 from warpimpact.scene.plausible import Implausible
 from warpimpact.scene.units import quoted
 from warpimpact.solver.device import DeviceError
+from warpimpact.solver.resolution import TooManySteps
 
 _MOST_BYTES = 2**20
 """Of a request."""
@@ -40,7 +42,7 @@ _FILES = {
     "design": ("design.css", "plate.js", "controls.js", "address.js", "design.js"),
 }
 """Of the page, by the rooms that have them."""
-_MISTAKES = (CampaignError, ResultError, DeviceError, MemoryError)
+_MISTAKES = (CampaignError, ResultError, DeviceError, TooManySteps, MemoryError)
 """Errors that the page shows as a sentence."""
 _FIRST, _ASKED, _REFINE, _LAST = 0, 1, 2, 3
 """Urgencies: the first map after a change, what somebody clicked, the stages that follow."""
@@ -85,7 +87,7 @@ class _Pages:
             asked = await _asked(request)
             level = _whole(asked, "level", 0, 9)
             design, others = self._designs(asked)
-        except _MISTAKES as error:
+        except Exception as error:
             return PlainTextResponse(_refused(error), media_type=_LINES)
 
         async def lines() -> AsyncIterator[str]:
@@ -93,7 +95,7 @@ class _Pages:
                 async with aclosing(self._lines(design, others, level)) as found:
                     async for line in found:
                         yield as_json(line) + "\n"
-            except _MISTAKES as error:
+            except Exception as error:
                 yield _refused(error)
 
         return StreamingResponse(lines(), media_type=_LINES)
@@ -223,7 +225,7 @@ async def _answered(request: Request, answer: Callable[[Tables], Awaitable[Any]]
         finally:
             gone.cancel()
             work.cancel()
-    except _MISTAKES as error:
+    except Exception as error:
         return JSONResponse({"sentence": _sentence(error)}, status_code=422)
 
 
@@ -233,12 +235,16 @@ async def _gone(request: Request) -> None:
         pass
 
 
-def _refused(error: BaseException) -> str:
+def _refused(error: Exception) -> str:
     return as_json({"kind": "refused", "sentence": _sentence(error)}) + "\n"
 
 
-def _sentence(error: BaseException) -> str:
-    return str(error).removeprefix("design: ") or "not enough memory"
+def _sentence(error: Exception) -> str:
+    """What the page says of an error; the details of a bug go to the terminal."""
+    if isinstance(error, _MISTAKES):
+        return str(error).removeprefix("design: ") or "not enough memory"
+    traceback.print_exception(error)
+    return f"This is a bug of warpimpact; the terminal has its details. {type(error).__name__}: {str(error)[:200]}"
 
 
 def _whole(asked: Tables, key: str, least: int, most: int) -> int:

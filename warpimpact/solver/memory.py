@@ -43,7 +43,8 @@ class Memory:
         stage, flight: the builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
-        surface, sections, target, law, shots, pace: structs of the inputs.
+        surfaces, sections, tables, target, law, shots, pace: structs of the inputs; `tables` has the first two where
+            shots have surfaces of their own.
         bending, passage, history: what the march fills beside the outcomes.
     """
 
@@ -53,13 +54,17 @@ class Memory:
         self.stage, self.flight = built(variant)
         self.put = Put(device.alias, variant.real)
         self.at_a_plate = prepared.shots.at_a_plate if variant.burst else 1
-        surfaces = [
-            surface_of(self.stage.Surface, scene.core, own.rings, own.azimuths, self.put) for own in prepared.surfaces
-        ]
-        self.rings, self.patches = (max(getattr(own, n) for own in surfaces) for n in ("most_rings", "most_patches"))
+        self.surfaces, self.sections = self._surfaces(prepared), self._sections(prepared)
+        self.rings, self.patches = (
+            max(getattr(one, n) for one in self.surfaces) for n in ("most_rings", "most_patches")
+        )
         most = {"most_rings": self.rings, "most_patches": self.patches}
-        self.surface = table_of(self.stage.Surface, surfaces, self.put, **most) if variant.tabled else surfaces[0]
-        self.target, self.sections, self.shots = self._target(prepared), self._sections(prepared), self._shots(prepared)
+        tabled = slice(None if variant.tabled else 0)
+        self.tables = (
+            table_of(self.stage.Surface, self.surfaces[tabled], self.put, **most),
+            table_of(self.stage.Sections, self.sections[tabled], self.put),
+        )
+        self.target, self.shots = self._target(prepared), self._shots(prepared)
         self.law, self.pace = self.stage.Law(), self.stage.Pace()
         self.law.onset_limit = LARGEST_ONSET
         self.pace.time_step, self.pace.rows = prepared.resolution.time_step or 0.0, prepared.rows
@@ -92,14 +97,16 @@ class Memory:
                 setattr(target, name, self.put(np.stack(rows), variable.type.dtype))
         return target
 
-    def _sections(self, prepared: Prepared) -> Any:
+    def _surfaces(self, prepared: Prepared) -> list[Any]:
+        core, struct = prepared.scene.core, self.stage.Surface
+        return [surface_of(struct, core, own.rings, own.azimuths, self.put) for own in prepared.surfaces]
+
+    def _sections(self, prepared: Prepared) -> list[Any]:
         structs = [self.stage.Sections() for _ in prepared.surfaces]
         for struct, own in zip(structs, prepared.surfaces, strict=True):
             for name in self.stage.Sections.vars if own.sections is not None else ():
                 setattr(struct, name, self.put(getattr(own.sections, name)))
-        self.kept = structs
-        tabled = prepared.variant.tabled and prepared.variant.bends
-        return table_of(self.stage.Sections, structs, self.put) if tabled else structs[0]
+        return structs
 
     def _shots(self, prepared: Prepared) -> Any:
         shots = self.stage.Shots()
@@ -212,7 +219,8 @@ class Memory:
         members = ["area", "slope", "shift", "gain", "y", "z", "x" * self.variant.deep, "ahead" * self.variant.burst]
         for name in filter(None, members):
             setattr(touches, name, empty(patches))
-        for name in filter(None, ["tile", "cell", "place" * self.variant.burst]):
+        places = ["row", "column", "plane"] if self.variant.deep else []
+        for name in filter(None, ["tile", "cell", "place" * self.variant.burst, *places]):
             setattr(touches, name, wp.empty(patches, dtype=wp.int32, device=self.device))
         touches.ring_area = empty(rings)
         if self.variant.bends:
@@ -229,7 +237,8 @@ class Memory:
 
     def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:
         """March `count` shots from order[first] on; returns `count`."""
-        inputs = [self.surface, self.sections, self.target, self.law, self.shots, self.pace, *scratch]
+        bodies = [self.surfaces[0], self.sections[0], *self.tables]
+        inputs = [*bodies, self.target, self.law, self.shots, self.pace, *scratch]
         launch = partial(wp.launch, dim=count)
         if self.variant.window:
             launch = partial(wp.launch_tiled, dim=[count], block_dim=LANES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -80,10 +80,17 @@ _OF_A_RING = ("station", "radius", "half_axial", "half_radial", "turn_axial", "t
 
 def table_of(struct: Any, values: Sequence[Any], put: Put, **members: Any) -> Any:
     """An array of structs, which does not keep what their members point to; some members have another value."""
+    if not values:
+        return _empty(struct, put.device)
     table = np.array([value.numpy_value() for value in values], dtype=struct.numpy_dtype())
     for name, value in members.items():
         table[name] = value
     return wp.array(table, dtype=struct, device=put.device)
+
+
+@cache
+def _empty(struct: Any, device: str) -> Any:
+    return wp.empty(0, dtype=struct, device=device)
 
 
 def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:

@@ -84,6 +84,8 @@ def test_an_impossible_plate_shows_the_sentence(page: Any) -> None:
     page.wait(lambda: page.text("#sentence"))
     sentence = "plate.pattern: got length = 12 mm, but the length must be at least the width, 14 mm"
     assert page.text("#sentence") == sentence
+    assert page.text("#status").startswith("No map of this design.")
+    assert page.find("#save")[0].get_property("disabled")  # there is no campaign that run takes
     move(page, "control-plate-pattern-width", 4.0)
     page.wait(lambda: not page.text("#sentence"))
     assert page.errors() == []
@@ -141,6 +143,32 @@ def test_nothing_leaves_this_machine(page: Any) -> None:
     assert set(hosts) == {urlsplit(page.driver.current_url).netloc}
 
 
+@pytest.mark.parametrize(
+    "held",
+    [
+        {"design": "no table", "pins": 3},
+        {"pins": "<img src=x>", "variable": ["<img src=x>"]},
+        {"pins": [None, {"name": "<img src=x onerror='document.title=1'>"}]},
+    ],
+)
+def test_an_address_of_others_is_only_text(page: Any, small: Path, held: dict[str, Any]) -> None:
+    own = tomllib.loads(small.read_text()) | {"title": "of others"}
+    held = {"design": own} | held
+    if isinstance(held["pins"], list):
+        held["pins"][1]["design"] = own
+    packed = page.driver.execute_async_script("address.packed(arguments[0]).then(arguments[1])", held)
+    address = page.driver.current_url.partition("#")[0]
+    page.open("about:blank")
+    page.open(f"{address}#{packed}")
+    page.wait(lambda: "Complete" in page.text("#status"), 120.0)
+    assert page.values("#title") == [
+        "of others" if held["design"] is own else "7.62 mm P80 core against a slotted plate"
+    ]
+    assert ("<img src=x" in page.text("#maps")) == isinstance(held["pins"], list)
+    assert not page.find("img[src=x]")
+    assert page.errors() == []
+
+
 @pytest.mark.parametrize("width", [1400, 390])
 def test_text_of_others_is_text(
     browser: Any, serve: Callable[..., str], small: Path, tmp_path: Path, width: int
@@ -181,3 +209,68 @@ def test_the_page_holds_what_the_address_says(page: Any) -> None:
     design = json.loads(held)["design"]
     text = json.dumps(design)
     assert Campaign.from_text(text, name="address", folder=Path("/")).plate.thickness == 4e-3
+
+
+def test_a_grip_of_the_plate_is_dragged(page: Any) -> None:
+    from selenium.webdriver.common.action_chains import ActionChains
+
+    grips = page.find("#plate .grip")
+    labels = [grip.get_attribute("aria-label") for grip in grips]
+    assert labels == [
+        "plate pattern width",
+        "plate pattern length",
+        "plate pattern spacing 0",
+        "plate pattern spacing 1",
+    ]
+    per_mm = page.driver.execute_script("const at = document.getElementById('plate'); return at.getScreenCTM().a")
+    drag = ActionChains(page.driver).click_and_hold(grips[0])
+    for _ in range(4):
+        drag = drag.move_by_offset(round(0.25 * per_mm), 0).pause(0.1)
+    drag.release().perform()
+    width = 4.0 + 2.0 * 4 * round(0.25 * per_mm) / per_mm  # a grip is at half the width
+    page.wait(lambda: float(page.values("#control-plate-pattern-width")[0]) == pytest.approx(width, abs=0.11))
+    page.find("#plate .grip")[0].send_keys("\ue012")  # arrow to the left
+    page.wait(lambda: float(page.values("#control-plate-pattern-width")[0]) == pytest.approx(width - 0.1, abs=0.11))
+    assert page.errors() == []
+
+
+def test_a_threat_a_material_and_a_layer_are_chosen(page: Any) -> None:
+    choose = (
+        "const box = document.getElementById(arguments[0]); box.value = arguments[1];"
+        "box.dispatchEvent(new Event('change', {bubbles: true}))"
+    )
+    page.driver.execute_script(choose, "control-core-threat", ".30 AP M2")
+    page.wait(lambda: page.values("#control-impact-velocity-number") == ["878"])
+    page.find("#add-layer")[0].click()
+    page.wait(lambda: page.find("#control-layer-0-gap"))
+    page.driver.execute_script(choose, "control-layer-0-pattern", "circle")
+    page.wait(lambda: page.find("#control-layer-0-pattern-diameter"))
+    page.find("#controls fieldset:last-of-type button")[0].click()
+    page.wait(lambda: not page.find("#control-layer-0-gap"))
+    assert not page.text("#sentence")
+    assert page.errors() == []
+
+
+def test_the_report_of_the_page_is_that_of_its_designs(page: Any, tmp_path: Path) -> None:
+    page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
+    page.find("#report")[0].click()
+    page.wait(lambda: list(tmp_path.glob("*.html")), 120.0)
+    (path,) = tmp_path.glob("*.html")
+    page.wait(lambda: path.read_text(encoding="utf-8").endswith("</html>"), 30.0)
+    assert "this design: 1500 of 1500 cores pass" in path.read_text(encoding="utf-8")
+
+
+def test_a_second_page_does_not_disturb_the_first(page: Any) -> None:
+    first, address = page.driver.current_window_handle, page.driver.current_url
+    move(page, "control-plate-thickness", 5.5)
+    page.driver.switch_to.new_window("window")
+    page.driver.get(address)
+    page.wait(lambda: "Complete" in page.text("#status"), 120.0)
+    move(page, "control-plate-thickness", 3.0)
+    settled(page)
+    assert page.text("#numbers").startswith("thickness\n3 mm")
+    page.driver.close()
+    page.driver.switch_to.window(first)
+    page.wait(lambda: "Complete" in page.text("#status"), 120.0)
+    assert page.text("#numbers").startswith("thickness\n5.5 mm")
+    assert page.errors() == []

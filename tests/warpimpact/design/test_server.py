@@ -15,6 +15,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.cli import main
+from warpimpact.design.answers import Answers
 from warpimpact.design.changes import SHAPES, changed
 from warpimpact.design.designs import FILE_KEYS, shelf_of, stages
 from warpimpact.results import attributes as attr
@@ -99,6 +100,16 @@ def test_what_makes_no_sense_is_refused_in_a_sentence(address: str, body: Any, s
     assert status == 200
     assert json.loads(text)["kind"] == "refused"
     assert sentence in json.loads(text)["sentence"]
+
+
+def test_a_bug_is_told(address: str, small: Path, monkeypatch: pytest.MonkeyPatch, capfd: Any) -> None:
+    def broken(*_: Any) -> None:
+        raise ZeroDivisionError("of a test")
+
+    monkeypatch.setattr(Answers, "plate", broken)
+    (line,) = compute(address, tables_of(small))
+    assert line["sentence"].endswith("ZeroDivisionError: of a test")
+    assert "in broken" in capfd.readouterr().err
 
 
 def test_every_key_that_names_a_file_is_known() -> None:

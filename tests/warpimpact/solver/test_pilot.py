@@ -55,8 +55,8 @@ OTHERS = make_shots(IMPACT, Hits(count=96, seed=6), PLATE)
 
 @pytest.fixture(scope="module")
 def limit() -> Outcomes:
-    """Of the hits that are not in the pilot, on the finest level."""
-    return simulate(SCENE, OTHERS, numerics=Numerics(level=9), device="cpu")
+    """Of the hits that are not in the pilot, finer by three levels at least than the names need here."""
+    return simulate(SCENE, OTHERS, numerics=Numerics(level=7), device="cpu")
 
 
 def found_for(numerics: Numerics, shots: Shots = PILOT, scene: Scene = SCENE) -> HitErrors:
@@ -74,6 +74,7 @@ def test_a_shanked_core_gets_the_accuracy_that_the_name_promises(name: str, limi
     many = make_shots(IMPACT, Hits(count=256, seed=5), PLATE)
     found, accuracy = found_for(Numerics(fidelity=name), many), PRESETS[name]
     assert found.kept
+    assert found.numerics.level <= 4
     velocity, tilt = errors(found.numerics, limit)
     assert velocity <= accuracy.residual_velocity
     assert tilt <= accuracy.tilt

@@ -1,0 +1,112 @@
+"""The desk computes one job at a time, the most urgent first, and ends what nobody wants."""
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from warpimpact.design.desk import Desk
+from warpimpact.solver.worker import Cancel
+
+
+def until(event: threading.Event) -> Callable[[Cancel], str]:
+    """Work that goes on until an event or until it is cancelled."""
+
+    def work(cancel: Cancel) -> str:
+        while not event.is_set():
+            cancel.check()
+            time.sleep(0.001)
+        return "done"
+
+    return work
+
+
+def test_an_urgent_job_puts_off_another_which_then_ends() -> None:
+    order, go = list[str](), threading.Event()
+
+    def first(cancel: Cancel) -> str:
+        order.append("refine")
+        return until(go)(cancel)
+
+    def urgent(_: Cancel) -> str:
+        order.append("urgent")
+        go.set()
+        return "at once"
+
+    async def both() -> list[str]:
+        desk = Desk()
+        slow = asyncio.ensure_future(desk.do(3, first))
+        await asyncio.sleep(0.05)
+        return [await desk.do(0, urgent), await slow]
+
+    assert asyncio.run(both()) == ["at once", "done"]
+    assert order == ["refine", "urgent", "refine"]
+
+
+def test_one_job_runs_at_a_time_in_the_order_of_their_urgency() -> None:
+    running, order, go = list[int](), list[int](), threading.Event()
+
+    def job(urgency: int) -> Callable[[Cancel], None]:
+        def work(_: Cancel) -> None:
+            running.append(urgency)
+            assert len(running) == 1
+            order.append(urgency)
+            time.sleep(0.01)
+            running.remove(urgency)
+
+        return work
+
+    async def every() -> None:
+        desk = Desk()
+        begun = asyncio.ensure_future(desk.do(0, until(go)))
+        await asyncio.sleep(0.05)
+        others = [asyncio.ensure_future(desk.do(urgency, job(urgency))) for urgency in (3, 1, 2)]
+        await asyncio.sleep(0.05)
+        go.set()
+        await asyncio.gather(begun, *others)
+
+    asyncio.run(every())
+    assert order == [1, 2, 3]
+
+
+@pytest.mark.parametrize("waits", [False, True])
+def test_what_nobody_awaits_ends_at_once(waits: bool) -> None:
+    never, begun, ended = threading.Event(), list[str](), list[str]()
+
+    def work(cancel: Cancel) -> None:
+        begun.append("work")
+        try:
+            until(never)(cancel)
+        finally:
+            ended.append("work")
+
+    async def left() -> float:
+        desk = Desk()
+        before = asyncio.ensure_future(desk.do(0, until(never))) if waits else None
+        job = asyncio.ensure_future(desk.do(1, work))
+        await asyncio.sleep(0.05)
+        job.cancel()
+        if before is not None:
+            before.cancel()
+        begin = time.perf_counter()
+        await desk.do(3, lambda _: None)
+        return time.perf_counter() - begin
+
+    assert asyncio.run(left()) < 1.0
+    assert begun == ended == ([] if waits else ["work"])
+
+
+def test_an_error_comes_to_who_asked_and_the_desk_goes_on() -> None:
+    def broken(_: Cancel) -> Any:
+        raise ZeroDivisionError
+
+    async def both() -> str:
+        desk = Desk()
+        with pytest.raises(ZeroDivisionError):
+            await desk.do(0, broken)
+        return await desk.do(0, lambda _: "goes on")
+
+    assert asyncio.run(both()) == "goes on"
