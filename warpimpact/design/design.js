@@ -383,7 +383,11 @@
   async function opened() {
     try {
       const held = await address.unpacked(location.hash.slice(1));
-      Object.assign(state, { design: held.design, pins: held.pins ?? [], variable: held.variable ?? state.variable });
+      if (typeof held.design !== "object") return false;
+      const pins = (Array.isArray(held.pins) ? held.pins : []).filter((one) => typeof one?.design === "object");
+      state.design = held.design;
+      state.pins = pins.map(({ name, design }) => ({ name: String(name).slice(0, 80), design }));
+      state.variable = String(held.variable ?? state.variable);
       return true;
     } catch {
       return false;

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
 from warpimpact.solver.limit import limit_velocity
-from warpimpact.solver.simulate import simulate
+from warpimpact.solver.many import simulate_many
+from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
 
@@ -76,6 +77,7 @@ def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iter
     own = {one.path: values[one.path] for one in fit.scene_parameters if one.path not in bench.shot.own}
     columns = _as_columns(fit, own)
     of_scene = {path: column for path, column in own.items() if path not in columns}
+    jobs = list[_Job]()
     for rows in _of_one_scene(of_scene, len(alike)):
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in of_scene.items()})
         targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling)
@@ -83,9 +85,11 @@ def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iter
         for first in range(0, len(rows), per_call):
             some = rows[first : first + per_call]
             of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.layers[0])
-            shots = repeated(targets.computed, of_sets, len(some))
-            outcomes = _outcomes(fit, bench, scene, shots, device)
-            yield Run(alike[some], scene, targets, outcomes.unfolded(targets.group))
+            jobs.append(_Job(alike[some], scene, targets, repeated(targets.computed, of_sets, len(some))))
+            if sum(len(job.shots) for job in jobs) >= AT_A_TIME:
+                yield from _run(fit, bench, jobs, device)
+                jobs = []
+    yield from _run(fit, bench, jobs, device)
 
 
 def _alike(points: Array) -> NDArray[np.int64]:
@@ -97,16 +101,35 @@ def _alike(points: Array) -> NDArray[np.int64]:
     return rows
 
 
-def _outcomes(fit: Fit, bench: Bench, scene: Scene, shots: Shots, device: str) -> Outcomes:
+class _Job(NamedTuple):
+    """Shots of a bench, of some sets that share a scene; see `Run`."""
+
+    which: NDArray[np.int64]
+    scene: Scene
+    aim: Aim
+    shots: Shots
+
+
+def _run(fit: Fit, bench: Bench, jobs: Sequence[_Job], device: str) -> Iterator[Run]:
+    for job, outcomes in zip(jobs, _outcomes(fit, bench, jobs, device), strict=True):
+        yield Run(job.which, job.scene, job.aim, outcomes.unfolded(job.aim.group))
+
+
+def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], device: str) -> list[Outcomes]:
     """What the observations of a bench need: outcomes at impact velocity, limit velocities, or both."""
     measured = [fit.shots[place] for place in bench.which]
     observations = [one for shot in measured for one in shot.observations]
-    if not any(one.is_limit for one in observations):
-        return simulate(scene, shots, numerics=fit.numerics, device=device)
-    limits = limit_velocity(scene, shots, numerics=fit.numerics, device=device)
+    limited = any(one.is_limit for one in observations)
     other = fit.selection or any(shot.status for shot in measured) or not all(one.is_limit for one in observations)
-    outcomes = simulate(scene, shots, numerics=fit.numerics, device=device) if other else limits.outcomes
-    return outcomes.assign(limit_velocity=limits.value)
+    scenes = [(job.scene, job.shots) for job in jobs]
+    outcomes = simulate_many(scenes, fit.numerics, Worker(device)) if other or not limited else []
+    if not limited:
+        return outcomes
+    limits = [limit_velocity(scene, shots, numerics=fit.numerics, device=device) for scene, shots in scenes]
+    return [
+        one.assign(limit_velocity=found.value)
+        for one, found in zip(outcomes or [found.outcomes for found in limits], limits, strict=True)
+    ]
 
 
 def _as_columns(fit: Fit, own: Mapping[Path, Array]) -> dict[Path, Array]:

@@ -143,6 +143,32 @@ def test_nothing_leaves_this_machine(page: Any) -> None:
     assert set(hosts) == {urlsplit(page.driver.current_url).netloc}
 
 
+@pytest.mark.parametrize(
+    "held",
+    [
+        {"design": "no table", "pins": 3},
+        {"pins": "<img src=x>", "variable": ["<img src=x>"]},
+        {"pins": [None, {"name": "<img src=x onerror='document.title=1'>"}]},
+    ],
+)
+def test_an_address_of_others_is_only_text(page: Any, small: Path, held: dict[str, Any]) -> None:
+    own = tomllib.loads(small.read_text()) | {"title": "of others"}
+    held = {"design": own} | held
+    if isinstance(held["pins"], list):
+        held["pins"][1]["design"] = own
+    packed = page.driver.execute_async_script("address.packed(arguments[0]).then(arguments[1])", held)
+    address = page.driver.current_url.partition("#")[0]
+    page.open("about:blank")
+    page.open(f"{address}#{packed}")
+    page.wait(lambda: "Complete" in page.text("#status"), 120.0)
+    assert page.values("#title") == [
+        "of others" if held["design"] is own else "7.62 mm P80 core against a slotted plate"
+    ]
+    assert ("<img src=x" in page.text("#maps")) == isinstance(held["pins"], list)
+    assert not page.find("img[src=x]")
+    assert page.errors() == []
+
+
 @pytest.mark.parametrize("width", [1400, 390])
 def test_text_of_others_is_text(
     browser: Any, serve: Callable[..., str], small: Path, tmp_path: Path, width: int
