@@ -15,20 +15,24 @@ def add_export(commands: Commands) -> None:
         commands,
         "export",
         _export,
-        summary="write a result as CSV, or a replayed hit for ParaView",
+        summary="write a result as CSV, a replayed hit for ParaView, or the holes of a plate as a drawing",
         description="Write a result as CSV, one row per hit. Or write the history of a hit as a folder of VTK files; "
-        "open its core.pvd and plate.pvd in ParaView. VTK needs: pip install 'warpimpact[vtk]'",
+        "open its core.pvd and plate.pvd in ParaView. VTK needs: pip install 'warpimpact[vtk]'. Or write the holes of "
+        "a campaign's plate as an SVG or DXF drawing in mm. DXF needs: pip install 'warpimpact[cad]'",
         example="export slotted.nc -o slotted.csv",
     )
     parser.add_argument(
-        "file", type=Path, metavar="RESULT.nc|HIT.nc", help="written by warpimpact run or warpimpact replay"
+        "file",
+        type=Path,
+        metavar="RESULT.nc|HIT.nc|CAMPAIGN.toml",
+        help="written by warpimpact run or warpimpact replay, or a campaign file",
     )
     add_output(
         parser,
-        "RESULT.csv|FOLDER",
-        "CSV file, or new folder for VTK (default: the name of the file with .csv or _vtk, in its folder)",
+        "RESULT.csv|FOLDER|PLATE.svg|PLATE.dxf",
+        "CSV file, new folder for VTK, or drawing (default: the file's name with .csv, _vtk or .svg, in its folder)",
     )
-    add_overwrite(parser, "an existing CSV file")
+    add_overwrite(parser, "an existing file")
 
 
 def _export(arguments: argparse.Namespace) -> None:
@@ -37,6 +41,9 @@ def _export(arguments: argparse.Namespace) -> None:
     from warpimpact.results import files
 
     path, output = arguments.file, arguments.output
+    if path.suffix == ".toml":
+        _export_drawing(path, output or path.with_suffix(".svg"), overwrite=arguments.overwrite)
+        return
     with files.opened_either(path) as dataset:
         if files.is_history(dataset):
             output = output or path.with_name(f"{path.stem}_vtk")
@@ -56,6 +63,16 @@ def _export(arguments: argparse.Namespace) -> None:
             written = [output]
     for file in written:
         print(file)
+
+
+def _export_drawing(path: Path, output: Path, *, overwrite: bool) -> None:
+    from warpimpact.campaign.campaign import Campaign
+    from warpimpact.export.drawing import SUFFIXES, write_drawing
+
+    check_suffix(output, "a drawing", *SUFFIXES)
+    check_output(output, overwrite=overwrite)
+    write_drawing(Campaign.from_toml(path).plate, output)
+    print(output)
 
 
 def add_report(commands: Commands) -> None:

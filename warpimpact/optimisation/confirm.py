@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,12 @@ from numpy.typing import NDArray
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
 from warpimpact.optimisation.evaluate import Job, campaign_of
-from warpimpact.optimisation.judged import Record, excesses, interval, means, objectives
+from warpimpact.optimisation.judged import Record, excesses, interval, means, numbers_of, objectives
 from warpimpact.optimisation.measures import AREAL_DENSITY
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
 from warpimpact.optimisation.work import Work
+from warpimpact.statistics.random_effects import positive_share
 
 Array = NDArray[np.float64]
 
@@ -40,6 +42,9 @@ class Confirmed:
         kept: whether fresh hits leave a design on the front and within the bounds.
         groups: number of the first design than which each is not certainly better.
         references: targets to compare with.
+        survival: of each design, per objective and bound, the share of the draws of a posterior for which it differs
+            from the next one of another group in the same direction as over all hits, and the lower end of the
+            interval of that share, shape [front, asked, 2]; NaN where it is not known.
     """
 
     numbers: NDArray[np.int64]
@@ -49,6 +54,7 @@ class Confirmed:
     kept: NDArray[np.bool_]
     groups: NDArray[np.int64]
     references: tuple[Record, ...]
+    survival: Array
 
 
 def confirm(design: Design, work: Work, found: Searched, follow: Callable[[str], None]) -> Confirmed:
@@ -57,18 +63,20 @@ def confirm(design: Design, work: Work, found: Searched, follow: Callable[[str],
     chosen = [found.records[int(number)] for number in numbers]
     others = [_reference(design, place) for place in range(len(design.references))]
     follow(f"{len(chosen)} designs of the front with fresh hits")
-    records, places = _fresh(design, work, [*chosen, *others])
+    records, places, draws = _fresh(design, work, [*chosen, *others])
     follow("solid plates of the same weight")
     solids = _solids(design, work, records[: len(chosen)])
     front = records[: len(chosen)]
+    kept, leaders = _kept(design, front), groups(design, front)
     return Confirmed(
         numbers=numbers,
         records=tuple(front),
         places=places[: len(chosen)],
         solids=tuple(solids),
-        kept=_kept(design, front),
-        groups=groups(design, front),
+        kept=kept,
+        groups=leaders,
         references=tuple(records[len(chosen) :]),
+        survival=survival(design, front, draws, kept & (leaders == np.arange(len(front)))),
     )
 
 
@@ -109,15 +117,15 @@ def check_references(design: Design) -> None:
         _reference(design, place)
 
 
-def _fresh(design: Design, work: Work, targets: Sequence[Record]) -> tuple[list[Record], Array]:
-    """Targets with fresh hits, and where these lie."""
+def _fresh(design: Design, work: Work, targets: Sequence[Record]) -> tuple[list[Record], Array, list[Array]]:
+    """Targets with fresh hits, where these lie, and the draws of a posterior that they took."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
     threats = range(len(design.threats))
     asked = [Job(one.tables, threat, 0, count, FIDELITY, seed) for one in targets for threat in threats]
     if not design.keys:
         empty = np.zeros((len(threats), 0, count))
         found = [Record(one.values, one.tables, one.areal_density, ("",) * len(threats), empty) for one in targets]
-        return found, np.zeros((len(targets), 2, 0))
+        return found, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
     levels = work.levels(asked)
     said = work.said([Job(*_of(job), level, seed) for job, level in zip(asked, levels, strict=True)])
     records = []
@@ -133,7 +141,8 @@ def _fresh(design: Design, work: Work, targets: Sequence[Record]) -> tuple[list[
                 seconds=sum(part.seconds for part in said[own]),
             )
         )
-    return records, np.array([one.places for one in said[:: len(threats)]])
+    of_first = said[:: len(threats)]
+    return records, np.array([one.places for one in of_first]), [one.draws for one in of_first]
 
 
 def _of(job: Job) -> tuple[Any, int, int, int]:
@@ -192,3 +201,19 @@ def is_better(design: Design, one: Record, other: Record) -> bool:
         if low[row] > least:
             return True
     return False
+
+
+def survival(design: Design, front: Sequence[Record], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:
+    """Which part of the order of the front survives the uncertainty of the parameters, as `Confirmed.survival` has it.
+    Hit k of every design takes the same draw."""
+    found = np.full((len(front), len(design.asked), 2), np.nan)
+    for number, following in pairwise(int(lead) for lead in np.flatnonzero(leads)):
+        one, other = front[number], front[following]
+        if not len(draws[number]) or not np.array_equal(draws[number], draws[following]):
+            continue
+        for row, asked in enumerate(design.asked):
+            apart = numbers_of(design, one, asked, one.hits) - numbers_of(design, other, asked, other.hits)
+            if asked.measure != AREAL_DENSITY and np.isfinite(apart).any():
+                share = positive_share(np.sign(np.nanmean(apart)) * apart, draws[number])
+                found[number, row] = (np.nan, np.nan) if share is None else (share.share, share.at_least)
+    return found

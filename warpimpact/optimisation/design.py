@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -260,7 +261,13 @@ class Design:
             data[table] = dict(own) if table == "core" and own else data.get(table, {}) | own
         for table, given in replaced.items():
             data[table] = data.get(table, {}) | given
-        return Campaign.from_text(json.dumps(data, ensure_ascii=False), name=self.name, folder=self.folder)
+        return _campaign(json.dumps(data, ensure_ascii=False), self.name, self.folder)
+
+
+@lru_cache(maxsize=256)
+def _campaign(text: str, name: str, folder: Path) -> Campaign:
+    """A campaign of a search, kept while more hits of it may be asked for: its plate then keeps its tile, too."""
+    return Campaign.from_text(text, name=name, folder=folder)
 
 
 def read_design(path: str | Path) -> Design:

@@ -63,11 +63,13 @@ class Said(NamedTuple):
     Attributes:
         values: of every effect that the design file asks for, shape [effects, hits]; NaN where a hit does not count.
         places: y and z of the hits [m], shape [2, hits].
+        draws: of the posterior that the hits took, shape [hits]; empty without one.
         seconds: processor time of preparing and marching, its share of those computed side by side.
     """
 
     values: Array
     places: Array
+    draws: Array
     seconds: float
 
 
@@ -110,7 +112,9 @@ def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: 
     said = []
     for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
         table = narrow_table(scene, shots, one, EFFECT_VARIABLES)
-        said.append(Said(said_of(design, table), np.array([shots.hit_y, shots.hit_z]), seconds / len(jobs)))
+        draws = np.zeros(0) if shots.posterior_draw is None else shots.posterior_draw
+        places = np.array([shots.hit_y, shots.hit_z])
+        said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
     for job, of, (_, scene, shots) in zip(jobs, said, scenes, strict=True):
         numerics = Numerics.model_validate_json(job.level)
         for row, key in enumerate(design.keys):

@@ -82,6 +82,8 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.NUMBER: confirmed.numbers,
         f.KEPT: confirmed.kept.astype(np.int8),
         f.GROUP: confirmed.groups,
+        f.SURVIVAL: confirmed.survival[..., 0],
+        f.SURVIVAL_AT_LEAST: confirmed.survival[..., 1],
         f.CAMPAIGN: _texts(toml_text(campaign_tables(design, one, 0)) for one in confirmed.records),
         f.FILE: _texts(f"design_{number:0{width}d}.toml" for number in range(len(confirmed.records))),
         f.FRESH_LEVELS: _texts(_levels(one) for one in confirmed.records),

@@ -14,6 +14,9 @@ from warpimpact.results import front as f
 if TYPE_CHECKING:
     import xarray
 
+NEEDED = 0.95
+"""Share of the draws of a posterior from which a difference survives."""
+
 
 def front_lines(dataset: xarray.Dataset) -> Iterator[str]:
     """The front of a search with its intervals, what fresh hits took from it, and which designs are one."""
@@ -39,6 +42,19 @@ def front_lines(dataset: xarray.Dataset) -> Iterator[str]:
         yield f"{name}: {', '.join(numbers_of_reference(dataset, place))}"
         yield from _against(dataset, place)
     yield from _shrinkage(dataset)
+    yield from _survival(dataset)
+
+
+def _survival(dataset: xarray.Dataset) -> Iterator[str]:
+    """Which part of the order of the front survives the uncertainty of the parameters."""
+    for place, label in enumerate(dataset[f.LABEL].values):
+        least = dataset[f.SURVIVAL_AT_LEAST].values[:, place]
+        if (known := np.isfinite(least)).any():
+            name, survive = str(label).partition(" [")[0], int((least[known] >= NEEDED).sum())
+            yield (
+                f"{name}: {survive} of {int(known.sum())} differences between neighbours on the front survive the "
+                f"uncertainty of the parameters (in at least {NEEDED:.0%} of the draws)"
+            )
 
 
 def _against(dataset: xarray.Dataset, reference: int) -> Iterator[str]:

@@ -37,7 +37,7 @@ class Work:
             return found
         self.resumed += len(jobs)
         return [
-            Said(stored[f"values_{k}"], stored[f"places_{k}"], float(stored[f"seconds_{k}"]))
+            Said(stored[f"values_{k}"], stored[f"places_{k}"], stored[f"draws_{k}"], float(stored[f"seconds_{k}"]))
             for k, _ in enumerate(jobs)
         ]
 

@@ -50,6 +50,10 @@ FRESH_LOW = Variable("front_found_low", _BY_FRONT, "1", _LOW)
 FRESH_HIGH = Variable("front_found_high", _BY_FRONT, "1", _HIGH)
 KEPT = Variable("front_kept", ("front",), "1", "1 where fresh hits leave it on the front and within the bounds, else 0")
 GROUP = Variable("front_group", ("front",), "1", "first design than which it is not certainly better at 95 %")
+SURVIVAL = Variable(
+    "front_survival", _BY_FRONT, "1", "share of the draws of a posterior in which it differs so from the next design"
+)
+SURVIVAL_AT_LEAST = Variable("front_survival_at_least", _BY_FRONT, "1", "lower end of the interval of that share")
 CAMPAIGN = Variable("front_campaign", ("front",), "1", "campaign of the first threat, as TOML")
 FILE = Variable("front_file", ("front",), "1", "name of its campaign file")
 SOLID = Variable("front_solid", _BY_FRONT, "1", "the same of the solid plate of equal areal density")
@@ -74,7 +78,21 @@ VOLUME = Variable(
 
 VARIABLES = (
     *(NAME, UNIT, LABELS, ASKED, LABEL, SIGN, LIMIT, VALUE, FOUND, FOUND_LOW, FOUND_HIGH, HITS, LEVELS, COST),
-    *(ON_FRONT, NUMBER, FRESH, FRESH_LOW, FRESH_HIGH, KEPT, GROUP, CAMPAIGN, FILE, SOLID, FRESH_LEVELS),
+    *(
+        ON_FRONT,
+        NUMBER,
+        FRESH,
+        FRESH_LOW,
+        FRESH_HIGH,
+        KEPT,
+        GROUP,
+        SURVIVAL,
+        SURVIVAL_AT_LEAST,
+        CAMPAIGN,
+        FILE,
+        SOLID,
+        FRESH_LEVELS,
+    ),
     *(HIT_Y, HIT_Z, HIT_VALUE, REFERENCE, REFERENCE_FOUND, REFERENCE_LOW, REFERENCE_HIGH, REFERENCE_CAMPAIGN),
     *(COMPUTED, VOLUME),
 )
@@ -88,8 +106,6 @@ BOX = "hypervolume_box"
 """Attribute: worst values of the first generation to minimise, then the distances from the best."""
 REFUSED, PILOTS = "refused_designs", "pilots"
 """Attributes: designs that broke a constraint, and pilots of the search."""
-SURVIVES = "front_survival"
-"""Attribute: of a posterior, which neighbours on the front stay in order, as a JSON list of shares of the draws."""
 _REFERENCES = "docs/howto/optimise.md of warpimpact"
 
 

@@ -14,12 +14,16 @@ from .patterns import (
     EllipsePattern,
     HexagonPattern,
     LatticePattern,
+    LevelSetPattern,
     MaskPattern,
     NoPattern,
     Pattern,
     SlotPattern,
     SquarePattern,
+    Supershape,
+    SupershapePattern,
     TrianglePattern,
+    Wave,
 )
 from .plate import Plate
 from .quantities import OF_THE_SCENE

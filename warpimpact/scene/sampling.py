@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,7 +52,7 @@ class Sampler:
         scatter = scatter or Scatter()
         self._scatter = scatter.given
         dimensions = _HIT_COLUMNS + (drawn_columns(scatter.layers) if self._scatter else 0)
-        self._sobol = [Sobol(dimensions, _seed(hits.seed, replicate)) for replicate in range(replicates)]
+        self._sobol = [_sequence(dimensions, hits.seed, replicate) for replicate in range(replicates)]
 
     def __len__(self) -> int:
         return self._hits.total(self._extent) * len(self._group)
@@ -117,6 +118,12 @@ def make_shots(impact: Impact, hits: Hits, plate: Plate, scatter: Scatter | None
     """
     sampler = Sampler(impact, hits, plate, scatter, hits.scramblings)
     return sampler.shots(0, len(sampler))
+
+
+@lru_cache(maxsize=128)
+def _sequence(dimensions: int, seed: int, replicate: int) -> Sobol:
+    """A scrambled sequence, kept: its scrambling takes as long as a hundred hits of a small plate."""
+    return Sobol(dimensions, _seed(seed, replicate))
 
 
 def _seed(seed: int, replicate: int) -> np.random.SeedSequence:

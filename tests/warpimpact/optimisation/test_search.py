@@ -1,5 +1,6 @@
 """The whole search against fronts that are known, and against itself: killed, resumed, with other seeds."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.optimisation.confirm import fresh_seed
 from warpimpact.optimisation.crew import cluster_crew, local_crew
-from warpimpact.optimisation.design import read_design
+from warpimpact.optimisation.design import design_from, read_design
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
 from warpimpact.optimisation.searcher import Searcher, hypervolume
 from warpimpact.optimisation.space import Space, Variable
@@ -26,6 +27,7 @@ from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.runs.shards import folder_of as folder_of_parts
 
+from ..campaign.test_posterior import posterior
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
 
 MORE_HITS = SEARCH.replace("hits = 64", "hits = 256")
@@ -192,3 +194,16 @@ def test_a_limit_of_what_weakens_by_time_is_refused() -> None:
     asked = '[[objectives]]\nmeasure = "limit_velocity"\n'
     with pytest.raises(CampaignError, match="weakens by time"):
         optimise(design("degradation = 0.8", HOLES, asked, SEARCH))
+
+
+def test_the_front_says_what_survives_the_uncertainty_of_the_parameters(tmp_path: Path) -> None:
+    drawn = posterior(tmp_path)
+    parts = ("degradation = 0.8", '[variables]\nthickness = ["2 mm", "4 mm"]', WEIGHT_AND_ENERGY)
+    plan = SEARCH.replace("confirm_hits = 64", "confirm_hits = 512")
+    text = "\n".join([f"posterior = {json.dumps(drawn.name)}", CORE, *parts, plan])
+    found = optimise(design_from(text, "d.toml", tmp_path))
+    assert (found.sizes["front"], found[f.KEPT].values.tolist()) == (2, [1, 1])
+    # Twice the plate takes more in every draw; the last design of a front has no next one.
+    assert found[f.SURVIVAL].values[0, 1] > 0.99
+    assert np.isnan(found[f.SURVIVAL].values[[0, 1], [0, 1]]).all()
+    assert any("1 of 1 differences" in line for line in front_lines(found))

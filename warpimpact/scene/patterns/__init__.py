@@ -1,9 +1,10 @@
-"""Hole patterns: one hole shape on a lattice, or any mask, repeated periodically (docs/model.md §3)."""
+"""Hole patterns: one hole shape on a lattice, free forms, or any mask, repeated periodically (docs/model.md §3)."""
 
 from typing import Annotated
 
 from pydantic import Field
 
+from .free_form import LevelSetPattern, Supershape, SupershapePattern, Wave
 from .lattice import LatticePattern, Place
 from .mask import MaskPattern
 from .pattern import BoolArray, NoPattern, Pattern
@@ -17,6 +18,8 @@ AnyPattern = Annotated[
     | HexagonPattern
     | EllipsePattern
     | NoPattern
+    | SupershapePattern
+    | LevelSetPattern
     | MaskPattern,
     Field(discriminator="shape"),
 ]

@@ -1,0 +1,223 @@
+"""Free forms: holes of no named shape, as square cells, from a few numbers (docs/model.md §3).
+
+A form is drawn in cells. A tool of some diameter then opens it: what the tool does not reach stays material (the
+opening of mathematical morphology: J. Serra, Image Analysis and Mathematical Morphology, Academic Press 1982). Material
+that a hole surrounds falls out.
+"""
+
+import math
+from abc import abstractmethod
+from functools import cached_property
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..model import Array, Model
+from ..units import Angle, Length, NonNegativeLength, PositiveLength
+from .cells import CellsPattern
+from .pattern import BoolArray
+
+_MOST_CELLS = 4_000_000
+_Exponent = Annotated[float, Field(gt=0.05, le=100.0)]
+
+
+class Supershape(Model):
+    """One hole of a free form, r(θ) ∝ (|cos(mθ/4)|^n2 + |sin(mθ/4)|^n3)^(−1/n1).
+
+    Source: J. Gielis, American Journal of Botany 90 (2003) 333.
+
+    Attributes:
+        y, z: its place in the cell [m].
+        radius: its largest radius, before `stretch` [m].
+        lobes: m, how many equal parts it has around; 0 for a circle.
+        exponents: n1, n2 and n3.
+        stretch: its length along its own z as a multiple of that along y.
+        rotation: from +y towards +z [rad].
+    """
+
+    y: Length = 0.0
+    z: Length = 0.0
+    radius: PositiveLength
+    lobes: Annotated[int, Field(strict=True, ge=0, le=24)] = 4
+    exponents: tuple[_Exponent, _Exponent, _Exponent] = (2.0, 2.0, 2.0)
+    stretch: Annotated[float, Field(ge=0.1, le=10.0)] = 1.0
+    rotation: Angle = 0.0
+
+    @property
+    def reach(self) -> float:
+        """The farthest that it may extend from its place [m]."""
+        return self.radius * max(1.0, self.stretch)
+
+    def holds(self, y: Array, z: Array) -> BoolArray:
+        """Whether points, from its place [m], lie in it; of their broadcast shape."""
+        cosine, sine = math.cos(self.rotation), math.sin(self.rotation)
+        along_y, along_z = cosine * y + sine * z, (cosine * z - sine * y) / self.stretch
+        turn = 0.25 * self.lobes * np.arctan2(along_z, along_y)
+        of_all = 0.25 * self.lobes * np.linspace(-np.pi, np.pi, 1441)
+        return np.asarray(np.hypot(along_y, along_z) <= self.radius * self._form(turn) / self._form(of_all).max())
+
+    def _form(self, turn: Array) -> Array:
+        one, two, three = self.exponents
+        return np.asarray((np.abs(np.cos(turn)) ** two + np.abs(np.sin(turn)) ** three) ** (-1.0 / one))
+
+
+class Wave(Model):
+    """A term of a level set, amplitude × cos(2π (k y/a + l z/b) + phase).
+
+    Attributes:
+        along_y, along_z: k and l, periods in the cell.
+        amplitude: as a multiple of those of the others.
+        phase: how far the wave is shifted [rad].
+    """
+
+    along_y: Annotated[int, Field(strict=True, ge=-6, le=6)]
+    along_z: Annotated[int, Field(strict=True, ge=-6, le=6)]
+    amplitude: Annotated[float, Field(ge=-100.0, le=100.0)] = 1.0
+    phase: Angle = 0.0
+
+
+class _FreeForm(CellsPattern):
+    """A form in a rectangular cell that repeats.
+
+    Attributes:
+        spacing: extent (a, b) of the cell along y and z [m]; that along z is rounded to whole cells of the drawing.
+        smallest_feature: diameter of the tool that cuts the holes: no part of a hole is narrower [m].
+        cell_size: side of the squares of the drawing, about [m]; a whole number of them is `spacing` along y.
+    """
+
+    spacing: tuple[PositiveLength, PositiveLength]
+    smallest_feature: NonNegativeLength = 0.0
+    cell_size: PositiveLength = 5e-5
+
+    @property
+    @abstractmethod
+    def extent(self) -> tuple[float, float]:
+        """Of the period along y and z [m], before it is rounded."""
+
+    @abstractmethod
+    def drawn(self, y: Array, z: Array) -> BoolArray:
+        """Where a form has holes, before a tool opens it, at cells y of shape [cells along y, 1] and z [m]."""
+
+    @model_validator(mode="after")
+    def _is_in_one_piece(self) -> Self:
+        count = math.prod(side / self.side for side in self.extent)
+        if count > _MOST_CELLS:
+            raise ValueError(f"got {count:.3g} cells, but at most {_MOST_CELLS:.1g}; a larger cell_size gives fewer")
+        _ = self.material
+        return self
+
+    @property
+    def side(self) -> float:
+        return self.spacing[0] / max(1, round(self.spacing[0] / self.cell_size))
+
+    @cached_property
+    def material(self) -> BoolArray:
+        """Where a cell is material, bool of shape [cells along y, cells along z], read-only."""
+        counts = [max(1, round(length / self.side)) for length in self.extent]
+        y, z = (self.side * (np.arange(count, dtype=np.float64) + 0.5 - 0.5 * count) for count in counts)
+        material = _in_one_piece(~_opened(self.drawn(y[:, None], z), 0.5 * self.smallest_feature / self.side))
+        material.setflags(write=False)
+        return material
+
+
+class SupershapePattern(_FreeForm):
+    """Unions of one to three supershapes in a cell.
+
+    Attributes:
+        shape: "supershape".
+        forms: the supershapes.
+        staggered: shifts every odd row of cells along y by b/2 along z.
+    """
+
+    shape: Literal["supershape"] = "supershape"
+    forms: Annotated[tuple[Supershape, ...], Field(min_length=1, max_length=3)]
+    staggered: Annotated[bool, Field(strict=True)] = False
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        return ((2.0 if self.staggered else 1.0) * self.spacing[0], self.spacing[1])
+
+    def drawn(self, y: Array, z: Array) -> BoolArray:
+        sides = (len(y) * self.side, len(z) * self.side)
+        rows = ((-0.25, -0.25), (0.25, 0.25)) if self.staggered else ((0.0, 0.0),)
+        holes = np.zeros((len(y), len(z)), dtype=bool)
+        for form in self.forms:
+            for row in rows:
+                at = [place + share * side for place, share, side in zip((form.y, form.z), row, sides, strict=True)]
+                images = [_images(place, form.reach, side) for place, side in zip(at, sides, strict=True)]
+                for in_y in images[0]:
+                    for in_z in images[1]:
+                        rows_of, columns = (
+                            np.abs(axis.ravel() - place) <= form.reach for axis, place in ((y, in_y), (z, in_z))
+                        )
+                        part = np.ix_(rows_of, columns)
+                        holes[part] |= form.holds(y[rows_of] - in_y, z[columns] - in_z)
+        return holes
+
+
+class LevelSetPattern(_FreeForm):
+    """Holes where a sum of a few waves is largest.
+
+    Attributes:
+        shape: "level_set".
+        waves: the terms of the sum.
+        share: of holes in the cell, before a tool opens them.
+    """
+
+    shape: Literal["level_set"] = "level_set"
+    waves: Annotated[tuple[Wave, ...], Field(min_length=1, max_length=12)]
+    share: Annotated[float, Field(gt=0.0, lt=1.0)]
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        return self.spacing
+
+    def drawn(self, y: Array, z: Array) -> BoolArray:
+        a, b = len(y) * self.side, len(z) * self.side
+        height = sum(
+            one.amplitude * np.cos(2.0 * np.pi * (one.along_y * y / a + one.along_z * z / b) + one.phase)
+            for one in self.waves
+        )
+        if np.ptp(height) < 1e-9:
+            raise ValueError("got waves that cancel, but their sum must differ from place to place")
+        return np.asarray(height > np.quantile(height, 1.0 - self.share))
+
+
+def _images(place: float, reach: float, side: float) -> list[float]:
+    """Places of the images of a hole that reach into a period about the origin."""
+    first, last = (math.ceil((-0.5 * side - reach - place) / side), math.floor((0.5 * side + reach - place) / side))
+    return [place + number * side for number in range(first, last + 1)]
+
+
+def _opened(holes: BoolArray, radius: float) -> BoolArray:
+    """What a disc of a radius [cells] reaches of some holes, without leaving them."""
+    if radius < 0.5 or not holes.any() or holes.all():
+        return holes
+    from scipy.ndimage import distance_transform_edt
+
+    margin = min(math.ceil(2.0 * radius) + 2, *holes.shape)
+    wide = np.pad(holes, margin, mode="wrap")
+    centres = distance_transform_edt(wide) > radius
+    reached = distance_transform_edt(~centres) <= radius
+    return np.asarray(reached[margin:-margin, margin:-margin] & holes)
+
+
+def _in_one_piece(material: BoolArray) -> BoolArray:
+    """Material without what holes surround.
+
+    Raises:
+        ValueError: the holes cut the plate apart.
+    """
+    from scipy.ndimage import label
+
+    rows, columns = material.shape
+    labels = label(np.tile(material, (3, 3)))[0]
+    middle = labels[rows : 2 * rows, columns : 2 * columns]
+    counts = np.bincount(middle[middle > 0], minlength=1)
+    piece = int(counts.argmax()) if counts.any() else 0
+    row, column = (int(index[0]) for index in np.nonzero(middle == piece)) if piece else (0, 0)
+    whole = [(row + k * rows, column + m * columns) for k, m in ((1, 1), (0, 1), (2, 1), (1, 0), (1, 2))]
+    if not piece or any(labels[at] != piece for at in whole):
+        raise ValueError("got holes that cut the plate apart, but the material must hold together")
+    return np.asarray(middle == piece)
