@@ -182,6 +182,7 @@ def _overheads(values: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
+    ahead = ", scheduled ahead of it" if values["ahead_of_other_work"] else ""
     before = {"rested": "the map before complete", "refining": "the map before being refined"}
     for key, seconds in values["seconds"].items():
         yield Row(
@@ -189,7 +190,7 @@ def _design_page(values: Mapping[str, Any]) -> Iterator[Row]:
             "slotted plate",
             f"{seconds['median']:.2f} s (median), {seconds['p95']:.2f} s (95 %)",
             f"until a headless Chromium has drawn it, {seconds['processor']:.2f} s of a core; at most 0.3 s is wanted",
-            f"{values['changes']} changes; load {values['load_before']:.1f} before",
+            f"{values['changes']} changes; other load {values['load_before']:.1f}{ahead}",
         )
 
 

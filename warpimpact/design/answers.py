@@ -103,6 +103,7 @@ class Answers:
             Cancelled: by `cancel`.
         """
         datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
+        cancel.check()
         own = datasets[OWN]
         promise = promise_text(own)
         most = MOST_HITS // len(datasets)
@@ -123,7 +124,11 @@ class Answers:
     def numbers(self, designs: Mapping[str, Design], cancel: Cancel) -> dict[str, Any]:
         """The tables of the same designs as HTML."""
         datasets = {label: self.result(design.text, cancel) for label, design in designs.items()}
-        results = [result_content(label, dataset) for label, dataset in datasets.items()]
+        results = []
+        for label, dataset in datasets.items():
+            cancel.check()
+            results.append(result_content(label, dataset))
+        cancel.check()
         comparison = compared(datasets, picture=False) if len(datasets) > 1 else None
         html = self._environment.get_template("answer.html").render(
             results=results, comparison=comparison, texts=texts()

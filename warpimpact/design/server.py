@@ -94,7 +94,7 @@ class _Pages:
             try:
                 async with aclosing(self._lines(design, others, level)) as found:
                     async for line in found:
-                        yield as_json(line) + "\n"
+                        yield await run_in_threadpool(as_json, line) + "\n"
             except Exception as error:
                 yield _refused(error)
 
