@@ -27,7 +27,7 @@ class Sampling(Model):
         hits: hit points per set over the part of the cell that differs.
         draws: of the posterior in the file, of equal weight.
         effective: effective sample size at which the sampling ends.
-        shared: sets that share the numbers which need a scene of their own, such as a degradation length.
+        shared: sets that share the numbers which need a scene of their own, such as a spacing of holes.
         seed: of all that is drawn.
     """
 

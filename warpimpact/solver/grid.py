@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.solver.device import free_memory
-from warpimpact.solver.itself import Itself
+from warpimpact.solver.keys import Key
 from warpimpact.solver.materials import ROUNDING
 
 if TYPE_CHECKING:
@@ -193,13 +193,13 @@ def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
     Raises:
         MemoryError: the tile does not fit; the message is for the user.
     """
-    return _tile(Itself(plate.pattern), spacing, sharp)
+    return _tile(Key(plate.pattern), spacing, sharp)
 
 
 @lru_cache(maxsize=16)
-def _tile(itself: Itself[Pattern], spacing: float, sharp: bool) -> Tile:
+def _tile(key: Key[Pattern], spacing: float, sharp: bool) -> Tile:
     """The tile of a pattern, kept for later shots at the same plate."""
-    pattern = itself.value
+    pattern = key.value
     period_y, period_z = pattern.period
     # An even number, so that a row staggered by half a period sees the same cells.
     step = 1 if sharp else 2

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.scene import Core
-from warpimpact.solver.itself import Itself
+from warpimpact.solver.keys import Key
 
 Array = NDArray[np.float64]
 
@@ -71,21 +71,21 @@ def rings_of(core: Core, axial: int, around: int, widest: float = math.inf, *, d
     closed surface sum to zero and the work of a straight shot is exact (docs/model.md §6.1).
     """
     if not discs:
-        return _rings(Itself(core), np.linspace(0.0, core.length, axial + 1).tobytes(), 0, 0, around)
-    (edges, rise), (nose, base) = _stations(Itself(core), axial), _ends(Itself(core))
+        return _rings(Key(core), np.linspace(0.0, core.length, axial + 1).tobytes(), 0, 0, around)
+    (edges, rise), (nose, base) = _stations(Key(core), axial), _ends(Key(core))
     parts, across = np.maximum(1, np.ceil(rise / widest - 1e-9)).astype(int), min(widest, core.length / axial)
     divided = edges.tobytes() if parts.max() == 1 else _divided(edges.tobytes(), parts.tobytes())
-    return _rings(Itself(core), divided, _discs(nose, across), _discs(base, across), around)
+    return _rings(Key(core), divided, _discs(nose, across), _discs(base, across), around)
 
 
 @lru_cache(maxsize=64)
-def _rings(itself: Itself[Core], edges: bytes, nose: int, base: int, around: int) -> Rings:
+def _rings(key: Key[Core], edges: bytes, nose: int, base: int, around: int) -> Rings:
     """Rings between some edges of the profile, and so many of the discs at the nose and at the base."""
-    core = itself.value
+    core = key.value
     parts = [
-        _disc_rings(0.0, _ends(itself)[0], nose, facing=1.0),
+        _disc_rings(0.0, _ends(key)[0], nose, facing=1.0),
         _profile_rings(core, np.frombuffer(edges)),
-        _disc_rings(core.length, _ends(itself)[1], base, facing=-1.0),
+        _disc_rings(core.length, _ends(key)[1], base, facing=-1.0),
     ]
     s, r, axial_area, radial_area, half_s, half_r, turn_s, turn_r = (
         np.concatenate(column) for column in zip(*parts, strict=True)
@@ -105,20 +105,20 @@ def _rings(itself: Itself[Core], edges: bytes, nose: int, base: int, around: int
 
 
 @lru_cache(maxsize=16)
-def _ends(itself: Itself[Core]) -> tuple[float, float]:
+def _ends(key: Key[Core]) -> tuple[float, float]:
     """Radii of a core at its nose and its base [m]."""
-    nose, base = itself.value.radius(np.array([0.0, itself.value.length]))
+    nose, base = key.value.radius(np.array([0.0, key.value.length]))
     return float(nose), float(base)
 
 
 @lru_cache(maxsize=16)
-def _stations(itself: Itself[Core], count: int) -> tuple[Array, Array]:
+def _stations(key: Key[Core], count: int) -> tuple[Array, Array]:
     """Edges of the profile's rings, and how much the radius changes from one to the next [m].
 
     They are length/count apart ahead of the widest station, BEHIND times this distance behind it. The widest station is
     an edge. Jumps of the slope are edges, too, if they are fewer than `count`.
     """
-    core = itself.value
+    core = key.value
     breaks, widest = core.breaks if len(core.breaks) < count else (), _widest_station(core)
     inner = np.unique([*breaks, widest])
     apart = np.diff(inner, prepend=0.0, append=core.length) > 1e-6 * core.length

@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.solver.itself import Itself
+from warpimpact.solver.keys import Key
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core
@@ -37,13 +37,13 @@ class Put:
 
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
     """The Surface (kernels/core_surface.py) of a core in rings of patches."""
-    return _surface(struct, Itself(core), rings, azimuths.tobytes(), put)
+    return _surface(struct, Key(core), rings, azimuths.tobytes(), put)
 
 
 @lru_cache(maxsize=64)
-def _surface(struct: Any, itself: Itself[Core], rings: Rings, azimuth: bytes, put: Put) -> Any:
+def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put) -> Any:
     """No kernel changes it, so it is kept for later shots with the same core."""
-    core, azimuths = itself.value, np.frombuffer(azimuth)
+    core, azimuths = key.value, np.frombuffer(azimuth)
     surface, area, around = struct(), np.hypot(rings.area_axial, rings.area_radial), len(azimuths) // 2
     azimuth_of = np.resize(azimuths, len(area) * around)  # of even and of odd rings in turn
     values = {name: getattr(rings, name) for name in _OF_A_RING} | {

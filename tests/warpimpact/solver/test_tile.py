@@ -72,6 +72,8 @@ def test_tile_is_kept_for_the_next_shots_but_not_for_another_mask_of_the_same_na
         return PLATE.model_copy(update={"pattern": pattern})
 
     one, other = masked((0, 0)), masked((2, 1))
+    slotted, again = (PLATE.model_copy(update={"pattern": PATTERNS[0].model_copy()}) for _ in range(2))
+    assert tile_of(slotted, 0.5e-3) is tile_of(again, 0.5e-3)
     assert tile_of(one, 0.5e-3) is tile_of(one.model_copy(update={"thickness": 1.0}), 0.5e-3)
     assert (tile_of(one, 0.5e-3).material != tile_of(other, 0.5e-3).material).any()
 
