@@ -23,7 +23,7 @@ _Exponent = Annotated[float, Field(gt=0.05, le=100.0)]
 
 
 class Supershape(Model):
-    """One hole of a free form, r(θ) ∝ (|cos(mθ/4)|^n2 + |sin(mθ/4)|^n3)^(−1/n1).
+    """One hole of a free form, ``r(θ) ∝ (|cos(mθ/4)|^n2 + |sin(mθ/4)|^n3)^(−1/n1)``.
 
     Source: J. Gielis, American Journal of Botany 90 (2003) 333.
 
