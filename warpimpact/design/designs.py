@@ -111,7 +111,13 @@ def _texts(path: Path) -> Iterator[tuple[str, str]]:
         yield from _texts_of_results(path)
         return
     text = read_text(path)
-    if isinstance(parsed(text, str(path)).get("plate"), list):
+    tables = parsed(text, str(path))
+    if "variables" in tables:
+        raise CampaignError(
+            f"{path}: variables: this takes one design; warpimpact optimise {path} searches the best ones into a "
+            "file, which this takes"
+        )
+    if isinstance(tables.get("plate"), list):
         for name, campaign in read_plates(path).items():
             yield name, campaign.text
     else:

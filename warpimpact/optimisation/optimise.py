@@ -10,6 +10,7 @@ from warpimpact.optimisation.crew import Crew, local_crew
 from warpimpact.optimisation.design import Design, read_design
 from warpimpact.optimisation.outcome import to_dataset, write_campaigns
 from warpimpact.optimisation.search import Follow, SearchProgress, search
+from warpimpact.optimisation.searcher import check_installed
 from warpimpact.optimisation.work import Work
 from warpimpact.results import front as f
 from warpimpact.runs.store import Store, stored
@@ -77,6 +78,7 @@ def folder_of(output: Path) -> Path:
 def _found(
     design: Design, crew: Crew, store: Store | None, follow: Follow, folder: Path | None = None
 ) -> tuple[xarray.Dataset, list[Path]]:
+    check_installed()
     check_references(design)
     work = Work(design, crew, store)
     last: list[SearchProgress] = []

@@ -7,6 +7,7 @@ K. Deb and others, IEEE Transactions on Evolutionary Computation 6 (2002) 182; J
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -18,25 +19,31 @@ from warpimpact.optimisation.space import Space
 Array = NDArray[np.float64]
 
 
+def check_installed() -> None:
+    """Refuse a search without the libraries that it needs.
+
+    Raises:
+        CampaignError: names the one that is not installed.
+    """
+    for library in ("pymoo", "moocore"):
+        if find_spec(library) is None:
+            raise CampaignError(f"a search needs {library}: pip install 'warpimpact[optimise]'")
+
+
 class Searcher:
     """Points of a space, a generation at a time. They depend on the seed and on what was told alone.
 
     Args:
         objectives, constraints: how many.
         population: points of a generation.
-
-    Raises:
-        CampaignError: pymoo is not installed.
     """
 
     def __init__(self, space: Space, objectives: int, constraints: int, population: int, seed: int) -> None:
-        try:
-            from pymoo.algorithms.moo.nsga2 import NSGA2
-            from pymoo.core.mixed import MixedVariableDuplicateElimination, MixedVariableMating, MixedVariableSampling
-            from pymoo.core.problem import Problem
-            from pymoo.core.termination import NoTermination
-        except ImportError:
-            raise CampaignError("a search needs pymoo: pip install 'warpimpact[optimise]'") from None
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.mixed import MixedVariableDuplicateElimination, MixedVariableMating, MixedVariableSampling
+        from pymoo.core.problem import Problem
+        from pymoo.core.termination import NoTermination
+
         self._names = [f"{number:03d}" for number in range(len(space.variables))]
         kinds = {name: _kind(one) for name, one in zip(self._names, space.variables, strict=True)}
         self._problem = Problem(vars=kinds, n_obj=objectives, n_ieq_constr=constraints)

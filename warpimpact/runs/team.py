@@ -81,13 +81,13 @@ def local_team(
     Args:
         device: "auto" (every CUDA device if there is one, else the CPU), or names with commas between them.
         computation: of every hit.
-        cancel: ends what they compute, whose futures then raise Cancelled; it is cancelled when the team breaks up.
+        cancel: ends what they compute, whose futures then raise Cancelled.
 
     Raises:
         DeviceError: a device is absent, or they are of different kinds, which compute different bits.
     """
     devices = _devices(device)
-    idle, done, stop = SimpleQueue[Worker](), dict[int, int](), cancel or Cancel()
+    idle, done, stop = SimpleQueue[Worker](), dict[int, int](), Cancel(cancel)
     tried, begun = list[int](), list[Future[Any]]()
     for chosen in devices:
         idle.put(Worker(str(chosen), cancel=stop))

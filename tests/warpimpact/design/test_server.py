@@ -219,6 +219,7 @@ def test_threats_materials_and_layers_can_be_chosen(small: Path) -> None:
     ("arguments", "sentence"),
     [
         (["nothing.toml"], "nothing.toml: there is no such file"),
+        ([str(CAMPAIGNS / "designs" / "lightest_plate.toml")], "this takes one design; warpimpact optimise"),
         (["http://127.0.0.1:1/x/#rubbish"], 'holds no design behind its "#"'),
         (["--port", "70000"], "--port: got 70000"),
     ],

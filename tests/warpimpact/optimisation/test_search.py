@@ -16,6 +16,7 @@ from warpimpact import Campaign
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
+from warpimpact.optimisation import searcher
 from warpimpact.optimisation.confirm import fresh_seed
 from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import design_from, read_design
@@ -59,10 +60,10 @@ def _disc(coordinates: Sequence[Sequence[float]]) -> tuple[np.ndarray, np.ndarra
 
 def test_a_front_with_a_constraint_has_its_hypervolume() -> None:
     space = Space((Variable("x", "x", 0.0, 1.0), Variable("y", "y", 0.0, 1.0)))
-    searcher, kept = Searcher(space, 2, 1, 40, seed=1), []
+    asking, kept = Searcher(space, 2, 1, 40, seed=1), []
     for _ in range(50):
-        points, broken = _disc(searcher.ask())
-        searcher.tell(points, broken)
+        points, broken = _disc(asking.ask())
+        asking.tell(points, broken)
         kept += list(points[broken[:, 0] <= 0.0])
     exact = 1.0 - np.pi / 4.0
     assert 0.9 * exact < hypervolume(np.array(kept), np.ones(2)) < exact
@@ -207,3 +208,9 @@ def test_the_front_says_what_survives_the_uncertainty_of_the_parameters(tmp_path
     assert found[f.SURVIVAL].values[0, 1] > 0.99
     assert np.isnan(found[f.SURVIVAL].values[[0, 1], [0, 1]]).all()
     assert any("1 of 1 differences" in line for line in front_lines(found))
+
+
+def test_a_search_says_which_library_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(searcher, "find_spec", lambda name: None if name == "moocore" else name)
+    with pytest.raises(CampaignError, match=r"needs moocore: pip install 'warpimpact\[optimise\]'"):
+        optimise(design(HOLES, WEIGHT_AND_ENERGY, SEARCH))
