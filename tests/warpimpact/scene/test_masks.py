@@ -161,7 +161,7 @@ def test_a_mask_of_one_hole_on_a_small_plate_has_the_rim_alone(tmp_path: Path) -
     mask = MaskPattern(file=tmp_path / "a.npy", cell_size="1 mm")
     assert mask.ligament((6 * MM, 8 * MM)) == pytest.approx(2 * MM)
     assert mask.ligament() == pytest.approx(8 * MM)
-    with pytest.raises(ValueError, match='margin cannot be combined with shape = "mask", .*: it has no single holes'):
+    with pytest.raises(ValueError, match=r'margin cannot be combined with shape = "mask", .*: it has no single holes'):
         mask.bounded((6 * MM, 8 * MM), 1 * MM)
 
 
