@@ -134,17 +134,19 @@ class March:
         waiting: set[Future[tuple[int, float]]] = set()
         alone = len(slots) == 1 and threading.current_thread() is not threading.main_thread()  # which is interrupted
         pool = _Here() if alone else ThreadPoolExecutor(len(slots))
+        # After each launch a thread may wait for the interpreter, while another one prepares its scene.
+        largest = total if alone else CPU_CHUNK
         try:
             while done < total:
                 while begun < total and len(waiting) < 2 * len(slots):
-                    share = max(1, (total - begun) // (SHARES * len(slots)))
+                    share = total - begun if alone else max(1, (total - begun) // (SHARES * len(slots)))
                     count = min(chunk_of(min(most, share), self.at_a_plate), total - begun)
                     waiting.add(pool.submit(work, begun, count))
                     begun += count
                 ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
                 for shots, seconds in (future.result() for future in ended):
                     done += shots
-                    most = min(CPU_CHUNK, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
+                    most = min(largest, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
                 progress(done)
         finally:  # whoever interrupts does not wait for a shot that takes a minute
             pool.shutdown(wait=False, cancel_futures=True)
