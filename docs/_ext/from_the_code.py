@@ -125,6 +125,11 @@ class CampaignReference(FromTheCode):
         name = model["properties"][key]["const"]
         yield from [f'{depth} `{key} = "{name}"`', "", model.get("description", ""), ""]
         yield from self.keys(model, without=key)
+        for name, part in model["properties"].items():
+            for one in self.chosen({"items": part["items"]} if "items" in part else {}):
+                if "properties" in one:
+                    yield from [f"Each of {code(name)} has:", ""]
+                    yield from self.keys(one)
 
     def keys(self, model: dict[str, Any], without: str = "") -> Iterator[str]:
         required = model.get("required", [])
