@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
-from warpimpact import Campaign
+from warpimpact import Campaign, Numerics
 from warpimpact.campaign.campaign import CampaignError
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally, dealing
@@ -16,6 +16,7 @@ from warpimpact.runs import shards
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, RunProgress, run, run_to_file
+from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.worker import Worker
 
 TEXT = (Path(__file__).parents[3] / "campaigns" / "burst_of_five.toml").read_text(encoding="utf-8")
@@ -97,8 +98,9 @@ def test_an_interval_counts_bursts(result: xarray.Dataset) -> None:
 def test_the_pilot_takes_whole_bursts(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
 
-    def piloted(scene: object, pilot: object, *rest: object) -> None:
+    def piloted(scene: object, pilot: object, *rest: object) -> HitErrors:
         seen.append(pilot)
+        return HitErrors(Numerics(level=0), True, 0.9, 0.0, 0.0)
 
     monkeypatch.setattr("warpimpact.runs.compute.pilot_of", piloted)
     for sampling in ("sobol", "grid"):

@@ -89,7 +89,7 @@ MISTAKES = {
         'shape = "slot"',
         'shape = "slit"',
         "plate.pattern.shape: got \"slit\", but it must be one of 'slot', 'circle', 'triangle', "
-        "'square', 'hexagon', 'ellipse', 'none', 'mask'",
+        "'square', 'hexagon', 'ellipse', 'none', 'supershape', 'level_set', 'mask'",
     ),
     "unknown choice": (
         '"standard"',

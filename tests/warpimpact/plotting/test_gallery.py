@@ -35,7 +35,8 @@ def test_stored_pictures_are_not_stale() -> None:
         assert (CAMPAIGNS / name).stat().st_size <= gallery.LARGEST
     assert not stale, "these differ from what the code draws; run make gallery"
     kept = {path.relative_to(CAMPAIGNS).as_posix() for path in (CAMPAIGNS / "gallery").glob("*.png")}
-    assert kept == {name for name in drawn if name.startswith("gallery/")}
+    by_browser = {name for name in kept if name.startswith("gallery/design_")}  # tests/benchmarks/design_film.py
+    assert kept - by_browser == {name for name in drawn if name.startswith("gallery/")}
 
 
 def test_another_picture_would_be_noticed() -> None:

@@ -19,6 +19,7 @@ from warpimpact.results.variables import (
     SHOT_VARIABLES,
 )
 from warpimpact.scene import NoPattern, Shots, SquarePattern
+from warpimpact.scene.quantities import OF_A_DRAW
 
 MM = 1e-3
 TWO_HOLES = SquarePattern(side=2 * MM, spacing=(16 * MM, 8 * MM), holes=[(2 * MM, 0.0), (-2 * MM, 0.0)])
@@ -230,7 +231,8 @@ def test_reading_another_dataset_names_what_is_missing(make_result, tmp_path):
 def test_every_field_of_shots_has_a_variable():
     shot_names = {variable.field for variable in SHOT_VARIABLES} | {"hit_y", "hit_z"}
     of_layers = {name.removeprefix("layer_") for name in OPTIONAL_SHOT_VARIABLES}
-    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers
+    # `posterior_draw` says what shots of a posterior have of those.
+    assert {field.name for field in dataclasses.fields(Shots)} == shot_names | of_layers | {*OF_A_DRAW}
 
 
 @pytest.mark.parametrize("standoff", [np.nan, 130e-3])

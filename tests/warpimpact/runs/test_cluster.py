@@ -159,7 +159,7 @@ def test_the_ligament_of_a_mask_is_found_once_for_all_workers(
     def again(_: object) -> float:
         raise AssertionError("was computed again")
 
-    monkeypatch.setattr("warpimpact.scene.patterns.mask.smallest_gap", again)
+    monkeypatch.setattr("warpimpact.scene.patterns.cells.smallest_gap", again)
     with pytest.raises(AssertionError):
         _ = masked.model_copy().plate.pattern.model_copy().ligament()
     assert pickle.loads(pickle.dumps(found)).plate.ligament == found.plate.ligament > 0.0
