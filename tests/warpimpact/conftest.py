@@ -216,9 +216,16 @@ class Browser:
         return [element.get_property("value") for element in self.find(selector)]
 
     def wait(self, condition: Callable[[], object], seconds: float = 30.0) -> None:
+        from selenium.common.exceptions import StaleElementReferenceException
         from selenium.webdriver.support.ui import WebDriverWait
 
-        WebDriverWait(self.driver, seconds, poll_frequency=0.05).until(lambda _: condition())
+        drawn_anew = [StaleElementReferenceException]  # between finding an element and asking it
+        waiting = WebDriverWait(self.driver, seconds, poll_frequency=0.05, ignored_exceptions=drawn_anew)
+        waiting.until(lambda _: condition())
+
+    def press(self, selector: str) -> None:
+        """Click the first of some elements, which the page may draw anew meanwhile."""
+        self.wait(lambda: self.find(selector)[0].click() is None)
 
     def point_at(self, selector: str, right: float, down: float, *, click: bool = False) -> None:
         """Move to a place of an element, from its middle in shares of its width and height."""

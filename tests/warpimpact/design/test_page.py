@@ -47,7 +47,7 @@ def toml(browser: Any, tmp_path: Path) -> Path:
     browser.driver.execute_cdp_cmd(
         "Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path), "eventsEnabled": False}
     )
-    browser.find("#save")[0].click()
+    browser.press("#save")
     browser.wait(lambda: list(tmp_path.glob("*.toml")))
     (path,) = tmp_path.glob("*.toml")
     return path
@@ -97,7 +97,7 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
     move(page, thickness.removeprefix("#"), 5.0)
     page.wait(lambda: page.driver.current_url != before)
     address = page.driver.current_url
-    page.find("#undo")[0].click()
+    page.press("#undo")
     page.wait(lambda: page.values(thickness) == ["4"])
     page.open("about:blank")
     page.open(address)
@@ -117,7 +117,7 @@ def test_a_click_on_the_map_shows_that_hit(page: Any) -> None:
 
 
 def test_a_pinned_design_is_compared_shot_by_shot(page: Any, small: Path) -> None:
-    page.find("#pin")[0].click()
+    page.press("#pin")
     move(page, "control-plate-thickness", 5.0)
     page.wait(lambda: "better than" in page.text("#answer") and "Complete" in page.text("#status"), 120.0)
     tables = tomllib.loads(small.read_text())
@@ -241,11 +241,11 @@ def test_a_threat_a_material_and_a_layer_are_chosen(page: Any) -> None:
     )
     page.driver.execute_script(choose, "control-core-threat", ".30 AP M2")
     page.wait(lambda: page.values("#control-impact-velocity-number") == ["878"])
-    page.find("#add-layer")[0].click()
+    page.press("#add-layer")
     page.wait(lambda: page.find("#control-layer-0-gap"))
     page.driver.execute_script(choose, "control-layer-0-pattern", "circle")
     page.wait(lambda: page.find("#control-layer-0-pattern-diameter"))
-    page.find("#controls fieldset:last-of-type button")[0].click()
+    page.press("#controls fieldset:last-of-type button")
     page.wait(lambda: not page.find("#control-layer-0-gap"))
     assert not page.text("#sentence")
     assert page.errors() == []
@@ -253,7 +253,7 @@ def test_a_threat_a_material_and_a_layer_are_chosen(page: Any) -> None:
 
 def test_the_report_of_the_page_is_that_of_its_designs(page: Any, tmp_path: Path) -> None:
     page.driver.execute_cdp_cmd("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(tmp_path)})
-    page.find("#report")[0].click()
+    page.press("#report")
     page.wait(lambda: list(tmp_path.glob("*.html")), 120.0)
     (path,) = tmp_path.glob("*.html")
     page.wait(lambda: path.read_text(encoding="utf-8").endswith("</html>"), 30.0)
