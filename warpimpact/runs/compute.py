@@ -100,9 +100,8 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
 
 
 def _finer(campaign: Campaign, found: Found | None) -> dict[str, Any]:
-    """Columns of the hits that a pilot computed at a finer level. The pilot knows the scene of the campaign, not the
-    draws of a posterior."""
-    if not isinstance(found, HitErrors) or found.finer is None or campaign.drawn is not None:
+    """Columns of the hits that a pilot computed at a finer level."""
+    if not isinstance(found, HitErrors) or found.finer is None:
         return {}
     group = len(campaign.symmetries) * campaign.at_a_plate
     groups = len(found.finer) // campaign.at_a_plate
