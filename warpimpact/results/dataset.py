@@ -91,7 +91,8 @@ def to_table(
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     variables = (name for name in v.hit_variables() if name in values and name not in left_out)
-    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES, *v.FINER_VARIABLES}
+    finer = [name for name, of_hits in v.FINER_VARIABLES.items() if of_hits in v.computed_variables()]
+    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES, *finer}
     return Table.of(
         stored_columns(variables, values, single),
         stored_columns((name for name in along if name in coordinates), coordinates, single),
@@ -146,7 +147,8 @@ def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
         of_hits: (of_hits.dims, dataset[name].values[those[order]], dict(dataset[of_hits].attrs))
         for name, of_hits in stored.items()
     }
-    return coarse, coarse.assign(at_finer)
+    unknown = [name for name in v.FINER_VARIABLES.values() if name in coarse and name not in at_finer]
+    return coarse, coarse.assign(at_finer).drop_vars(unknown)
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:

@@ -47,7 +47,8 @@ class History:
         """Read a trace of shape [steps, WIDTH] (kernels/trace.py)."""
         from scipy.spatial.transform import Rotation  # a third of a second to import
 
-        time, position, attitude, velocity, momentum, force, moment, step = (trace[:, part] for part in COLUMNS.values())
+        columns = (trace[:, part] for part in COLUMNS.values())
+        time, position, attitude, velocity, momentum, force, moment, step = columns
         axis = Rotation.from_quat(attitude).apply([1.0, 0.0, 0.0])
         spin = np.sum(momentum * axis, axis=1, keepdims=True)
         along = spin * axis
