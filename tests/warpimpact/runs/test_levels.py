@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, Numerics
+from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.summary import estimated, summary_text
 from warpimpact.results import attributes as attr
@@ -115,7 +116,10 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
         if one.hit is None and not one.label.startswith("P("):
             assert abs(one.value - other.value) <= (one.numerics or 0.0), one.name
     assert "numerics ± " in summary_text(told)
-    assert "numerics" not in summary_text(truth)
+    assert summary_text(truth).count("numerics ±") == 1
+    assert "numerics ± is not known: numerics.level is given, so no hits" in summary_text(truth)
+    assert "numerics ± is not known: none of these hits" in summary_text(told.isel(hit=slice(900, None)))
+    assert any("numerics ± is not known of b: " in note for note in compare([told, truth], ["a", "b"]).notes)
 
 
 def test_a_stop_rule_takes_the_level_and_the_hits_that_its_interval_needs() -> None:
