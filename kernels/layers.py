@@ -69,6 +69,40 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         farthest: real
 
     @wp.func
+    def first_step(target: Target, shot: wp.int32, shortest: real):
+        """Length of the first step [s]: that of the plate."""
+        return own_of(target.stretch, 0, shot) * shortest
+
+    @wp.func
+    def next_step(
+        surface: Surface,
+        target: Target,
+        shot: wp.int32,
+        pose: Pose,
+        reached: Reached,
+        last: Change,
+        dt: real,
+        free: real,
+        shortest: real,
+    ):
+        """Length of the step after the present one and a `free` time [s]: that of the layer that needs the shortest, of
+        those that the core can be in until then. It is not so long that it takes more than a share of the speed, if it
+        takes as much of it per time as the present one."""
+        longest = one
+        for k in range(target.count):
+            longest = wp.max(longest, own_of(target.stretch, k, shot))
+        margin = (half * dt + free + longest * shortest) * pose.speed
+        low, high = reached.rearmost - margin, reached.foremost + margin
+        stretch = longest
+        for k in range(target.count):
+            front, rear = faces_of(target, k, shot)
+            if high > front and low < rear:
+                stretch = wp.min(stretch, own_of(target.stretch, k, shot))
+        taken = wp.length(last.velocity) + surface.bounding_radius * wp.length(last.omega)
+        allowed = target.slowing * wp.length(pose.velocity) * dt / (taken + tiny)
+        return wp.max(shortest, wp.min(stretch * shortest, allowed))
+
+    @wp.func
     def begin(
         surface: Surface,
         target: Target,

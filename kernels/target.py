@@ -36,6 +36,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         Layers that touch each other and remember alike are one laminate: a contact in one weakens the others, and they
         share a field. `laminate` is the number of the first of them. `deep` is 1 where the laminate is thicker than the
         depth over which it weakens together, else 0.
+        `stretch` is how many times longer a step may be than the shortest, where a core touches nothing but the layer,
+        and `slowing` is the share of its speed that a longer step may take.
         `standoffs` are distances behind the rear face of every layer [m], which the point `ahead` of the centre of mass
         passes [m].
         """
@@ -48,6 +50,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         by_path: wp.array(dtype=wp.bool)
         standoffs: wp.array(dtype=real)
         ahead: real
+        slowing: real
         front: wp.array2d(dtype=wp.float64)
         thickness: wp.array2d(dtype=wp.float64)
         deep: wp.array2d(dtype=wp.float64)
@@ -61,6 +64,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         decay_rate: wp.array2d(dtype=real)
         onset_jump: wp.array2d(dtype=real)
         most_jump: wp.array2d(dtype=real)
+        stretch: wp.array2d(dtype=real)
 
     @wp.func
     def own_of(values: wp.array2d(dtype=Any), layer: wp.int32, shot: wp.int32):
