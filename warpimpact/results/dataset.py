@@ -134,9 +134,9 @@ def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
     level. None if there are none."""
     if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
         return None
-    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if name in dataset and of_hits in dataset}
-    if any(dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
-        return None  # results that were joined have several
+    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in dataset}
+    if any(name not in dataset or dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
+        return None  # results that were joined have several; altered ones lack some
     numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
     found, places, those = np.intersect1d(hits, numbers, return_indices=True)
     if not len(found) or v.STATUS not in stored.values() or np.isin(hits, found).sum() > len(found):
@@ -147,8 +147,7 @@ def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
         of_hits: (of_hits.dims, dataset[name].values[those[order]], dict(dataset[of_hits].attrs))
         for name, of_hits in stored.items()
     }
-    unknown = [name for name in v.FINER_VARIABLES.values() if name in coarse and name not in at_finer]
-    return coarse, coarse.assign(at_finer).drop_vars(unknown)
+    return coarse, coarse.assign(at_finer)
 
 
 def numbered(dataset: AResult, first: int = 0) -> AResult:
