@@ -342,6 +342,8 @@ def build(variant: Variant) -> SimpleNamespace:
         int j = 0;
     #if !defined(__CUDA_ARCH__)
         typedef Real Vector __attribute__((vector_size(LANES * sizeof(Real))));
+        typedef Real Pair __attribute__((vector_size(2 * LANES * sizeof(Real))));  // one waits while the other adds
+        for (; j + 2 * LANES <= count; j += 2 * LANES) sum(Pair{}, gained + j, into + j, kept + j);
         for (; j + LANES <= count; j += LANES) sum(Vector{}, gained + j, into + j, kept + j);
     #endif
         for (; j < count; ++j) sum((Real)0, gained + j, into + j, kept + j);
