@@ -11,7 +11,7 @@ from types import ModuleType, SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, earlier, footprint, interaction, passage, plate_grid, rigid_body, shots, target
+from . import core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots, target
 from .status import RUNNING, Status
 from .variant import Variant
 
@@ -22,7 +22,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one, tiny = real(0.0), real(0.5), real(1.0), real(1.0e-9)
     far = 1.0e9  # [m]
-    use = variant.use(core_surface, earlier, footprint, interaction, passage, plate_grid, rigid_body, shots)
+    use = variant.use(core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots)
     plates, loads = target.build(variant, scheme), scheme.build(variant)
     Surface, Pose, Window = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Window
     Body, State = use.rigid_body.Body, use.rigid_body.State
@@ -156,6 +156,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         home = vec3()
         if layer > 0 or stack.open[slot * target.count + layer]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
+        use.lanes.barrier()
         for k in range(target.laminate[layer], target.count):
             if target.laminate[k] == target.laminate[layer]:
                 here = slot * target.count + k
@@ -263,6 +264,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
                     found.inside = found.inside and (
                         touch.inside or not (target.weakens[k] or wp.static(variant.burst))
                     )
+                use.lanes.barrier()
                 stack.found[here] = touch
             elif low > rear and not use.passage.has_left(passage, shot, k):
                 since = (rearmost - rear) / wp.max(state.velocity[0], one)

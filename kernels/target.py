@@ -20,6 +20,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     Shots, Earlier, own = use.shots.Shots, use.earlier.Earlier, use.shots.own
     Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
     Fields, open_blank = scheme.build(variant).Fields, scheme.build(variant).open_window
+    fields_of = getattr(scheme.build(variant), "fields_of", None)  # where a window may be in shared memory
 
     # One plate comes by value, because CUDA does not know where a pointer leads that lies in memory.
     Plates = wp.array(dtype=Plate) if variant.layered or variant.tabled else Plate
@@ -146,6 +147,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
                 window.planes = 1
                 window.per_plane = real(0.0)
         if wp.static(variant.burst):
+            if wp.static(variant.window > 0):
+                fields = fields_of(fields, window.first)
             thickness = own_of(target.thickness, layer, shot)
             window = use.channel.open_window(window, earlier.channels, thickness, layer)
             window.pierced = use.earlier.recall(earlier, fields, plate, window, slot, layer, shot, y, z)
@@ -156,6 +159,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         """Keep for later shots what this one has added to a layer in its window there."""
         if wp.static(variant.burst):
             if window.weakens:
+                if wp.static(variant.window > 0):
+                    fields = fields_of(fields, window.first)
                 use.earlier.keep(earlier, fields, window, slot, shot)
 
     @wp.func

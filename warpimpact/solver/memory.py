@@ -150,7 +150,7 @@ class Memory:
         """Names of the fields that a slot needs."""
         if not (self.variant.nodal or self.variant.degrades):
             return []
-        if self.variant.window and self.device.is_cuda:  # the others are in shared memory
+        if self.variant.window and self.device.is_cuda and not self.variant.layered:  # the others are in shared memory
             return ["filtered"]
         members, real = self.stage.Fields.vars.items(), self.variant.real
         names = [name for name, member in members if getattr(member.type, "dtype", None) is real]
