@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, exposure, memory, plate_grid
+from . import core_surface, exposure, lanes, memory, plate_grid
 from .variant import Variant
 
 
@@ -25,7 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
     steepest = real(0.5)  # least cosine of a core's angle with the normal for which its sections are compared
     spared = real(0.1)  # cells: what a section adds beyond the last one by no more is not drawn
     wall = real(20.0)  # the share of material goes from 0 to 1 over a cell divided by this
-    use = variant.use(core_surface, exposure, plate_grid)
+    use, split = variant.use(core_surface, exposure, lanes, plate_grid), lanes.split(variant)
     read, write = memory.build(real).read, memory.build(real).write
     Surface, Pose, Fields = use.core_surface.Surface, use.core_surface.Pose, use.exposure.Fields
     Window, Box = use.plate_grid.Window, use.plate_grid.Box
@@ -63,16 +63,19 @@ def build(variant: Variant) -> SimpleNamespace:
         apart: wp.array(dtype=wp.float64)
 
     # Native, because a compiler vectorises these loops only if the pointers do not alias.
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start >= 0 && start + count <= field.shape[0]);
     auto* __restrict__ into = field.data + start;
     for (int j = 0; j < count; ++j) into[j] = value;
     """)
+    )
     def fill(field: wp.array(dtype=real), start: wp.int32, count: wp.int32, value: real):
         """field[start + j] = value for j < count."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     const auto least = [](int a, int b) { return a < b ? a : b; };
     const auto most = [](int a, int b) { return a > b ? a : b; };
     const int row_low = most(most(0, -row), box.y_low - 1 - row);
@@ -92,6 +95,7 @@ def build(variant: Variant) -> SimpleNamespace:
         }
     }
     """)
+    )
     def join_shifted(
         field: wp.array(dtype=real),
         target: wp.int32,
@@ -110,7 +114,8 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     # (r² − d²) / 2r in the place of the distance r − d: the same at the wall, and without a root.
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     using Real = decltype(0 * y);
     assert(start >= 0 && (rows <= 0 || columns <= 0 || start + (rows - 1) * stride + columns <= field.shape[0]));
     const Real per = -(Real)0.5 / radius, most = (Real)0.5 * (radius - cell * cell * per);
@@ -128,6 +133,7 @@ def build(variant: Variant) -> SimpleNamespace:
         join(field.data + start + i * stride, level, -2 * per * v * turn_y * turn_z);
     }
     """)
+    )
     def cut(
         field: wp.array(dtype=real),
         start: wp.int32,
@@ -181,6 +187,7 @@ def build(variant: Variant) -> SimpleNamespace:
         whole.z_low = wp.min(whole.z_low, box.z_low)
         whole.y_high = wp.max(whole.y_high, box.y_high)
         whole.z_high = wp.max(whole.z_high, box.z_high)
+        use.lanes.barrier()
         channels.box[mine] = whole
 
     @wp.func
@@ -219,7 +226,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 arm = vec3(x, y / window.per_cell, z / window.per_cell) - pose.position
                 station = wp.dot(arm, pose.axis)
                 radius, node = radius_at(surface, station), start + i * window.cells_z + j
-                if radius > zero:
+                if radius > zero and use.lanes.has(j):
                     inside = radius - wp.sqrt(wp.max(zero, wp.dot(arm, arm) - station * station))
                     write(channels.inside, node, wp.max(inside, read(channels.inside, node)))
 
@@ -276,6 +283,7 @@ def build(variant: Variant) -> SimpleNamespace:
                     if not holds(before, core, slack):
                         if before.radius > zero and not holds(core, before, zero):
                             draw(channels, surface, window, mine, node, before)
+                        use.lanes.barrier()
                         channels.sections[first + plane] = core
 
     @wp.func
@@ -370,7 +378,8 @@ def build(variant: Variant) -> SimpleNamespace:
         return window.channel + (index - window.first) + wp.int32(plane) * window.nodes, depth - plane
 
     # Native, because a compiler reads several nodes at once only if the pointers do not alias.
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     using Real = decltype(0 * per_wall);
     assert(start >= 0 && start + count <= area.shape[0]);
     const auto spare = [=](Real* __restrict__ area, Real* __restrict__ slope, Real* __restrict__ gain,
@@ -403,6 +412,7 @@ def build(variant: Variant) -> SimpleNamespace:
     spare(area.data + start, slope.data + start, gain.data + start, at.data + start, x.data + start, y.data + start,
           z.data + start, field.data, field.shape[0]);
     """)
+    )
     def spare_channels(
         area: wp.array(dtype=real),
         slope: wp.array(dtype=real),

@@ -136,6 +136,25 @@ def build(variant: Variant) -> SimpleNamespace:
                 j += 1
 
     @wp.func
+    def spare(fields: Fields, window: Window, touches: Touches, first: wp.int32, count: wp.int32):
+        """Restrict touches, from index `first` on, to what the channels of earlier hits leave."""
+        use.channel.spare_channels(
+            touches.area,
+            touches.slope,
+            touches.gain,
+            touches.place,
+            touches.ahead,
+            touches.y,
+            touches.z,
+            first,
+            count,
+            fields.channel,
+            window.nodes,
+            window.cells_z,
+            use.channel.per_wall(window),
+        )
+
+    @wp.func
     def meet(plate: Plate, touches: Touches, first: wp.int32, count: wp.int32):
         """Restrict touches to material, from index `first` on; return the area that presses on it [m²]."""
         return use.plate_grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
@@ -369,21 +388,7 @@ def build(variant: Variant) -> SimpleNamespace:
         find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
         if wp.static(variant.burst):
             if window.pierced:
-                use.channel.spare_channels(
-                    touches.area,
-                    touches.slope,
-                    touches.gain,
-                    touches.place,
-                    touches.ahead,
-                    touches.y,
-                    touches.z,
-                    base + begin,
-                    end - begin,
-                    fields.channel,
-                    window.nodes,
-                    window.cells_z,
-                    use.channel.per_wall(window),
-                )
+                spare(fields, window, touches, base + begin, end - begin)
         first, last = int(surface.rings), int(-1)  # of the rings that touch
         for index in range(found.first_ring, found.last_ring + 1):
             area = zero

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import memory
+from . import lanes, memory
 from .variant import Variant
 
 
@@ -15,7 +15,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the surface for one variant."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    read = memory.build(real).read
+    read, use = memory.build(real).read, variant.use(lanes)
     quarter, half_turn = real(0.25), real(math.pi)
     widest_ratio, flattest = real(0.02), real(1.0e-3)  # floors that keep the convolution's quotient finite
 
@@ -176,12 +176,19 @@ def build(variant: Variant) -> SimpleNamespace:
         rearmost, foremost = real(1.0e9), real(-1.0e9)
         wide = broadside(pose)
         index = int(0)
+        if wp.static(variant.window > 0):
+            index = use.lanes.lane()
         while index < surface.rings:
             ring = ring_at(surface, pose, index)
             aslant, along = ring.half_radial * wide, ring.half_axial * pose.axis[0]
             rearmost = wp.min(rearmost, ring.centre[0] - ring.radius * wide - wp.abs(along - aslant))
             foremost = wp.max(foremost, ring.centre[0] + ring.radius * wide + wp.abs(along + aslant))
-            index += 1
+            if wp.static(variant.window > 0):
+                index += use.lanes.count()
+            else:
+                index += 1
+        if wp.static(variant.window > 0):
+            rearmost, foremost = use.lanes.lowest(rearmost), use.lanes.highest(foremost)
         return rearmost, foremost
 
     @wp.func

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import channel, core_surface, exposure, plate_grid
+from . import channel, core_surface, exposure, lanes, plate_grid
 from .variant import Variant
 
 
@@ -18,7 +18,7 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of earlier hits for one variant."""
     real = variant.real
-    use = variant.use(channel, core_surface, exposure, plate_grid)
+    use, split = variant.use(channel, core_surface, exposure, lanes, plate_grid), lanes.split(variant)
     Fields, Plate, Window = use.exposure.Fields, use.plate_grid.Plate, use.plate_grid.Window
     Surface, Pose, Channels = use.core_surface.Surface, use.core_surface.Pose, use.channel.Channels
 
@@ -41,7 +41,8 @@ def build(variant: Variant) -> SimpleNamespace:
         channels: Channels
 
     # Native, because a compiler vectorises these loops only if the pointers do not alias.
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     const int row_low = row > 0 ? 0 : -row, row_high = row < 0 ? rows : rows - 1 - row;
     const int low = column > 0 ? 0 : -column, high = column < 0 ? columns : columns - 1 - column;
     const auto far_far = y * z, far_near = y - far_far, near_far = z - far_far, near_near = 1 - y - near_far;
@@ -55,6 +56,7 @@ def build(variant: Variant) -> SimpleNamespace:
             into[j] += near_near * near[j] + near_far * near[j + 1] + far_near * far[j] + far_far * far[j + 1];
     }
     """)
+    )
     def add_shifted(
         field: wp.array(dtype=real),
         target: wp.int32,
@@ -71,24 +73,28 @@ def build(variant: Variant) -> SimpleNamespace:
         nothing."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start >= 0 && start + count <= target.shape[0] && first >= 0 && first + count <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ from = source.data + first;
     for (int j = 0; j < count; ++j) into[j] = from[j];
     """)
+    )
     def copy(
         target: wp.array(dtype=real), start: wp.int32, source: wp.array(dtype=real), first: wp.int32, count: wp.int32
     ):
         """target[start + j] = source[first + j] for j < count."""
         ...
 
-    @wp.func_native("""
+    @wp.func_native(
+        split("""
     assert(start >= 0 && start + count <= target.shape[0] && first >= 0 && first + count <= source.shape[0]);
     auto* __restrict__ into = target.data + start;
     const auto* __restrict__ from = source.data + first;
     for (int j = 0; j < count; ++j) into[j] = from[j] - into[j];
     """)
+    )
     def subtract_from(
         target: wp.array(dtype=real), start: wp.int32, source: wp.array(dtype=real), first: wp.int32, count: wp.int32
     ):
@@ -129,6 +135,7 @@ def build(variant: Variant) -> SimpleNamespace:
         use.channel.begin(earlier.channels, window, slot, layer, shot, mine)
         if window.weakens:
             use.exposure.clear(earlier.exposure, row, nodes)
+            use.lanes.barrier()
         for before in range(order):
             other = (slot * earlier.count + before) * earlier.layers + layer
             if earlier.open[other]:
@@ -152,9 +159,11 @@ def build(variant: Variant) -> SimpleNamespace:
                                 far_y,
                                 far_z,
                             )
+                        use.lanes.barrier()
                     if earlier.channels.through[other]:
                         if not pierced:
                             use.channel.clear(fields, window)
+                            use.lanes.barrier()
                         pierced = True
                         use.channel.join(
                             earlier.channels,
@@ -169,8 +178,10 @@ def build(variant: Variant) -> SimpleNamespace:
                             far_y,
                             far_z,
                         )
+                        use.lanes.barrier()
         if window.weakens:
             copy(fields.exposure, window.first, earlier.exposure, row, nodes)
+        use.lanes.barrier()
         earlier.y[mine] = y
         earlier.z[mine] = z
         earlier.open[mine] = True

@@ -8,6 +8,7 @@ On a CPU a block has one lane, and nothing of this costs anything. With Warp's `
 run there one after another, from barrier to barrier, on one thread of the machine: for tests.
 """
 
+import re
 from collections.abc import Callable
 from functools import cache
 from types import SimpleNamespace
@@ -29,9 +30,9 @@ WAIT = "WP_TILE_SYNC();"
 
 
 def split(variant: Variant) -> Callable[[str], str]:
-    """What makes a loop over all j < count, in native code, go over this lane's share of them in the block layout."""
-    share = f"int j = {LANE}; j < count; j += WP_TILE_BLOCK_DIM"
-    return lambda snippet: snippet.replace("int j = 0; j < count; ++j", share) if variant.window else snippet
+    """What makes a loop over j, in native code, go over this lane's share of them in the block layout."""
+    share = rf"int j = \1 + {LANE}; j < \2; j += WP_TILE_BLOCK_DIM"
+    return lambda snippet: re.sub(r"int j = (\w+); j < (\w+); \+\+j", share, snippet) if variant.window else snippet
 
 
 def _butterfly(kind: str, both: str) -> str:
@@ -75,20 +76,37 @@ def build(variant: Variant) -> SimpleNamespace:
         """Number of lanes."""
         ...
 
-    @wp.func_native(f"""
+    waiting = f"""
     #if defined(__CUDA_ARCH__)
         __syncwarp();
     #else
         {WAIT}
     #endif
-    """)
+    """
+
+    @wp.func_native(waiting if variant.window else "")
     def barrier():
-        """Wait for all lanes; each then sees what the others have written."""
+        """Wait for all lanes; each then sees what the others have written. Nothing in the simple layout."""
+        ...
+
+    @wp.func_native(f"return j % WP_TILE_BLOCK_DIM == {LANE};" if variant.window else "return true;")
+    def has(j: wp.int32) -> wp.bool:
+        """Whether number j, at least 0, is this lane's: always in the simple layout."""
         ...
 
     @wp.func_native(_butterfly(kind, "x + other"))
     def total(x: real) -> real:
         """Sum over the lanes: the same bits in each of them."""
+        ...
+
+    @wp.func_native(_butterfly(kind, "other < x ? other : x"))
+    def lowest(x: real) -> real:
+        """Minimum over the lanes."""
+        ...
+
+    @wp.func_native(_butterfly(kind, "other > x ? other : x"))
+    def highest(x: real) -> real:
+        """Maximum over the lanes."""
         ...
 
     @wp.func_native(_butterfly("int", "other < x ? other : x"))
@@ -115,20 +133,21 @@ def build(variant: Variant) -> SimpleNamespace:
         return most(wp.where(x, 1, 0)) > 0
 
     def own(name: str) -> Any:
-        """The function that gives a block its own nodes of a field: in its shared memory on CUDA, else those of its
-        slot."""
+        """The function that gives a block the nodes of its front window: in its shared memory on CUDA, else in global
+        memory."""
 
         @wp.func_native(f"""
         #if defined(__CUDA_ARCH__)
             __shared__ {kind} {name}[{variant.window}];
-            return wp::array_t<{kind}>({name}, nodes);
+            return wp::array_t<{kind}>({name}, {variant.window});
         #else
-            assert(nodes <= {variant.window} && (slot + 1) * nodes <= field.shape[0]);
-            return wp::array_t<{kind}>(field.data + slot * nodes, nodes);
+            assert(first >= 0 && first <= field.shape[0]);
+            const int left = field.shape[0] - first;
+            return wp::array_t<{kind}>(field.data + first, left < {variant.window} ? left : {variant.window});
         #endif
         """)
-        def place(field: wp.array(dtype=real), slot: wp.int32, nodes: wp.int32) -> wp.array(dtype=real):
-            """A block's own nodes of one field."""
+        def place(field: wp.array(dtype=real), first: wp.int32) -> wp.array(dtype=real):
+            """The nodes of the front window, which would be those of a field from number `first` on."""
             ...
 
         return place

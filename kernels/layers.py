@@ -11,7 +11,7 @@ from types import ModuleType, SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, earlier, footprint, interaction, passage, plate_grid, rigid_body, shots, target
+from . import core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots, target
 from .status import RUNNING, Status
 from .variant import Variant
 
@@ -22,7 +22,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one, tiny = real(0.0), real(0.5), real(1.0), real(1.0e-9)
     far = 1.0e9  # [m]
-    use = variant.use(core_surface, earlier, footprint, interaction, passage, plate_grid, rigid_body, shots)
+    use = variant.use(core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots)
     plates, loads = target.build(variant, scheme), scheme.build(variant)
     Surface, Pose, Window = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Window
     Body, State = use.rigid_body.Body, use.rigid_body.State
@@ -67,6 +67,40 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         behind: wp.bool
         flight: vec3
         farthest: real
+
+    @wp.func
+    def first_step(target: Target, shot: wp.int32, shortest: real):
+        """Length of the first step [s]: that of the plate."""
+        return own_of(target.stretch, 0, shot) * shortest
+
+    @wp.func
+    def next_step(
+        surface: Surface,
+        target: Target,
+        shot: wp.int32,
+        pose: Pose,
+        reached: Reached,
+        last: Change,
+        dt: real,
+        free: real,
+        shortest: real,
+    ):
+        """Length of the step after the present one and a `free` time [s]: that of the layer that needs the shortest, of
+        those that the core can be in until then. It is not so long that it takes more than a share of the speed, if it
+        takes as much of it per time as the present one."""
+        longest = one
+        for k in range(target.count):
+            longest = wp.max(longest, own_of(target.stretch, k, shot))
+        margin = (half * dt + free + longest * shortest) * pose.speed
+        low, high = reached.rearmost - margin, reached.foremost + margin
+        stretch = longest
+        for k in range(target.count):
+            front, rear = faces_of(target, k, shot)
+            if high > front and low < rear:
+                stretch = wp.min(stretch, own_of(target.stretch, k, shot))
+        taken = wp.length(last.velocity) + surface.bounding_radius * wp.length(last.omega)
+        allowed = target.slowing * wp.length(pose.velocity) * dt / (taken + tiny)
+        return wp.max(shortest, wp.min(stretch * shortest, allowed))
 
     @wp.func
     def begin(
@@ -122,6 +156,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         home = vec3()
         if layer > 0 or stack.open[slot * target.count + layer]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
+        use.lanes.barrier()
         for k in range(target.laminate[layer], target.count):
             if target.laminate[k] == target.laminate[layer]:
                 here = slot * target.count + k
@@ -229,6 +264,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
                     found.inside = found.inside and (
                         touch.inside or not (target.weakens[k] or wp.static(variant.burst))
                     )
+                use.lanes.barrier()
                 stack.found[here] = touch
             elif low > rear and not use.passage.has_left(passage, shot, k):
                 since = (rearmost - rear) / wp.max(state.velocity[0], one)

@@ -63,7 +63,7 @@ def build(variant: Variant) -> SimpleNamespace:
     Load, Change = use.rigid_body.Load, use.rigid_body.Change
     Fields, Footprint, Touches = loads.Fields, use.footprint.Footprint, loads.Touches
     Sections, Bending = use.bending.Sections, use.bending.Bending
-    Shots, Pace, own = use.shots.Shots, use.shots.Pace, use.shots.own
+    Shots, own = use.shots.Shots, use.shots.own
     Target, Stack, Passage, Earlier = plates.Target, reaches.Stack, use.passage.Passage, use.earlier.Earlier
     Channels, Section, Box = use.channel.Channels, use.channel.Section, use.plate_grid.Box
 
@@ -132,7 +132,7 @@ def build(variant: Variant) -> SimpleNamespace:
         target: Target,
         law: Law,
         shots: Shots,
-        pace: Pace,
+        rows: wp.int32,
         # scratch
         fields: Fields,
         touches: Touches,
@@ -148,7 +148,9 @@ def build(variant: Variant) -> SimpleNamespace:
         slots.
 
         Shots at one plate are numbered in a row, and are computed one after another in one slot. All shots have one
-        surface, by value as one plate is (kernels/target.py), or each has one of the table.
+        surface, by value as one plate is (kernels/target.py), or each has one of the table. Each shot has `rows` rows
+        of the trace; 0 means no trace. The trace has no build of its own, so a shot computes the same bits with and
+        without it.
         """
         shot = order[first + wp.tid()]
         slot = wp.tid() % slots
@@ -159,15 +161,15 @@ def build(variant: Variant) -> SimpleNamespace:
             target = plates.of_shot(target, shots, shot)
         law = plates.law_of(target, law, 0, shot)
         law.onset_share = own(shots.onset_share, shot)
-        pace = use.shots.pace_of(pace, shots, shot)
         speed = own(shots.velocity, shot)
-        dt = use.shots.step_of(pace, speed, own(shots.obliquity, shot))
-        max_steps = wp.int32(wp.ceil(pace.longest_way / (speed * wp.float64(dt))))
+        shortest = real(own(shots.time_step, shot))
+        max_steps = wp.int32(wp.ceil(own(shots.longest_way, shot) / (speed * wp.float64(shortest))))
         depth = real(plates.depth_of(target, shot))
         fields = loads.own_fields(fields, slot)
         state = use.shots.launch_state(surface, body, shots, shot)
         axis = use.rigid_body.axis_of(state.attitude)
         initial_energy = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+        dt = reaches.first_step(target, shot, shortest)
         # Positions are those of mid-step from here on: kicks at mid-step, exact drifts between them.
         state = use.rigid_body.drift(body, state, half * dt)
         reached, status = reaches.begin(surface, target, fields, stack, earlier, passage, shots, slot, shot, state)
@@ -176,12 +178,13 @@ def build(variant: Variant) -> SimpleNamespace:
             worst = Bending()
             worst.strength = own(shots.strength, shot)
         contact_steps = int(0)
-        skipped = real(0.0)  # time between layers that no step counts
+        skipped = half * (dt - shortest)  # time that no shortest step counts
+        longer = real(0.0)  # what steps in contact are longer than the shortest, together
         last = Change()
         before_last = Change()
         step = int(0)
         while status == RUNNING and step < max_steps and not lost:
-            now = (real(step) + half) * dt + skipped
+            now = (real(step) + half) * shortest + skipped
             omega = use.rigid_body.angular_velocity(
                 body, use.rigid_body.axis_of(state.attitude), state.angular_momentum
             )
@@ -213,6 +216,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 if load.touching:
                     touched = True
                     contact_steps += 1
+                    longer += dt - shortest
                     # The damping counts from the speeds at the start of the step.
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
@@ -224,15 +228,19 @@ def build(variant: Variant) -> SimpleNamespace:
                     last = use.rigid_body.change_between(body, before, state)
                 else:
                     last = Change()
-                if pace.rows > 0:
+                if rows > 0:
                     force, moment = use.rigid_body.mean_load(body, before, load, dt)
-                    use.trace.record(trace, shot * pace.rows + step, now, state, force, moment)
-                state = use.rigid_body.drift(body, state, dt + free)
-                skipped += free
+                    use.trace.record(trace, shot * rows + step, now, dt, state, force, moment)
+                following = reaches.next_step(surface, target, shot, pose, reached, last, dt, free, shortest)
+                between = half * (dt + following)  # from mid-step to mid-step
+                state = use.rigid_body.drift(body, state, between + free)
+                skipped += between - shortest + free
+                last = use.rigid_body.in_step(last, following / dt)
+                dt = following
                 step += 1
-        if pace.rows > 0:
-            now = (real(step) + half) * dt + skipped
-            use.trace.record(trace, shot * pace.rows + step, now, state, vec3(), vec3())
+        if rows > 0:
+            now = (real(step) + half) * shortest + skipped
+            use.trace.record(trace, shot * rows + step, now, dt, state, vec3(), vec3())
         if status == RUNNING:
             status = reaches.given_up(target, shot, reached, state, touched)
         reaches.conclude(surface, target, fields, stack, earlier, passage, slot, shot, status, reached)
@@ -242,7 +250,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 return
         outcomes.status[shot] = status
         outcomes.steps[shot] = step
-        outcomes.contact_duration[shot] = real(contact_steps) * dt
+        outcomes.contact_duration[shot] = real(contact_steps) * shortest + longer
         energy_loss = zero
         if touched:
             energy_loss = initial_energy - use.rigid_body.kinetic_energy(

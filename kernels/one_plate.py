@@ -51,6 +51,26 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         )
 
     @wp.func
+    def first_step(target: Target, shot: wp.int32, shortest: real):
+        """Every step is as long [s]."""
+        return shortest
+
+    @wp.func
+    def next_step(
+        surface: Surface,
+        target: Target,
+        shot: wp.int32,
+        pose: Pose,
+        reached: Reached,
+        last: Change,
+        dt: real,
+        free: real,
+        shortest: real,
+    ):
+        """Every step is as long [s]."""
+        return shortest
+
+    @wp.func
     def begin(
         surface: Surface,
         target: Target,

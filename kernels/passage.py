@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import rigid_body
+from . import lanes, rigid_body
 from .status import Status
 from .variant import Variant
 
@@ -15,7 +15,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the passage through the layers for one variant."""
     real, vec3 = variant.real, variant.vec3
     one = real(1.0)
-    use = variant.use(rigid_body)
+    use = variant.use(lanes, rigid_body)
     Body, State = use.rigid_body.Body, use.rigid_body.State
     ENTERED = wp.constant(int(Status.ARRESTED))  # what a core that touches a layer is until it leaves
 
@@ -111,7 +111,9 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """Record how a core left a layer at a speed [m/s], `since` [s] before the time."""
         axis = use.rigid_body.turned(body, use.rigid_body.axis_of(state.attitude), state.angular_momentum, -since)
-        passage.status[shot, layer] = wp.where(passage.status[shot, layer] == ENTERED, Status.PERFORATED, Status.MISSED)
+        entered = passage.status[shot, layer] == ENTERED
+        use.lanes.barrier()
+        passage.status[shot, layer] = wp.where(entered, Status.PERFORATED, Status.MISSED)
         passage.velocity[shot, layer] = speed
         passage.tilt[shot, layer] = angle_between(axis, flight)
         passage.time[shot, layer] = time - since

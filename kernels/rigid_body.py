@@ -227,6 +227,14 @@ def build(variant: Variant) -> SimpleNamespace:
         return change
 
     @wp.func
+    def in_step(change: Change, share: real):
+        """The change in a step that is longer than another by some factor, if the load stays as it was."""
+        foreseen = Change()
+        foreseen.velocity = share * change.velocity
+        foreseen.omega = share * change.omega
+        return foreseen
+
+    @wp.func
     def swings(body: Body, before: Change, last: Change):
         """Whether a step has turned back the change across the axis that the one before it made, by more than rounding
         can: in a straight shot nothing else acts across the axis."""

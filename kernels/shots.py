@@ -17,7 +17,6 @@ from .variant import Variant
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the shots for one variant."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
-    tiny = wp.float64(1.0e-9)
     use = variant.use(core_surface, rigid_body)
     Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
     Body, State = use.rigid_body.Body, use.rigid_body.State
@@ -27,8 +26,9 @@ def build(variant: Variant) -> SimpleNamespace:
         """Arrays of shape [1] or [shots], SI and radians.
 
         Hit point, velocity and attitude on impact (docs/model.md §1); the members of Body, the strength of the core
-        [Pa], the members of Pace that follow from them, and `onset_share` of Law. `plates` is the number of the
-        target's plates, and `surface` that of the core's surface, where these come from tables.
+        [Pa], `onset_share` of Law, the time step [s] where it is shortest, and the distance [m] at impact velocity
+        after which a shot that has not ended is given up. `plates` is the number of the target's plates, and `surface`
+        that of the core's surface, where these come from tables.
         """
 
         hit_y: wp.array(dtype=wp.float64)
@@ -46,30 +46,8 @@ def build(variant: Variant) -> SimpleNamespace:
         onset_share: wp.array(dtype=real)
         plates: wp.array(dtype=wp.int32)
         surface: wp.array(dtype=wp.int32)
-        way: wp.array(dtype=wp.float64)
-        way_along: wp.array(dtype=wp.float64)
-        longest_time: wp.array(dtype=wp.float64)
-        longest_step: wp.array(dtype=wp.float64)
+        time_step: wp.array(dtype=wp.float64)
         longest_way: wp.array(dtype=wp.float64)
-
-    @wp.struct
-    class Pace:
-        """What sets the length of a step.
-
-        `time_step` [s] is constant. If it is 0, a step covers the distance `way` [m] at impact velocity. Two bounds
-        shorten this distance, to a quarter at most: `way_along` [m] in the plane of the plate, and `longest_time` [s].
-        No step covers more than `longest_step` [m]. A shot is given up if it has not ended after `longest_way` [m] at
-        impact velocity. Each shot has `rows` rows of the trace; 0 means no trace. The trace has no build of its own, so
-        a shot computes the same bits with and without it.
-        """
-
-        time_step: wp.float64
-        way: wp.float64
-        way_along: wp.float64
-        longest_time: wp.float64
-        longest_step: wp.float64
-        longest_way: wp.float64
-        rows: wp.int32
 
     @wp.func
     def own(values: wp.array(dtype=Any), shot: wp.int32):
@@ -83,25 +61,6 @@ def build(variant: Variant) -> SimpleNamespace:
         body.inertia_axial = own(shots.inertia_axial, shot)
         body.inertia_transverse = own(shots.inertia_transverse, shot)
         return body
-
-    @wp.func
-    def pace_of(scene: Pace, shots: Shots, shot: wp.int32):
-        pace = scene
-        pace.way = own(shots.way, shot)
-        pace.way_along = own(shots.way_along, shot)
-        pace.longest_time = own(shots.longest_time, shot)
-        pace.longest_step = own(shots.longest_step, shot)
-        pace.longest_way = own(shots.longest_way, shot)
-        return pace
-
-    @wp.func
-    def step_of(pace: Pace, speed: wp.float64, obliquity: wp.float64):
-        """Time step of a shot [s]."""
-        way = pace.time_step * speed
-        if way == wp.float64(0.0):
-            bound = wp.min(pace.way_along / wp.max(wp.sin(obliquity), tiny), pace.longest_time * speed)
-            way = wp.clamp(bound, wp.float64(0.25) * pace.way, pace.way)
-        return real(wp.min(way, pace.longest_step) / speed)
 
     @wp.func
     def line_of_flight(shots: Shots, shot: wp.int32):

@@ -20,6 +20,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     Shots, Earlier, own = use.shots.Shots, use.earlier.Earlier, use.shots.own
     Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
     Fields, open_blank = scheme.build(variant).Fields, scheme.build(variant).open_window
+    fields_of = getattr(scheme.build(variant), "fields_of", None)  # where a window may be in shared memory
 
     # One plate comes by value, because CUDA does not know where a pointer leads that lies in memory.
     Plates = wp.array(dtype=Plate) if variant.layered or variant.tabled else Plate
@@ -36,6 +37,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         Layers that touch each other and remember alike are one laminate: a contact in one weakens the others, and they
         share a field. `laminate` is the number of the first of them. `deep` is 1 where the laminate is thicker than the
         depth over which it weakens together, else 0.
+        `stretch` is how many times longer a step may be than the shortest, where a core touches nothing but the layer,
+        and `slowing` is the share of its speed that a longer step may take.
         `standoffs` are distances behind the rear face of every layer [m], which the point `ahead` of the centre of mass
         passes [m].
         """
@@ -48,6 +51,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         by_path: wp.array(dtype=wp.bool)
         standoffs: wp.array(dtype=real)
         ahead: real
+        slowing: real
         front: wp.array2d(dtype=wp.float64)
         thickness: wp.array2d(dtype=wp.float64)
         deep: wp.array2d(dtype=wp.float64)
@@ -61,6 +65,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         decay_rate: wp.array2d(dtype=real)
         onset_jump: wp.array2d(dtype=real)
         most_jump: wp.array2d(dtype=real)
+        stretch: wp.array2d(dtype=real)
 
     @wp.func
     def own_of(values: wp.array2d(dtype=Any), layer: wp.int32, shot: wp.int32):
@@ -142,6 +147,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
                 window.planes = 1
                 window.per_plane = real(0.0)
         if wp.static(variant.burst):
+            if wp.static(variant.window > 0):
+                fields = fields_of(fields, window.first)
             thickness = own_of(target.thickness, layer, shot)
             window = use.channel.open_window(window, earlier.channels, thickness, layer)
             window.pierced = use.earlier.recall(earlier, fields, plate, window, slot, layer, shot, y, z)
@@ -152,6 +159,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         """Keep for later shots what this one has added to a layer in its window there."""
         if wp.static(variant.burst):
             if window.weakens:
+                if wp.static(variant.window > 0):
+                    fields = fields_of(fields, window.first)
                 use.earlier.keep(earlier, fields, window, slot, shot)
 
     @wp.func

@@ -16,9 +16,11 @@ COLUMNS = {
     "angular_momentum": slice(11, 14),
     "force": slice(14, 17),
     "moment": slice(17, 20),
+    "step": slice(20, 21),
 }
-"""Columns of a row, SI. The attitude is (x, y, z, w); force and moment are means over the step."""
-WIDTH = COLUMNS["moment"].stop
+"""Columns of a row, SI. The attitude is (x, y, z, w); force and moment are means over the step, `step` is its length.
+Times are those of mid-step."""
+WIDTH = COLUMNS["step"].stop
 """Numbers per row."""
 
 
@@ -27,7 +29,7 @@ def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the trace for one variant."""
     real, vec3 = variant.real, variant.vec3
     State = rigid_body.build(variant).State
-    time_at, position_at, attitude_at, velocity_at, momentum_at, force_at, moment_at = (
+    time_at, position_at, attitude_at, velocity_at, momentum_at, force_at, moment_at, step_at = (
         wp.constant(columns.start) for columns in COLUMNS.values()
     )
 
@@ -37,9 +39,12 @@ def build(variant: Variant) -> SimpleNamespace:
             trace[row, column + k] = value[k]
 
     @wp.func
-    def record(trace: wp.array2d(dtype=real), row: wp.int32, time: real, state: State, force: vec3, moment: vec3):
+    def record(
+        trace: wp.array2d(dtype=real), row: wp.int32, time: real, dt: real, state: State, force: vec3, moment: vec3
+    ):
         """Write the row of one step: the state after its kick, and the load of the kick."""
         trace[row, time_at] = time
+        trace[row, step_at] = dt
         write_vec3(trace, row, position_at, state.position)
         for k in range(4):
             trace[row, attitude_at + k] = state.attitude[k]

@@ -37,10 +37,15 @@ def test_kernel_compiles_to_ptx(stage: Any, variant: Variant, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "variant",
-    [Variant(window=2048), Variant(window=512, degrades=False, rimmed=True)],
+    ("variant", "barriers"),
+    [
+        (Variant(window=2048), 7),
+        (Variant(window=512, degrades=False, rimmed=True), 0),
+        (Variant(window=2048, burst=True), 16),
+        (Variant(window=2048, layered=True), 18),
+    ],
 )
-def test_block_keeps_its_window_in_shared_memory(variant: Variant, tmp_path: Path) -> None:
+def test_block_keeps_its_front_window_in_shared_memory(variant: Variant, barriers: int, tmp_path: Path) -> None:
     kernel = march.build(variant).kernel
     wp.compile_aot_module(kernel.module, arch=90, use_ptx=True, module_dir=tmp_path)
     ptx = next(tmp_path.glob("*.ptx")).read_text()
@@ -48,11 +53,12 @@ def test_block_keeps_its_window_in_shared_memory(variant: Variant, tmp_path: Pat
     assert shared == ([("exposure", "8192"), ("gain", "8192")] if variant.degrades else [])
     assert f".maxntid {LANES}, 1, 1" in ptx
     used = Counter(re.findall(r"^\s+(?:@!?%p\d+ )?((?:ld|st|atom|red|shfl|bar|barrier)\.[\w.:]+)", ptx, re.MULTILINE))
-    spaces = {name.split(".")[1] for name in used if name.startswith(("ld.", "st."))}
-    assert spaces <= {"global", "shared", "local", "param", "const"}  # none through a generic address
+    spaces = {name.split(".")[1] for name in used if name.startswith(("ld.", "st.", "atom.", "red."))}
+    named = {"global", "shared", "local", "param", "const"}
+    assert spaces <= named | ({"u32", "f32"} if variant.layered else set())  # only plates have generic addresses there
     assert used["shfl.sync.bfly.b32"] >= 5 * 20
     assert not [name for name in used if name.startswith("bar.sync")]  # a warp waits for itself alone
+    assert used["bar.warp.sync"] == barriers  # kernels/block.py says what for
     if variant.degrades:
-        assert used["bar.warp.sync"] == 7  # kernels/block.py tells what for
         assert used["ld.shared.f32"] >= 4 + 4
         assert sum(count for name, count in used.items() if name.startswith(("atom.shared.add", "red.shared.add"))) >= 4

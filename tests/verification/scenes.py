@@ -100,6 +100,7 @@ class History:
 
     core: Core
     time: Array
+    step: Array
     position: Array
     attitude: Rotation  # from the core's axes to the plate's
     velocity: Array
@@ -138,4 +139,4 @@ def histories(
 def _history(core: Core, rows: Array) -> History:
     attitude = Rotation.from_quat(rows[:, 4:8])
     columns = (rows[:, start : start + 3] for start in (8, 11, 14, 17))
-    return History(core, rows[:, 0], rows[:, 1:4], attitude, *columns)
+    return History(core, rows[:, 0], rows[:, 20], rows[:, 1:4], attitude, *columns)

@@ -37,7 +37,7 @@ from warpimpact.analysis.effectiveness import (
 )
 from warpimpact.analysis.numbers import of_each
 from warpimpact.analysis.questions import check_same_question, other_shots
-from warpimpact.analysis.summary import breaks_promise, sampling_note
+from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, sampling_note
 from warpimpact.analysis.survival import draws_note, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import dealing
@@ -226,6 +226,8 @@ def _notes(datasets: Sequence[xarray.Dataset], names: Sequence[str]) -> Iterator
         yield "The plates were computed with different numerics: {} is {} and {}.".format(*found)
     if broken := [name for name, dataset in zip(names, datasets, strict=True) if breaks_promise(dataset)]:
         yield f"The numerics are less exact than promised: {', '.join(broken)} (warpimpact inspect)."
+    if unknown := [name for name, dataset in zip(names, datasets, strict=True) if not hits_at_two_levels(dataset)]:
+        yield f"numerics ± is not known of {', '.join(unknown)}: intervals are by the hits alone (warpimpact inspect)."
     solid = {name: solid_note(dataset) for name, dataset in zip(names, datasets, strict=True)}
     alike = len(set(solid.values())) == 1
     yield from dict.fromkeys(note if alike else f"{name}: {note}" for name, note in solid.items() if note)

@@ -38,9 +38,12 @@ def ends_of(estimate: Estimate) -> Ends:
     return Ends(estimate.low, estimate.high, estimate.parameters, estimate.numerics)
 
 
-def intervals_text(ends: Ends, text: Callable[[float], str] | None = None) -> str:
-    """The intervals of a number; without a format of its ends four digits, and two of what the numerics may shift."""
-    shift = text or "{:.2g}".format
+def intervals_text(
+    ends: Ends, text: Callable[[float], str] | None = None, shift: Callable[[float], str] | None = None
+) -> str:
+    """The intervals of a number; without a format of its ends four digits, and two of what the numerics may shift it
+    by, or the format of the ends if only that is given."""
+    shift = shift or text or "{:.2g}".format
     text = text or number_text
     told = interval_text(ends.low, ends.high, text)
     if ends.parameters is not None:

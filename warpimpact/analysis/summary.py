@@ -81,9 +81,7 @@ def promise_text(dataset: Result) -> str | None:
         return None
     given = json.loads(told[attr.NUMERICS_GIVEN])
     if attr.RESIDUAL_VELOCITY_ERROR not in told:
-        fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
-        name = next((name for name in fixed if given.get(name) is not None), "scheme")
-        return f"promises nothing, as numerics.{name} is given"
+        return f"promises nothing, as {_fixed_by(told)} is given"
     if attr.LEVEL_FOR in told:
         return _level_for(told)
     asked = json.loads(told[attr.ACCURACY])
@@ -95,6 +93,13 @@ def promise_text(dataset: Result) -> str | None:
     if told[attr.PROMISE_KEPT]:
         return f"{name} keeps its promise ({stated}); {found}"
     return f"{name} does not keep its promise ({stated}) at the level that it may use; {found}"
+
+
+def _fixed_by(told: Mapping[str, Any]) -> str:
+    """The key of the campaign that fixes the resolution of a result without a pilot."""
+    given = json.loads(told[attr.NUMERICS_GIVEN])
+    fixed = ("level", "time_step", "travel", "patches_axial", "patches_around", "grid_spacing")
+    return f"numerics.{next((name for name in fixed if given.get(name) is not None), 'scheme')}"
 
 
 def _level_for(told: Mapping[str, Any]) -> str:
@@ -237,10 +242,25 @@ def summary_text(dataset: Result) -> str:
 
 
 def numerics_note(dataset: Result) -> str:
-    """What tells how far the numerics may shift the numbers of a result; empty where nothing does."""
-    if v.FINER_HIT not in dataset:
-        return ""
-    return f"numerics ±: from {dataset.sizes['finer']} of the hits, which were computed at a finer level, too."
+    """What tells how far the numerics may shift the numbers of a result, or why that is not known."""
+    if hits := hits_at_two_levels(dataset):
+        return f"numerics ±: from {hits} of the hits, which were computed at a finer level, too."
+    return f"numerics ± is not known: {_why_not_known(dataset)}."
+
+
+def hits_at_two_levels(dataset: Result) -> int:
+    """How many hits of a result were computed at a finer level, too, which tell what the numerics may shift."""
+    pair = finer_pair(dataset[[v.STATUS, *(name for name in v.GROUPS["finer"] if name in dataset)]])
+    return 0 if pair is None else pair[0].sizes["hit"]
+
+
+def _why_not_known(dataset: Result) -> str:
+    if v.FINER_HIT in dataset:
+        return "none of these hits was computed at a finer level, too"
+    if attr.NUMERICS_GIVEN in dataset.attrs and attr.RESOLUTION not in dataset.attrs:
+        given = _fixed_by(dataset.attrs)
+        return f"{given} is given, so no hits were computed at a finer level (numerics.fidelity in its place does that)"
+    return "the result has no hits at a finer level"
 
 
 def levels_note(dataset: Result) -> str:
@@ -283,11 +303,11 @@ def stop_lines(dataset: Result) -> list[str]:
         return []
     (low, high), unit = told[attr.ESTIMATE_INTERVAL], STORED[told[attr.ESTIMATE_UNITS]]
     interval = interval_text(unit.factor * low, unit.factor * high, "{:.6g}".format)
-    shift = told.get(attr.ESTIMATE_NUMERICS, 0.0)
-    numerics = f", numerics ± {unit.factor * shift:.2g}{unit.suffix}" if shift > 0.0 else ""
+    shift = told.get(attr.ESTIMATE_NUMERICS, math.nan)
+    numerics = "not known" if math.isnan(shift) else f"{unit.factor * shift:.2g}{unit.suffix}"
     return [
         f"{told[attr.STOP_QUANTITY]} = {unit.text(told[attr.ESTIMATE], '.6g')}, {told[attr.CONFIDENCE]:.4g} interval "
-        f"{interval}{unit.suffix}{numerics}; {_STOPPED[told[attr.STOP_REASON]]}"
+        f"{interval}{unit.suffix}, numerics ± {numerics}; {_STOPPED[told[attr.STOP_REASON]]}"
     ]
 
 

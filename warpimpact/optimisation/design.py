@@ -102,7 +102,7 @@ class Bound(_Asked):
 
     @property
     def limit(self) -> float:
-        return float(self.at_most if self.at_most is not None else self.at_least)  # type: ignore[arg-type]
+        return float(next(one for one in (self.at_most, self.at_least) if one is not None))
 
     @property
     def sign(self) -> float:

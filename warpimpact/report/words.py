@@ -17,7 +17,15 @@ from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, Comparison, best_rows, conditions, rankings
 from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effectiveness
 from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
-from warpimpact.analysis.summary import estimated, means_of, promise_text, sampling_note, slices, status_shares
+from warpimpact.analysis.summary import (
+    estimated,
+    means_of,
+    numerics_note,
+    promise_text,
+    sampling_note,
+    slices,
+    status_shares,
+)
 from warpimpact.analysis.survival import draws_note
 from warpimpact.campaign.text import parsed
 from warpimpact.plotting.cell import range_text, words
@@ -162,7 +170,8 @@ def _caveats(dataset: xarray.Dataset) -> list[str]:
     """What limits the numbers of a result, a sentence each, beside every table of them."""
     chance = "Intervals describe the hits that were drawn."
     model = "The core stays one rigid body, which overstates what comes through where cores break or erode."
-    return [sentence for sentence in (chance, sampling_note(dataset), draws_note(dataset), model) if sentence]
+    notes = (chance, sampling_note(dataset), numerics_note(dataset), draws_note(dataset), model)
+    return [sentence for sentence in notes if sentence]
 
 
 def _tables(dataset: xarray.Dataset) -> dict[str, dict[str, str]]:

@@ -91,7 +91,8 @@ def to_table(
     zero = np.zeros(len(shots))
     values[v.EXIT_POSITION] = outcomes.exit_position + np.stack([zero, shots.hit_y, shots.hit_z], axis=-1)
     variables = (name for name in v.hit_variables() if name in values and name not in left_out)
-    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES, *v.FINER_VARIABLES}
+    finer = [name for name, of_hits in v.FINER_VARIABLES.items() if of_hits in v.computed_variables()]
+    single = () if double else {*v.computed_variables(), *v.SOLID_VARIABLES, *finer}
     return Table.of(
         stored_columns(variables, values, single),
         stored_columns((name for name in along if name in coordinates), coordinates, single),
@@ -133,9 +134,9 @@ def finer_pair(dataset: Result) -> tuple[Any, Any] | None:
     level. None if there are none."""
     if v.FINER_HIT not in dataset or v.HIT not in dataset.sizes:
         return None
-    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if name in dataset and of_hits in dataset}
-    if any(dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
-        return None  # results that were joined have several
+    stored = {name: of_hits for name, of_hits in v.FINER_VARIABLES.items() if of_hits in dataset}
+    if any(name not in dataset or dataset[name].dims != name.dims for name in (v.FINER_HIT, *stored)):
+        return None  # results that were joined have several; altered ones lack some
     numbers, hits = dataset[v.FINER_HIT].values, hit_numbers(dataset)
     found, places, those = np.intersect1d(hits, numbers, return_indices=True)
     if not len(found) or v.STATUS not in stored.values() or np.isin(hits, found).sum() > len(found):

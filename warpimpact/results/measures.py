@@ -214,7 +214,7 @@ class Tally:
 
 def shift_of(measure: Measure, levels: tuple[Result, Result] | None, confidence: float = 0.95) -> float | None:
     """How far the numerics may shift a measure, by hits of a result at two levels (`finer_pair`); None without them."""
-    if levels is None or measure.variable in v.LIMIT_VARIABLES:
+    if levels is None:
         return None
     dealt: Estimating = {**dealing(levels[0]), "replicates": 1, "confidence": confidence}
     coarse, fine = (measure.numbers(level) for level in levels)

@@ -94,11 +94,11 @@ FINER_HIT = Variable("finer_hit", ("finer",), "1", "number of a hit that was com
 FINER_COORDINATES = (FINER_HIT,)
 FINER_VARIABLES = {
     _beside(one, "finer", "finer", "at a finer level"): one
-    for one in (*_RECORDED, STOPPED_IN, DEPTH)
+    for one in (*_RECORDED, STOPPED_IN, DEPTH, *LIMIT_VARIABLES)
     if one.is_number_of_hit or one in (STATUS, STOPPED_IN, BROKEN)
 }
 """Outcomes of some hits at a finer level of resolution, each with the variable of the hits that it corresponds to.
-Present where a pilot found the resolution; not in a campaign with a posterior, nor in a search of limits."""
+Present where a pilot found the resolution."""
 
 OUTLINE_Y = Variable("outline_y", ("vertex",), "m", "hole outlines in the unit cell, y, separated by NaN")
 OUTLINE_Z = Variable("outline_z", ("vertex",), "m", "hole outlines in the unit cell, z, separated by NaN")

@@ -90,7 +90,7 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     images, numerics = len(campaign.symmetries), numerics_of(campaign, task.found)
     progress = of_images(progress, images)
     outcomes, elapsed = _outcomes(campaign.scene, task.shots[::images], numerics, worker, progress)
-    beside = _finer(campaign, task.found)
+    beside = finer_hits(campaign, task.found, pilot_most(campaign))
     if task.solid is not None:
         beside |= solid_columns(_outcomes(*at_solid(campaign, task.solid), numerics, worker)[0])
     attributes = computed_by(campaign, worker.device, len(outcomes), elapsed)
@@ -99,14 +99,17 @@ def compute(campaign: Campaign, task: Task, worker: Worker, progress: Progress |
     return described(campaign, task.shots, outcomes, numerics, attributes, beside)
 
 
-def _finer(campaign: Campaign, found: Found | None) -> dict[str, Any]:
-    """Columns of the hits that a pilot computed at a finer level. The pilot knows the scene of the campaign, not the
-    draws of a posterior."""
-    if not isinstance(found, HitErrors) or found.finer is None or campaign.drawn is not None:
+def finer_hits(campaign: Campaign, found: Found | None, most: int) -> dict[str, Any]:
+    """Columns of the hits that a pilot computed at a finer level.
+
+    Args:
+        most: shots of the pilot, at most, as in `pilot_shots`.
+    """
+    if found is None or found.finer is None:
         return {}
     group = len(campaign.symmetries) * campaign.at_a_plate
     groups = len(found.finer) // campaign.at_a_plate
-    numbers = _pilot_places(campaign, pilot_most(campaign))[:groups, None] * group + np.arange(group)
+    numbers = _pilot_places(campaign, most)[:groups, None] * group + np.arange(group)
     return finer_columns(found.finer.unfolded(campaign.symmetries), numbers.reshape(-1))
 
 

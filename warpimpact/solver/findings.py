@@ -24,11 +24,14 @@ class Found:
         numerics: the level to compute all shots with.
         kept: whether the errors are within what was asked for.
         share: of the shots that are within the errors.
+        finer: outcomes of the first shots of the pilot at the finer level that it was compared with; None where there
+            are none.
     """
 
     numerics: Numerics
     kept: bool
     share: float
+    finer: Outcomes | None = field(default=None, compare=False, repr=False, kw_only=True)
 
     @property
     @abstractmethod
@@ -38,7 +41,7 @@ class Found:
     @property
     def told(self) -> Self:
         """The same without outcomes of shots."""
-        return self
+        return replace(self, finer=None)
 
     @property
     def phrase(self) -> str:
@@ -78,7 +81,6 @@ class HitErrors(Found):
         status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
         cost: what the level costs beside the first one that was tried; None if that is not known.
         shifts: levels that were tried, each with what the numerics may shift the means of a run by.
-        finer: outcomes of the first shots of the pilot at the finer level that it was compared with.
         tried: what was found at every level, coarse to fine, with outcomes of shots there and at a finer level.
     """
 
@@ -88,12 +90,11 @@ class HitErrors(Found):
     status_error: float = math.nan
     cost: Cost | None = field(default=None, compare=False)
     shifts: Mapping[int, tuple[float, ...]] = field(default_factory=dict, compare=False)
-    finer: Outcomes | None = field(default=None, compare=False, repr=False)
     tried: tuple[Tried, ...] = field(default=(), compare=False, repr=False)
 
     @property
     def told(self) -> Self:
-        return replace(self, finer=None, tried=())
+        return replace(super().told, tried=())
 
     @property
     def errors(self) -> str:
@@ -109,10 +110,12 @@ class LimitErrors(Found):
     Attributes:
         error: of velocities [m/s] or of thicknesses [m]; infinite where the pilot could not tell.
         quantity: "velocity" or "thickness".
+        finer_level: that the limits were compared with; None where it did not fit the memory.
     """
 
     error: float
     quantity: str
+    finer_level: int | None = field(default=None, compare=False)
 
     @property
     def errors(self) -> str:

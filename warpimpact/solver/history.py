@@ -20,6 +20,7 @@ class History:
 
     Attributes:
         time: since the first touch of the front face [s], shape [steps].
+        step: length of the step, over which force and moment act [s], shape [steps].
         position: of the centre of mass, from the hit point [m], shape [steps, 3].
         attitude: unit quaternion (x, y, z, w) that turns the plate's axes into the core's, shape [steps, 4].
         core_axis: unit vector along the core towards its nose, shape [steps, 3].
@@ -30,6 +31,7 @@ class History:
     """
 
     time: Array
+    step: Array
     position: Array
     attitude: Array
     core_axis: Array
@@ -45,7 +47,8 @@ class History:
         """Read a trace of shape [steps, WIDTH] (kernels/trace.py)."""
         from scipy.spatial.transform import Rotation  # a third of a second to import
 
-        time, position, attitude, velocity, momentum, force, moment = (trace[:, part] for part in COLUMNS.values())
+        columns = (trace[:, part] for part in COLUMNS.values())
+        time, position, attitude, velocity, momentum, force, moment, step = columns
         axis = Rotation.from_quat(attitude).apply([1.0, 0.0, 0.0])
         spin = np.sum(momentum * axis, axis=1, keepdims=True)
         along = spin * axis
@@ -54,6 +57,7 @@ class History:
         across = np.cross(momentum, axis)
         return cls(
             time=time[:, 0],
+            step=step[:, 0],
             position=position,
             attitude=attitude,
             core_axis=axis,

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.records.limit import LIMITS
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.findings import LimitErrors
@@ -67,6 +68,10 @@ class Limits:
     converged: NDArray[np.bool_]
     shots: Shots
     outcomes: Outcomes
+
+    def recorded(self, quantity: str) -> Outcomes:
+        """The outcomes with the columns of the search."""
+        return self.outcomes.assign(**{str(name): getattr(self, name.field) for name in LIMITS[quantity]})
 
 
 @dataclass(frozen=True)
@@ -168,11 +173,17 @@ def pilot_of_limits(
     """Find the level of resolution for an accuracy of limits (solver/pilot.py); the arguments are those of
     `simulate.pilot_of`."""
 
+    known: dict[int, Limits] = {}
+
     def limits_at(level: int) -> Array:
         trying(level)
-        return limits(scene, pilot, sought, at_level(level, numerics), worker).value
+        known[level] = limits(scene, pilot, sought, at_level(level, numerics), worker)
+        return known[level].value
 
-    return pilot_limits(limits_at, numerics, sought.quantity)
+    found = pilot_limits(limits_at, numerics, sought.quantity)
+    if found.finer_level is None:
+        return found
+    return replace(found, finer=known[found.finer_level].recorded(sought.quantity))
 
 
 def limits(

@@ -79,7 +79,9 @@ class March:
         self.cells, prepared = cells, self.memory.prepared
         if 0 < prepared.variant.window < math.prod(cells):
             simple = replace(prepared, variant=replace(prepared.variant, window=0))
-            self.memory = Memory(simple, self.memory.device)
+            wider = Memory(simple, self.memory.device)
+            wider.passage, wider.history = self.memory.passage, self.memory.history  # with the shots that are done
+            self.memory = wider
 
     def _window_cells(self) -> Cells:
         """Cells of a first window, or what memory allows.

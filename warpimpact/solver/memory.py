@@ -43,7 +43,7 @@ class Memory:
         stage, flight: the builds of the march and of the free flight that the scene needs.
         put: puts values on the device.
         at_a_plate: shots in a row that share a slot of scratch, as the earlier ones leave the plate to the later ones.
-        surfaces, sections, tables, target, law, shots, pace: structs of the inputs; `tables` has the first two where
+        surfaces, sections, tables, target, law, shots: structs of the inputs; `tables` has the first two where
             shots have surfaces of their own.
         bending, passage, history: what the march fills beside the outcomes.
     """
@@ -65,9 +65,8 @@ class Memory:
             table_of(self.stage.Sections, self.sections[tabled], self.put),
         )
         self.target, self.shots = self._target(prepared), self._shots(prepared)
-        self.law, self.pace = self.stage.Law(), self.stage.Pace()
+        self.law = self.stage.Law()
         self.law.onset_limit = LARGEST_ONSET
-        self.pace.time_step, self.pace.rows = prepared.resolution.time_step or 0.0, prepared.rows
         self.free = scene.record.flies_free(scene.core, scene.target)
         self.bending = wp.empty(count if variant.bends else 0, dtype=self.stage.Bending, device=device)
         self.history = wp.empty((count * prepared.rows, WIDTH), dtype=variant.real, device=device)
@@ -89,11 +88,12 @@ class Memory:
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
         target.laminate = self.put(np.array([one.laminate for one in materials]), wp.int32)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
-        record = prepared.scene.record
+        target.slowing, record = prepared.resolution.slowing, prepared.scene.record
         target.standoffs, target.ahead = self.put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
         for name, variable in self.stage.Target.vars.items():
             if getattr(variable.type, "ndim", 1) == 2:
-                rows = np.broadcast_arrays(*(getattr(one, name) for one in materials))
+                own = prepared.stretch if name == "stretch" else [getattr(one, name) for one in materials]
+                rows = np.broadcast_arrays(*own)
                 setattr(target, name, self.put(np.stack(rows), variable.type.dtype))
         return target
 
@@ -150,7 +150,7 @@ class Memory:
         """Names of the fields that a slot needs."""
         if not (self.variant.nodal or self.variant.degrades):
             return []
-        if self.variant.window and self.device.is_cuda:  # the others are in shared memory
+        if self.variant.window and self.device.is_cuda and not self.variant.layered:  # the others are in shared memory
             return ["filtered"]
         members, real = self.stage.Fields.vars.items(), self.variant.real
         names = [name for name, member in members if getattr(member.type, "dtype", None) is real]
@@ -238,7 +238,7 @@ class Memory:
     def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:
         """March `count` shots from order[first] on; returns `count`."""
         bodies = [self.surfaces[0], self.sections[0], *self.tables]
-        inputs = [*bodies, self.target, self.law, self.shots, self.pace, *scratch]
+        inputs = [*bodies, self.target, self.law, self.shots, self.prepared.rows, *scratch]
         launch = partial(wp.launch, dim=count)
         if self.variant.window:
             launch = partial(wp.launch_tiled, dim=[count], block_dim=LANES)

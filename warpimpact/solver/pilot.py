@@ -214,8 +214,8 @@ def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity
     share, allowed_share = asked.share, (1.0 if quantity == "velocity" else 2.0) * asked.limit
     first = min(coarsest_level(usual / asked.limit), FINEST_LIMIT)
 
-    def found_at(index: int, error: float, allowed: float) -> LimitErrors:
-        return LimitErrors(at_level(index, numerics), error <= allowed, share, error, quantity)
+    def found_at(index: int, error: float, allowed: float, finer: int | None = None) -> LimitErrors:
+        return LimitErrors(at_level(index, numerics), error <= allowed, share, error, quantity, finer)
 
     known: dict[int, Array] = {}
 
@@ -227,7 +227,11 @@ def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity
     def judge(index: int, finer: int, margin: float) -> tuple[LimitErrors, float, bool]:
         change, half, typical = limit_changes(limits(index), limits(finer), share)
         allowed = allowed_share * typical
-        return found_at(index, margin * change, allowed), margin * half / max(allowed, 1e-30), margin * half <= allowed
+        return (
+            found_at(index, margin * change, allowed, finer),
+            margin * half / max(allowed, 1e-30),
+            margin * half <= allowed,
+        )
 
     levels = range(first, FINEST_LIMIT + 1)
     found = _coarsest(judge, levels, FINEST_LIMIT + 1, BEYOND_LIMITS)

@@ -15,7 +15,7 @@ from warpimpact.kernels.variant import Variant
 from warpimpact.scene import exclusions
 from warpimpact.solver.grid import Grid, Lengths, grids_of
 from warpimpact.solver.materials import OWN_LENGTHS, Materials, materials_of
-from warpimpact.solver.resolution import Resolution, conditions_of, resolve, steps_of
+from warpimpact.solver.resolution import Resolution, conditions_of, layer_steps, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
 from warpimpact.solver.windows import Cells, block_window, first_windows, windows_behind
 
@@ -46,6 +46,7 @@ class Prepared:
         plates: the plate, and the layers behind it; likewise several where shots have degradation lengths of their own.
         materials: of the plate, and of the layers behind it.
         conditions: every member of the kernels' Shots (kernels/shots.py), each of shape [1] or [shots].
+        stretch: how many times longer than the shortest a step in each layer is (kernels/target.py), likewise.
         steps: of a passage that nothing hinders, at most.
         first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
             [shots].
@@ -60,6 +61,7 @@ class Prepared:
     plates: list[list[Grid]]
     materials: list[Materials]
     conditions: dict[str, NDArray[Any]]
+    stretch: list[Array]
     steps: int
     first_cells: NDArray[np.int64]
     rows: int = 0
@@ -121,8 +123,10 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     resolutions = [resolve(scene, numerics, weakening, [own.length for own in layers]) for layers in lengths]
     shared = "degradation_length" in shots.columns
     resolution, tabled = resolutions[0], any(name in shots.columns for name in OWN_LENGTHS)
-    conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, resolution)
-    steps = int(steps_of(shots, resolution, conditions).max())
+    own_lengths = [np.array([layer.length for layer in layers])[which] for layers in zip(*lengths, strict=True)]
+    time_steps = layer_steps(scene, shots, materials, resolution, own_lengths)
+    conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, time_steps)
+    steps = int(steps_of(shots, conditions).max())
     deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
     exclusions.check_together(
@@ -169,7 +173,6 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     conditions |= {
         "plates": which,
         "surface": np.array([list(around).index(own) for own in rings])[which],
-        "way_along": np.array([one.way_along for one in resolutions])[which],
     }
     return Prepared(
         scene=scene,
@@ -183,6 +186,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         plates=grids,
         materials=materials,
         conditions=conditions,
+        stretch=[step / conditions["time_step"] for step in time_steps],
         steps=steps,
         first_cells=first_cells,
     )

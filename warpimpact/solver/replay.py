@@ -107,7 +107,7 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     march, contact = traced(scene, shots, numerics, snapshots)
     memory, trace = march.memory, traces_of(march.memory, contact)[-1]
     outcomes = outcomes_of(memory, contact)[-1:]  # a snapshot writes over what the march has filled
-    time_step = 2.0 * trace[0, 0]
+    time_step = float(memory.prepared.conditions["time_step"][-1])
     steps = np.unique(np.linspace(0, len(trace) - 1, snapshots).round().astype(int))
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
     cell_y, cell_z = nodes_about(home, march.cells, spacing)
@@ -115,11 +115,12 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     scratch = memory.scratch(1, march.cells) if len(steps) else ()
     if scratch and memory.variant.layered and memory.variant.degrades:  # the window of a layer opens with a step
         scratch[0].exposure.zero_()
+    history = History.from_trace(trace, _body(memory.prepared))
     left = [_left_after(memory, march.cells, scratch, count, time_step, material) for count in steps]
     return Replay(
         outcomes=outcomes,
-        history=History.from_trace(trace, _body(memory.prepared)),
-        plate_time=trace[steps, 0] - 0.5 * time_step if memory.variant.layered else steps * time_step,
+        history=history,
+        plate_time=history.time[steps] - 0.5 * history.step[steps] if memory.variant.layered else steps * time_step,
         resistance_share=np.array([share for share, _ in left]).reshape(-1, len(cell_y), len(cell_z)),
         cell_y=cell_y,
         cell_z=cell_z,

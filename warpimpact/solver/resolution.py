@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene.patterns import NoPattern
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.materials import Materials, decay_rate
 
@@ -46,8 +47,8 @@ SLENDER = 1.0 / 7.0
 DEEP = 2.0
 """Of the degradation depth: a passage no longer than that leaves a step within the depth."""
 ALONG = 1.6
-"""Way of a step in the plane of the plate, in degradation lengths and per unit of `travel`: contact that sweeps
-sideways by more than that leaves gaps in the exposure."""
+"""Way of a step in the plane of a plate, in degradation lengths and per unit of `travel`: contact that sweeps sideways
+by more than that leaves gaps in the exposure, and jumps over edges of holes."""
 
 WEAKENING = 2.7
 """ln of what a step may take off the resistance where it acts all the time, per unit of `travel`: exposure counts as
@@ -120,12 +121,15 @@ class Resolution:
     """Way per step at impact velocity, as a share of the passage: the thickness of the plate, or `slender` [m] where
     that is less. A step, also a given one, that is longer than the passage jumps over what happens in the plate."""
     slender: float
-    way_along: float
-    """The most of a step's way that may lie in the plane of the plate [m], if a quarter of it is enough for that."""
+    along: float
+    """The most of a step's way that may lie in the plane of a plate, in degradation lengths, if a quarter of it is
+    enough for that."""
     weakening: float
     """The most that contact may take off ln of the resistance in a step, likewise."""
     slowing: float
-    """The most that contact may take off the energy in a step, likewise, over twice the cross section [1/m²]."""
+    """The most that contact may take off the speed in a step, likewise."""
+    section: float
+    """The core's largest cross section [m²]."""
     mass: float
     """Of the core, where no other is given [kg]."""
     static: float
@@ -145,6 +149,13 @@ class Resolution:
         acting = np.minimum(thickness, DEEP * np.asarray(depth)) if weakens else thickness
         return np.minimum(acting, self.slender)
 
+    def way_along(self, plate: Plate, length: ArrayLike, *, weakens: bool) -> Array:
+        """The most of a step's way that may lie in the plane of a plate [m], for some degradation lengths [m], of their
+        shape; infinite where the plate is and stays the same everywhere."""
+        if isinstance(plate.pattern, NoPattern) and plate.size is None and not weakens:
+            return np.full(np.shape(length), math.inf)
+        return self.along * np.asarray(length)
+
     def longest_time(
         self, decay: Array, plate: Plate, velocity: ArrayLike, mass: ArrayLike, static_stress: ArrayLike
     ) -> Array:
@@ -152,14 +163,22 @@ class Resolution:
         of decay (`decay_rate`), impact velocities [m/s], masses [kg] and static stresses [Pa], of their shape."""
         longest = self.weakening / np.maximum(-decay, SLOWEST_DECAY)
         weakened = longest if plate.degradation_distance is None else longest / np.asarray(velocity)
-        slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / np.maximum(static_stress, SMALLEST_STRESS)
+        stopping = self.section * np.maximum(static_stress, SMALLEST_STRESS)
+        slowed = self.slowing * np.asarray(mass) * np.asarray(velocity) / stopping
         return np.asarray(np.minimum(weakened, slowed))
 
-    def step_at(self, velocity: ArrayLike, obliquity: ArrayLike, passage: ArrayLike, longest_time: ArrayLike) -> Array:
-        """Time steps [s] at impact velocities [m/s], obliquities [rad], `passage` [m] and `longest_time` [s], of their
-        shape."""
+    def step_at(
+        self,
+        velocity: ArrayLike,
+        obliquity: ArrayLike,
+        passage: ArrayLike,
+        longest_time: ArrayLike,
+        way_along: ArrayLike = math.inf,
+    ) -> Array:
+        """Time steps [s] at impact velocities [m/s], obliquities [rad], `passage` [m], `longest_time` [s] and
+        `way_along` [m], of their shape."""
         longest = self.travel * np.asarray(passage)
-        aslant = self.way_along / np.maximum(np.sin(obliquity), 1e-9)
+        aslant = np.asarray(way_along) / np.maximum(np.sin(obliquity), 1e-9)
         way = np.clip(np.minimum(aslant, np.multiply(longest_time, velocity)), 0.25 * longest, longest)
         if self.time_step is not None:
             way = self.time_step * np.asarray(velocity)
@@ -170,8 +189,10 @@ class Resolution:
         stress = self.static * plate.resistance
         decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
         longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
-        passage = self.passage(plate.thickness, plate.degradation_depth, weakens=plate.degradation < 1.0)
-        return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time))
+        weakens = plate.degradation < 1.0
+        passage = self.passage(plate.thickness, plate.degradation_depth, weakens=weakens)
+        way_along = self.way_along(plate, plate.degradation_length, weakens=weakens)
+        return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time, way_along))
 
     def step_in(self, impact: Impact, target: Target) -> float:
         """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
@@ -207,9 +228,10 @@ def resolve(
         block=numerics.layout == "block",
         travel=travel,
         slender=SLENDER * core.length,
-        way_along=ALONG * travel * finest,
+        along=ALONG * travel,
         weakening=WEAKENING * travel,
-        slowing=SLOWING * travel * 0.5 / (math.pi * core.max_radius**2),
+        slowing=0.5 * SLOWING * travel,
+        section=math.pi * core.max_radius**2,
         mass=core.mass_properties.mass,
         static=scene.interaction.static,
         patch_width=math.inf if nodal else width,
@@ -217,23 +239,38 @@ def resolve(
     )
 
 
+def layer_steps(
+    scene: Scene, shots: Shots, materials: Sequence[Materials], resolution: Resolution, lengths: Sequence[Array]
+) -> list[Array]:
+    """Time steps in all layers [s], each of shape [shots].
+
+    Args:
+        lengths: over which the layers weaken [m], each of shape [1] or [shots].
+    """
+    mass = shots.own("mass", scene.core.mass_properties.mass)
+    return [
+        resolution.step_at(
+            shots.velocity,
+            shots.obliquity,
+            resolution.passage(own.thickness, own.depth, weakens=own.weakens),
+            resolution.longest_time(own.decay_rate, layer, shots.velocity, mass, own.a0),
+            resolution.way_along(layer, length, weakens=own.weakens),
+        )
+        for layer, own, length in zip(scene.target.layers, materials, lengths, strict=True)
+    ]
+
+
 def conditions_of(
-    scene: Scene, shots: Shots, materials: Sequence[Materials], resolution: Resolution
+    scene: Scene, shots: Shots, materials: Sequence[Materials], steps: Sequence[Array]
 ) -> dict[str, Array]:
     """What every shot is computed with, under the names of the kernels' Shots; of shape [1] where all share it.
 
-    The layer that needs the shortest step sets the step.
+    Args:
+        steps: as `layer_steps` gives them.
     """
     core, target = scene.core, scene.target
     body = core.mass_properties
     mass, depth = shots.own("mass", body.mass), materials[-1].front + materials[-1].thickness
-    passage = _least(
-        resolution.passage(material.thickness, material.depth, weakens=material.weakens) for material in materials
-    )
-    times = (
-        resolution.longest_time(material.decay_rate, layer, shots.velocity, mass, material.a0)
-        for material, layer in zip(materials, target.layers, strict=True)
-    )
     scale = mass / body.mass  # of the body as a whole, so of its moments of inertia, too
     gaps = sum(target.gaps)
     return {name: values for name, values in shots.columns.items() if name not in BY_LAYER} | {
@@ -242,14 +279,12 @@ def conditions_of(
         "inertia_transverse": scale * body.inertia_transverse,
         "strength": shots.own("strength", UNBREAKABLE if core.strength is None else core.strength),
         "onset_share": shots.own("onset", scene.interaction.onset),
-        "way": resolution.travel * passage,
-        "longest_time": _least(times),
-        "longest_step": passage,
+        "time_step": reduce(np.minimum, steps),
         "longest_way": STEP_ALLOWANCE * (depth - gaps + 2.0 * len(materials) * core.bounding_radius) + gaps,
     }
 
 
-def steps_of(shots: Shots, resolution: Resolution, conditions: dict[str, Array]) -> Array:
+def steps_of(shots: Shots, conditions: dict[str, Array]) -> Array:
     """Steps of passages that nothing hinders, shape [shots].
 
     Args:
@@ -258,7 +293,7 @@ def steps_of(shots: Shots, resolution: Resolution, conditions: dict[str, Array])
     Raises:
         TooManySteps: a passage takes more than MOST_STEPS.
     """
-    step = resolution.step_at(shots.velocity, shots.obliquity, conditions["longest_step"], conditions["longest_time"])
+    step = conditions["time_step"]
     steps = conditions["longest_way"] / STEP_ALLOWANCE / (step * shots.velocity)
     if (most := float(steps.max())) > MOST_STEPS:
         raise TooManySteps(
@@ -267,7 +302,3 @@ def steps_of(shots: Shots, resolution: Resolution, conditions: dict[str, Array])
             "set the step"
         )
     return np.asarray(steps)
-
-
-def _least(values: Iterable[Array]) -> Array:
-    return np.asarray(reduce(np.minimum, values))

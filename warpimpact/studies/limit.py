@@ -17,10 +17,10 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
-from warpimpact.results.dataset import failed
+from warpimpact.results.dataset import failed, finer_pair
 from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
-from warpimpact.runs.compute import at_solid, found_in, numerics_of, of_images, pilot_shots
+from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
 from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Task
@@ -45,6 +45,7 @@ from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
+from warpimpact.statistics.shifts import shift_of_quantile
 
 if TYPE_CHECKING:
     from warpimpact.results.table import Result
@@ -124,14 +125,13 @@ class LimitMap:
             attr.LIMIT_TOLERANCE: sought.tolerance,
             attr.LIMIT_HIGHEST: sought.highest,
         }
-        solid: dict[str, Array] = {}
+        beside = finer_hits(campaign, found, limits_pilot_size(campaign.numerics.asked))
         if task.solid is not None:
             solid, of_solid = self._at_solid(campaign, task.solid, numerics, worker)
             attributes |= of_solid
-        put = self._put(campaign, task.shots, searched, images)
-        found_limits = {name: getattr(searched, name.field) for name in v.LIMITS[sought.quantity]}
-        outcomes = searched.outcomes.assign(**found_limits)
-        return described(campaign, put, outcomes, short_steps(numerics), attributes, solid)
+            beside |= solid
+        put, outcomes = self._put(campaign, task.shots, searched, images), searched.recorded(sought.quantity)
+        return described(campaign, put, outcomes, short_steps(numerics), attributes, beside)
 
     def _at_solid(
         self, campaign: Campaign, shots: Shots, numerics: Numerics, worker: Worker
@@ -195,14 +195,20 @@ def quantiles(dataset: xarray.Dataset) -> dict[str, Estimate]:
     """V50 and V05 (of a thickness H50 and H05) with their 95 % intervals over the hits; infinite where so many hits
     have a limit beyond the largest value tried."""
     quantity, highest = dataset.attrs[attr.LIMIT], dataset.attrs[attr.LIMIT_HIGHEST]
-    value = dataset[v.LIMITS[quantity].value].values
-    counted = np.where(failed(dataset), np.nan, np.minimum(value, highest))
+
+    def counted_of(some: xarray.Dataset) -> Array:
+        return np.where(failed(some), np.nan, np.minimum(some[v.LIMITS[quantity].value].values, highest))
+
+    counted, pair, dealt = counted_of(dataset), finer_pair(dataset), dealing(dataset)
+    levels = None if pair is None else (counted_of(pair[0]), counted_of(pair[1]))
     found = {}
     for name, share in QUANTILES.items():
-        estimate = estimate_of("quantile", counted, share=share, **dealing(dataset))
+        estimate = estimate_of("quantile", counted, share=share, **dealt)
         ends = (estimate.value, estimate.low, estimate.high)
         drawn = by_draws(dataset, counted, of_quantile(share))
         estimate = over_draws(dataset, estimate, drawn, units=_UNITS_OF[quantity])
         value_, low, high = (math.inf if end >= highest else end for end in ends)
+        if levels is not None:
+            estimate = replace(estimate, numerics=shift_of_quantile(*levels, share, images=dealt["images"]))
         found[name if quantity == "velocity" else f"H{name[1:]}"] = replace(estimate, value=value_, low=low, high=high)
     return found

@@ -9,6 +9,7 @@ import xarray
 
 from warpimpact.analysis.numbers import ends_of, intervals_text
 from warpimpact.analysis.proxy import proxy
+from warpimpact.analysis.summary import numerics_note
 from warpimpact.analysis.survival import draws_note
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
@@ -44,7 +45,7 @@ def limits_text(dataset: xarray.Dataset) -> str:
         rows += _proxy_lines(dataset)
     else:
         for name, estimate in quantiles(dataset).items():
-            ends = intervals_text(ends_of(estimate), lambda end: f"{factor * end:.5g}")
+            ends = intervals_text(ends_of(estimate.times(factor)), "{:.5g}".format, "{:.2g}".format)
             what = "perforate" if quantity == "velocity" else "have a smaller limit"
             share = f"{100.0 * QUANTILES[f'V{name[1:]}']:g} % of the hits {what}"
             rows.append(f"{name} = {factor * estimate.value:.5g} {unit}   95 % interval {ends}   ({share})")
@@ -62,7 +63,7 @@ def limits_text(dataset: xarray.Dataset) -> str:
     rows += [*_solid_lines(dataset), *published_lines(dataset)]
     rows.append(f"{runs.mean():.2g} runs of a hit on average, {runs.max()} at most")
     rows.append(promise_line(dataset))
-    rows += filter(None, [draws_note(dataset)])
+    rows += filter(None, [numerics_note(dataset), draws_note(dataset)])
     return "\n".join(rows)
 
 

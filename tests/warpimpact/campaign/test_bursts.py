@@ -117,10 +117,6 @@ def test_what_a_burst_does_not_take_is_refused_in_one_sentence() -> None:
             "[burst] cannot be combined with hits.irreducible = true: the hits of a burst have no images",
         ),
         (('fidelity = "draft"', 'scheme = "nodal"'), '[burst] cannot be combined with numerics.scheme = "nodal"'),
-        (
-            ('fidelity = "draft"', 'fidelity = "draft"\nlayout = "block"'),
-            'numerics.layout = "block" cannot be combined with [burst]: a block computes one hit',
-        ),
         (('scatter = "5 mm"', 'scatter = "30 m"'), "but they are exact up to"),
         (('scatter = "5 mm"', 'scatter = "5 kg"'), "burst.scatter"),
     ):

@@ -22,7 +22,7 @@ from warpimpact.results import posterior_file
 from warpimpact.results.files import read
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import run
-from warpimpact.scene import Interaction, Plate, Scene, Shots
+from warpimpact.scene import Interaction, Numerics, Plate, Scene, Shots
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.solver.simulate import simulate
 
@@ -140,6 +140,25 @@ def test_a_mean_has_an_interval_by_hits_and_one_by_parameters(tmp_path: Path) ->
     shown = overview(result).axes[0].get_title()
     assert shown.endswith("mean of hits nearby")
     assert variable_map(result, "residual_velocity").axes[3].get_ylabel() == "spread over draws and conditions [m/s]"
+
+
+@pytest.mark.parametrize("of_draw", [{}, {"degradation_length": 3e-4}], ids=["columns", "tables"])
+@pytest.mark.parametrize("hits", ["[hits]", "[hits]\nirreducible = true"], ids=["sobol", "images"])
+def test_the_numerics_shift_a_mean_over_draws_too(tmp_path: Path, of_draw: dict[str, float], hits: str) -> None:
+    """The pilot's hits have the draws that the run gives them, so a run at the finer level has the same hits."""
+    given = campaign(posterior(tmp_path, **of_draw), ("[hits]", hits), ('time_step = "2 us"\n', ""))
+    result = run(given, device="cpu")
+    level = json.loads(result.attrs["resolution"])["level"] + 2
+    finer = run(given.model_copy(update={"numerics": Numerics(level=level)}), device="cpu")
+    assert len(np.unique(result["posterior_draw"].values[result["finer_hit"].values])) > 10
+    at = finer.isel(hit=result["finer_hit"].values)
+    np.testing.assert_array_equal(result["finer_residual_velocity"].values, at["residual_velocity"].values)
+    mean = summary(result).residual_velocity
+    assert mean.numerics is not None
+    assert 0.0 < mean.numerics < 5.0
+    assert abs(float((finer["residual_velocity"] - result["residual_velocity"]).mean())) < mean.numerics
+    assert "by parameters" in inspect_text(result)
+    assert f", numerics ± {mean.numerics:.2f}" in inspect_text(result)
 
 
 def test_limits_have_both_intervals_too(tmp_path: Path, monkeypatch, capsys) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from warpimpact import Campaign, Numerics
+from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.summary import estimated, summary_text
 from warpimpact.results import attributes as attr
@@ -115,7 +116,10 @@ def test_measures_say_what_the_numerics_may_shift_them_by_and_a_finer_level_agre
         if one.hit is None and not one.label.startswith("P("):
             assert abs(one.value - other.value) <= (one.numerics or 0.0), one.name
     assert "numerics ± " in summary_text(told)
-    assert "numerics" not in summary_text(truth)
+    assert summary_text(truth).count("numerics ±") == 1
+    assert "numerics ± is not known: numerics.level is given, so no hits" in summary_text(truth)
+    assert "numerics ± is not known: none of these hits" in summary_text(told.isel(hit=slice(900, None)))
+    assert any("numerics ± is not known of b: " in note for note in compare([told, truth], ["a", "b"]).notes)
 
 
 def test_a_stop_rule_takes_the_level_and_the_hits_that_its_interval_needs() -> None:
@@ -123,14 +127,14 @@ def test_a_stop_rule_takes_the_level_and_the_hits_that_its_interval_needs() -> N
         asked = {"[output]": STOP.format(half_width), "count = 256\n": "", 'fidelity = "standard"': ""} | changes
         return dict(run(campaign(asked), device="cpu").attrs)
 
-    wide, narrow = ran("4 deg"), ran("0.8 deg")
-    for told, half_width in ((wide, 4.0), (narrow, 0.8)):
+    wide, narrow = ran("4 deg"), ran("1 deg")
+    levels = [json.loads(str(told[attr.RESOLUTION]))["level"] for told in (wide, narrow)]
+    for told, half_width, level in ((wide, 4.0, levels[0]), (narrow, 1.0, levels[1])):
         low, high = told[attr.ESTIMATE_INTERVAL]
         assert told[attr.LEVEL_FOR] == "mean(tilt@130mm)"
         assert told[attr.STOP_REASON] == "half_width"
-        assert 0.0 < told[attr.ESTIMATE_NUMERICS] <= 0.5 * half_width
+        assert 0.0 < json.loads(told[attr.LEVEL_SHIFTS])[str(level)][1] <= 0.5 * half_width
         assert 0.5 * (high - low) + told[attr.ESTIMATE_NUMERICS] <= half_width
-    levels = [json.loads(told[attr.RESOLUTION])["level"] for told in (wide, narrow)]
     assert levels[0] < levels[1]
     # Who asks for single hits, too, has the level that they need; more hits are then of no use.
     asked = ran("1.2 deg", **{'fidelity = "standard"': 'fidelity = "draft"'})

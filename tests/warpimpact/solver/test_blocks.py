@@ -6,8 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from warpimpact.scene import Impact, Layer, Numerics, Plate, PolynomialCore, Record, Scene, Shots, Target
-from warpimpact.solver import simulate, windows
+from warpimpact.scene import (
+    Impact,
+    Layer,
+    Numerics,
+    Plate,
+    PolynomialCore,
+    Record,
+    Scene,
+    Shots,
+    SlotPattern,
+    Target,
+    exclusions,
+)
+from warpimpact.solver import replay, simulate, windows
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
 
@@ -16,12 +28,9 @@ PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation=0.8, degradation_int
 SIMPLE, BLOCK = Numerics(level=2), Numerics(level=2, layout="block")
 
 
-def shots_of(count: int = 3, at_a_plate: int = 1, **columns: float) -> Shots:
+def shots_of(count: int = 3, **columns: Any) -> Shots:
     values = dict.fromkeys(("hit_y", "hit_z", *Impact.model_fields), 0.0) | {"velocity": 825.0} | columns
-    columns_of = {name: np.full(count, value) for name, value in values.items()}
-    if at_a_plate > 1:
-        columns_of |= {"sample": np.arange(count) // at_a_plate, "burst_order": np.arange(count) % at_a_plate}
-    return Shots(**columns_of)
+    return Shots(**{name: np.full(count, value) for name, value in values.items()})
 
 
 @pytest.mark.parametrize("index", [0, 2, 4])
@@ -45,29 +54,48 @@ def test_windows_that_do_not_fit_a_block_are_for_the_simple_layout() -> None:
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
 
 
+def test_only_the_front_window_has_to_fit_a_block() -> None:
+    behind = Layer(**PLATE.model_dump(), gap=20e-3)
+    prepared = prepare(Scene(core=CORE, target=Target(layers=(PLATE, behind))), shots_of(), BLOCK)
+    front, base = prepared.nodes((prepared.cells,) * 2)
+    assert front <= prepared.variant.window <= max(windows.SIZES) < base
+
+
 def test_shots_that_leave_the_window_of_their_block_are_computed_in_the_simple_layout(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(windows, "SLACK", 1.02)
+    monkeypatch.setattr(windows, "SLACK", 0.8)
     shots = shots_of(pitch=0.03)
     simple, block = (simulate.simulate(Scene(core=CORE, target=PLATE), shots, numerics=n) for n in (SIMPLE, BLOCK))
     np.testing.assert_array_equal(block.status, simple.status)
     np.testing.assert_array_equal(block.residual_velocity, simple.residual_velocity)
 
 
+def test_shots_that_do_not_leave_theirs_keep_what_layers_and_histories_have_of_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(windows, "DEEP", 0.2)  # so that a core leaves its window of the base if it is turned
+    slots = SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True)
+    base = Layer(**PLATE.model_dump(), gap=0.1)
+    scene = Scene(core=CORE, target=Target(layers=(PLATE.model_copy(update={"pattern": slots}), base)))
+    shots = shots_of(hit_y=np.array([0.0, 2e-3, 0.0]))
+    simple, block = (simulate.simulate(scene, shots, numerics=n) for n in (SIMPLE, BLOCK))
+    np.testing.assert_allclose(block.layer_residual_velocity, simple.layer_residual_velocity, atol=1e-3)
+    for here, there in zip(*(replay.trace(scene, shots, numerics=n) for n in (SIMPLE, BLOCK)), strict=True):
+        np.testing.assert_allclose(here[:, 8], there[:, 8], atol=1e-2)
+
+
 @pytest.mark.parametrize(
-    ("scene", "numerics", "shots", "words"),
+    ("scene", "numerics", "words"),
     [
-        ({}, {"precision": "double"}, {}, 'numerics.precision = "double"'),
-        ({}, {"scheme": "nodal"}, {}, 'numerics.scheme = "nodal"'),
-        ({"record": Record(bending=True)}, {}, {}, "output.bending = true"),
-        ({"target": Target(layers=(PLATE, Layer(**PLATE.model_dump())))}, {}, {}, "[[layer]]"),
-        ({}, {}, {"count": 4, "at_a_plate": 2}, "[burst]"),
+        ({}, {"precision": "double"}, 'numerics.precision = "double"'),
+        ({}, {"scheme": "nodal"}, 'numerics.scheme = "nodal"'),
+        ({"record": Record(bending=True)}, {}, "output.bending = true"),
+        ({"target": PLATE.model_copy(update={"thickness": 5e-3})}, {}, exclusions.DEEP),
+        ({"target": Target(layers=(PLATE, Layer(**PLATE.model_dump())))}, {}, exclusions.DEEP),
     ],
 )
-def test_what_a_block_does_not_compute_is_refused(
-    scene: dict[str, Any], numerics: dict[str, Any], shots: dict[str, int], words: str
-) -> None:
+def test_what_a_block_does_not_compute_is_refused(scene: dict[str, Any], numerics: dict[str, Any], words: str) -> None:
     whole = Scene(**{"core": CORE, "target": PLATE} | scene)
     with pytest.raises(ValueError, match=re.escape(f'numerics.layout = "block" cannot be combined with {words}: a')):
-        simulate.simulate(whole, shots_of(**shots), numerics=Numerics(layout="block", **numerics))
+        simulate.simulate(whole, shots_of(), numerics=Numerics(layout="block", **numerics))

@@ -210,7 +210,7 @@ def test_draft_tells_errors_that_other_hits_keep_where_a_base_stops_some_of_them
     assert found.numerics.level <= 5
     assert np.nanquantile(velocity, 0.9) <= found.residual_velocity_error
     assert np.nanquantile(tilt, 0.9) <= found.tilt_error
-    assert np.nanquantile(depth, 0.9) <= found.depth_error < 2e-3
+    assert np.nanquantile(depth, 0.9) <= found.depth_error < 5e-3
     other = ended_otherwise(coarse, fine)
     assert (np.isnan(velocity) == other).all()
     assert other.mean() <= found.status_error + 3.0 / 64.0

@@ -47,6 +47,13 @@ def test_a_share_is_known_far_better_than_from_the_shots_that_changed_sides() ->
     assert 0.0 < shift_of_share(coarse, fine) < 0.2 * shift_of_yes(1.0 * (coarse > 0.0), 1.0 * (fine > 0.0))
 
 
+def test_many_shots_that_lie_close_to_the_limit_shift_a_share_by_their_number() -> None:
+    """A quarter of the shots within 0.1 of the limit, others as far as 8: a window has the width of all of them."""
+    coarse = np.concatenate([np.full(64, -0.1), np.linspace(-8.0, 8.0, 192)])
+    fine = coarse + 0.2
+    assert shift_of_share(coarse, fine) >= np.mean(fine > 0.0) - np.mean(coarse > 0.0) > 0.25
+
+
 def test_shots_that_count_at_one_level_alone_shift_a_mean() -> None:
     coarse, fine = np.full(64, 2.0), np.full(64, 2.0)
     coarse[:8], fine[:8] = np.nan, 6.0  # their mean is 2, with them 2.5
