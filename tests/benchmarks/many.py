@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 from bench import machine, store
-from roads import NORMAL, P80, SLOTTED, scene_and_shots
+from roads import NORMAL, P80, SLOTTED, Scenes, scene_and_shots
 
-from warpimpact import Numerics, Scene, Shots
+from warpimpact import Numerics, Shots
 from warpimpact.solver import grid
 from warpimpact.solver.many import simulate_many
 from warpimpact.solver.worker import Worker
@@ -29,8 +29,6 @@ DESIGNS, EACH = 8, 512
 LENGTHS = (1024, 64)
 WIDTHS = [f"{4.0 + 0.001 * k:.3f} mm" for k in range(DESIGNS)]
 """So alike that their hits cost the same."""
-
-Scenes = list[tuple[Scene, Shots]]
 
 
 def with_lengths(shots: Shots, lengths: int) -> Shots:

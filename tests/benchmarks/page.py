@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any, NamedTuple
 
 HERE = Path(__file__).resolve().parent
@@ -23,6 +24,8 @@ RUNS: Mapping[str, Sequence[str]] = {
     "peers": ("peers.py", "--hits", "256"),
     "throughput": ("throughput.py",),
     "roads": ("roads.py",),
+    "drawn": ("roads.py", "--seed", "1", "--scenes", "6"),
+    "loops": ("loops.py",),
     "many": ("many.py",),
     "overheads": ("overheads.py",),
     "design_page": ("design_page.py",),
@@ -74,6 +77,8 @@ def rows(found: Mapping[str, Any]) -> Iterator[Row]:
         ("throughput", _throughput),
         ("peers", _peers),
         ("roads", _roads),
+        ("drawn", _drawn),
+        ("loops", _loops),
         ("many", _many),
         ("overheads", _overheads),
         ("design_page", _design_page),
@@ -150,6 +155,50 @@ def _roads(values: Mapping[str, Any]) -> Iterator[Row]:
             f"processor time of a run of {values['run']} hits with its pilot",
             f"least of {values['rounds']} rounds, {values['hits']} hits",
         )
+
+
+def _drawn(values: Mapping[str, Any]) -> Iterator[Row]:
+    kinds = {"plate": "single plates", "layers": "targets of layers, and bursts"}
+    for kind, scene in kinds.items():
+        some = [one for name, one in values["roads"].items() if name.startswith(kind)]
+        costs, shares = (sorted(one[name] for one in some) for name in ("ratio", "pilot_share"))
+        yield Row(
+            "standard, times the cost of the slotted plate",
+            f"{len(some)} {scene}, drawn from seed {values['seed']}",
+            f"{median(costs):.1f} (median), {costs[0]:.1f} to {costs[-1]:.1f}; pilot {median(shares):.0%} (median), at "
+            f"most {shares[-1]:.0%}; promise kept on {sum(one['kept'] for one in some)}",
+            f"processor time of a run of {values['run']} hits with its pilot",
+            f"least of {values['rounds']} rounds, {values['hits']} hits",
+        )
+
+
+def _loops(values: Mapping[str, Any]) -> Iterator[Row]:
+    for name, one in values["limits"].items():
+        yield Row(
+            "limit velocity, times the cost of the slotted plate at standard",
+            name,
+            f"{one['ratio']:.0f}, {one['runs']:.1f} runs of a hit; level {one['level']}, "
+            f"{one['microseconds_per_hit'] * 1e-3:.2g} ms per hit, pilot {one['pilot_share']:.0%}"
+            + ("" if one["kept"] else "; promise not kept"),
+            f"processor time of a run of {values['run']} hits with its pilot",
+            f"one run of {values['hits']} hits",
+        )
+    for name, one in values["drawn"].items():
+        yield Row(
+            f"hits of {values['draws']} draws, times the cost of one scene",
+            f"slotted plate, {name} of a posterior",
+            f"{one['ratio']:.2f}; {_rounded(one['hits_per_second'])} hits per second of one core",
+            f"one scene with as many hits, level {values['level']}",
+            f"least of {values['rounds']} rounds, {values['each']} hits of a draw",
+        )
+    fit = values["identify"]
+    yield Row(
+        "`warpimpact identify`, seconds and effective sample size",
+        "the paper's two shots (`paper_fit`)",
+        f"{fit['seconds']:.0f} s of a core, {fit['wall']:.0f} s wall time; {fit['effective']:.0f}",
+        f"{fit['sets']} sets of parameters",
+        "one fit",
+    )
 
 
 def _many(values: Mapping[str, Any]) -> Iterator[Row]:

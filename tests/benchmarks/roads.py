@@ -2,10 +2,11 @@
 included.
 
     python tests/benchmarks/roads.py            # writes results/roads.json
+    python tests/benchmarks/roads.py --seed 1   # writes results/drawn.json
 
 Every road differs from the slotted plate, or from the oblique one, in what its name says. A road's level is what its
 own pilot finds for a run of RUN hits. The roads are timed in turn with the slotted plate, and the least round counts.
-`--seed` adds scenes of random_layers.py.
+With a seed the roads are scenes that nobody chose: single plates of random_scenes.py, and targets of random_layers.py.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from typing import Any
 
 from bench import machine, store
 from random_layers import drawn
+from random_scenes import draw
 
 from warpimpact import Campaign, Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
@@ -64,6 +66,8 @@ staggered = true
 """
 SLOTTED = f'[plate]\nthickness = "4 mm"\n{MATERIAL}{SLOTS}'
 ROUND = f'[plate]\nthickness = "5 mm"\n{MATERIAL}{HOLES}'
+Scenes = list[tuple[Scene, Shots]]
+"""Scenes with their shots."""
 BY_PATH = '[plate]\ndegradation_distance = "0.8 mm"'
 NORMAL, OBLIQUE = '[impact]\nvelocity = "825 m/s"\n', '[impact]\nvelocity = "838 m/s"\nobliquity = "30 deg"\n'
 
@@ -122,44 +126,58 @@ def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics) -> Road:
     return Road(scene, shots, found.numerics, found.kept, time.process_time() - begin)
 
 
-def _campaign(text: str) -> Campaign:
+def campaign_of(text: str) -> Campaign:
     """The campaign of a text of ROADS."""
     bending = "bending = true\n" if "strength" in text else ""
     whole = f'title = "road"\n{text}[hits]\ncount = {RUN}\nseed = 1\n[output]\nstandoffs = ["130 mm"]\n{bending}'
     return Campaign.from_text(whole, name="road", folder=Path())
 
 
+def scenes_of(texts: Sequence[str], hits: int) -> Scenes:
+    """Scenes of texts of ROADS, each with its first shots."""
+    return [scene_and_shots(text, hits) for text in texts]
+
+
 def scene_and_shots(text: str, hits: int) -> tuple[Scene, Shots]:
     """The scene of a text of ROADS, and its first shots."""
-    campaign = _campaign(text)
+    campaign = campaign_of(text)
     return campaign.scene, campaign.sampler().shots(0, hits * campaign.at_a_plate)
 
 
 def named(text: str, hits: int) -> Road:
     """A road of ROADS."""
-    campaign = _campaign(text)
+    campaign = campaign_of(text)
     each = campaign.at_a_plate
     shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], RUN)) * each)
     return road(campaign.scene, shots[: hits * each], shots, campaign.numerics)
+
+
+def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
+    """Roads that nobody chose: so many single plates, then so many targets of layers or bursts."""
+    found = {}
+    for kind, draws in (("plate", draw), ("layers", drawn)):
+        for index in range(scenes):
+            case = draws(seed, index)
+            pilot = case.shots(pilot_size(PRESETS["standard"], RUN), seed=77)
+            found[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics())
+            print(f"{kind} {index}: {case.name}, pilot {found[f'{kind} {index}: {case.name}'].pilot:.1f} s", flush=True)
+    return found
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Measure, print, store."""
     parser = argparse.ArgumentParser(description="what the scenes that users have cost, beside the slotted plate")
     parser.add_argument("--hits", type=int, default=256, help="hits that are timed (default: 256)")
-    parser.add_argument("--seed", type=int, help="of random_layers.py, whose first scenes are timed, too")
-    parser.add_argument("--scenes", type=int, default=6, help="of the seed (default: 6)")
+    parser.add_argument("--seed", type=int, help="of scenes that are drawn, in place of the named ones")
+    parser.add_argument("--scenes", type=int, default=6, help="of either kind that are drawn (default: 6)")
     given = parser.parse_args(argv)
-    roads = {}
-    for name, text in ROADS.items():
-        roads[name] = named(text, given.hits)
-        print(name, f"pilot {roads[name].pilot:.1f} s", flush=True)
-    for index in range(given.scenes if given.seed is not None else 0):
-        case = drawn(given.seed, index)
-        pilot = case.shots(pilot_size(PRESETS["standard"], RUN), seed=77)
-        roads[f"{given.seed}.{index}: {case.name}"] = road(case.scene, case.shots(given.hits), pilot, Numerics())
+    slotted = named(ROADS["slotted plate"], given.hits)
     values: dict[str, Any] = {"machine": machine(), "hits": given.hits, "run": RUN, "rounds": ROUNDS, "roads": {}}
-    slotted = roads["slotted plate"]
+    if given.seed is None:
+        roads = {name: named(text, given.hits) for name, text in ROADS.items()}
+    else:
+        values["seed"] = given.seed
+        roads = drawn_roads(given.seed, given.scenes, given.hits)
     for name, one in roads.items():
         rounds = [(one.seconds(), slotted.seconds()) for _ in range(ROUNDS)]
         cost, reference = (min(times) for times in zip(*rounds, strict=True))
@@ -172,7 +190,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             "pilot_share": one.pilot / whole[0],
         }
         print(name, values["roads"][name], flush=True)
-    store("roads", values)
+    store("roads" if given.seed is None else "drawn", values)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,8 @@ from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimat
 
 BEYOND = 2.0
 """Factor for the error of the finer level itself, two levels on: the errors of means about halve over two levels, where
-those of single hits fall to a quarter. With 1.4, which is enough for single hits, 6 of 40 means of random scenes shift
-by more (tests/benchmarks/random_shifts.py)."""
+those of single hits fall to a quarter. With 1.4, which is enough for single hits, 7 of 44 means of random scenes
+shift by more (tests/benchmarks/random_shifts.py)."""
 WINDOW = 1.84
 """Half the width of the window of a share, in standard deviations, for one shot: that of a normal density (B. W.
 Silverman, Density Estimation, 1986, section 3.4.2)."""

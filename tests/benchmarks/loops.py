@@ -1,0 +1,152 @@
+"""What questions that take many computations cost, as ratios to the slotted plate.
+
+    python tests/benchmarks/loops.py            # writes results/loops.json; some three minutes of a core
+
+- Limits: runs of a hit, and processor time of a hit in a run of RUN hits with its pilot over that of the slotted
+  plate at standard. A plate that weakens by time has no limit, so these weaken by distance.
+- Draws: processor time of a hit where a posterior draws a length, a law of stress or the spacing of the holes, over
+  that of one scene with as many hits at the same level.
+- `warpimpact identify` with the paper's two shots: seconds and effective sample size.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from bench import CHECKOUT, machine, store
+from many import with_lengths
+from roads import (
+    BY_PATH,
+    NORMAL,
+    OGIVE,
+    P80,
+    ROADS,
+    ROUND,
+    RUN,
+    SLOTTED,
+    Scenes,
+    campaign_of,
+    named,
+    scenes_of,
+)
+
+from warpimpact import Numerics, Shots
+from warpimpact.identification.identify import identify_to_file
+from warpimpact.identification.reading import read_fit
+from warpimpact.results import posterior_file
+from warpimpact.solver import grid
+from warpimpact.solver.limit import limits, pilot_of_limits
+from warpimpact.solver.many import simulate_many
+from warpimpact.solver.pilot import limits_pilot_size
+from warpimpact.solver.worker import Worker
+from warpimpact.studies.limit import LimitMap
+
+ONE = Worker("cpu", 1)
+LIMITS = {
+    "slotted plate": P80 + SLOTTED.replace("[plate]", BY_PATH) + NORMAL,
+    "ogive with a shank, round holes of 5 mm": OGIVE + ROUND.replace("[plate]", BY_PATH) + NORMAL,
+}
+FIT = CHECKOUT / "campaigns" / "fits" / "paper_fit.toml"
+SLOTTED_HITS = 256
+"""Hits of the slotted plate that are timed."""
+DRAWS, LEVEL = 64, Numerics(level=2)
+
+
+def spent(work: Callable[[], Any]) -> tuple[Any, float]:
+    """What a call gives, and its processor time [s]."""
+    begin = time.process_time()
+    found = work()
+    return found, time.process_time() - begin
+
+
+def limit(text: str, hits: int, slotted: float) -> dict[str, Any]:
+    """A search of the limit velocities of some hits of a campaign, beside processor time per hit [s]."""
+    campaign = campaign_of(text)
+    sought, shots = LimitMap.of(campaign).sought, campaign.sampler().shots(0, hits)
+    some = shots[: limits_pilot_size(campaign.numerics.asked)]
+    pilot_of_limits(campaign.scene, some[:1], sought, campaign.numerics, ONE)  # builds the kernels
+    found, pilot = spent(lambda: pilot_of_limits(campaign.scene, some, sought, campaign.numerics, ONE))
+    searched, seconds = spent(lambda: limits(campaign.scene, shots, sought, found.numerics, ONE))
+    whole = seconds / hits + pilot / RUN
+    return {
+        "ratio": whole / slotted,
+        "runs": float(searched.runs.mean()),
+        "microseconds_per_hit": 1e6 * seconds / hits,
+        "level": found.numerics.level,
+        "kept": found.kept,
+        "pilot_share": pilot / RUN / whole,
+    }
+
+
+def drawn_scenes(each: int) -> dict[str, Scenes]:
+    """Scenes with their shots: one, then what DRAWS draws make of it."""
+    ((scene, shots),) = scenes_of([P80 + SLOTTED + NORMAL], DRAWS * each)
+    spacings = [SLOTTED.replace('["8 mm"', f'["{7.5 + k / DRAWS:.4f} mm"') for k in range(DRAWS)]
+    return {
+        "one scene": [(scene, shots)],
+        "degradation lengths": [(scene, with_lengths(shots, DRAWS))],
+        "laws of stress": [(scene, with_laws(shots))],
+        "spacings of the slots": scenes_of([P80 + plate + NORMAL for plate in spacings], each),
+    }
+
+
+def with_laws(shots: Shots) -> Shots:
+    """Shots with laws of stress whose terms are drawn."""
+    draws = np.random.default_rng(1).uniform(0.5, 1.0, (2, DRAWS))[:, np.arange(len(shots)) % DRAWS]
+    return replace(shots, static=draws[0], quadratic=draws[1])
+
+
+def draws(each: int, rounds: int) -> dict[str, Any]:
+    """Cost of a hit of every kind of draw over that of the one scene; the least of some rounds, in turn."""
+    kinds = drawn_scenes(each)
+    times: dict[str, list[float]] = {name: [] for name in kinds}
+    for number in range(rounds + 1):  # the first one builds the kernels
+        for name, scenes in kinds.items():
+            grid._tile.cache_clear()
+            _, seconds = spent(lambda scenes=scenes: simulate_many(scenes, LEVEL, ONE))
+            times[name] += [seconds / (DRAWS * each)] if number else []
+    least = {name: min(of) for name, of in times.items()}
+    one = least.pop("one scene")
+    return {name: {"ratio": of / one, "hits_per_second": 1.0 / of} for name, of in least.items()}
+
+
+def identified(folder: Path) -> dict[str, Any]:
+    """The fit of the paper's two shots, whose posterior goes into a folder."""
+    wall, output = time.perf_counter(), folder / "paper_fit.nc"
+    _, seconds = spent(lambda: identify_to_file(read_fit(FIT), output, device="cpu", overwrite=True))
+    told = posterior_file.read(output).attrs
+    effective, sets = float(told[posterior_file.EFFECTIVE]), int(told[posterior_file.SETS])
+    return {"seconds": seconds, "wall": time.perf_counter() - wall, "effective": effective, "sets": sets}
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Measure, print, store."""
+    parser = argparse.ArgumentParser(description="what questions that take many computations cost")
+    parser.add_argument("--hits", type=int, default=64, help="whose limits are searched (default: 64)")
+    parser.add_argument("--each", type=int, default=64, help="hits of a draw (default: 64)")
+    parser.add_argument("--rounds", type=int, default=3, help="of the draws (default: 3)")
+    parser.add_argument("--posterior", type=Path, metavar="FOLDER", help="keep the posterior of the fit there")
+    given = parser.parse_args(argv)
+    road = named(ROADS["slotted plate"], SLOTTED_HITS)
+    slotted = min(road.seconds() for _ in range(given.rounds)) + road.pilot / RUN
+    values: dict[str, Any] = {"machine": machine(), "hits": given.hits, "run": RUN, "draws": DRAWS, "each": given.each}
+    values |= {"rounds": given.rounds, "level": LEVEL.level}
+    values["limits"] = {name: limit(text, given.hits, slotted) for name, text in LIMITS.items()}
+    print(values["limits"], flush=True)
+    values["drawn"] = draws(given.each, given.rounds)
+    print(values["drawn"], flush=True)
+    with TemporaryDirectory() as folder:
+        values["identify"] = identified(given.posterior or Path(folder))
+    print(values["identify"], flush=True)
+    store("loops", values)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""Scenes drawn from a seed: do the numerics shift measures by more than a result says?
+
+A pilot for a run of 16,384 hits finds the level for standard. Its hits at that level and at the finer one say by how
+much the numerics may shift the mean residual velocity, the mean last tilt and the share of the cores whose last tilt is
+beyond 30°: this is "numerics ±". Other hits show the shift: they are computed at that level and at level 7. They are
+few, so what they show has an interval of its own. A shift is more than was promised where this interval begins beyond
+the promise.
+
+    python tests/benchmarks/random_shifts.py --seed 1 --scenes 16            # single plates
+    python tests/benchmarks/random_shifts.py --seed 1 --scenes 8 --layers    # several layers, bursts
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from random_layers import RUN, drawn
+from random_scenes import Case, draw
+
+from warpimpact.kernels.status import Status
+from warpimpact.records.outcomes import Outcomes
+from warpimpact.scene import PRESETS, Numerics, Shots
+from warpimpact.solver.pilot import pilot_size
+from warpimpact.solver.simulate import pilot_of, simulate
+from warpimpact.solver.worker import Worker
+from warpimpact.statistics.intervals import estimate_of
+from warpimpact.statistics.shifts import change_of_mean, shift_of_mean, shift_of_share
+
+Array = NDArray[np.float64]
+ANSWER = 7
+"""Level of LADDER behind the answer."""
+TILTED = 30.0
+"""Last tilt [degree] beyond which cores are counted."""
+
+
+class Shift(NamedTuple):
+    """Of a measure: what is promised, what other hits show, and half the width of the interval of that."""
+
+    name: str
+    promised: float
+    shown: float
+    unsure: float
+
+    @property
+    def is_more(self) -> bool:
+        """Whether the hits show more than is promised."""
+        return abs(self.shown) - self.unsure > self.promised
+
+
+def columns(outcomes: Outcomes) -> tuple[Array, Array]:
+    """Residual velocities [m/s] and last tilts [degree] of the cores that passed, NaN of others."""
+    passed = np.isin(outcomes.status, [Status.PERFORATED, Status.MISSED])
+    velocity, tilt = outcomes.residual_velocity, np.degrees(outcomes.tilt[:, -1])
+    return np.where(passed, velocity, np.nan), np.where(passed, tilt, np.nan)
+
+
+def shifts(pilot: tuple[Outcomes, Outcomes], others: tuple[Outcomes, Outcomes], together: int) -> list[Shift]:
+    """Those of all measures, by a pilot and by other hits at two levels each, with so many shots at a plate."""
+    rows = []
+    before, after = (list(zip(*map(columns, pair), strict=True)) for pair in (pilot, others))
+    for name, by_pilot, by_others in zip(("velocity", "tilt"), before, after, strict=True):
+        change = change_of_mean(*by_others, images=together)
+        rows.append(Shift(name, shift_of_mean(*by_pilot, images=together), change.value, change.half_width))
+    coarse, fine = (np.where(np.isnan(tilt), np.nan, tilt > TILTED) for tilt in after[1])
+    change = estimate_of("difference", fine - coarse, images=together)
+    promised = shift_of_share(*(tilt - TILTED for tilt in before[1]), images=together)
+    return [*rows, Shift("P(tilted)", promised, change.value, change.half_width)]
+
+
+def measured(case: Case, hits: int) -> tuple[int, bool, list[Shift]]:
+    """The level, whether the promise of single hits is kept there, and the shifts."""
+
+    def at(level: int | None, shots: Shots) -> Outcomes:
+        return simulate(case.scene, shots, numerics=Numerics(level=level), device="cpu", threads=1)
+
+    pilot, others = case.shots(pilot_size(PRESETS["standard"], RUN), seed=77), case.shots(hits)
+    found = pilot_of(case.scene, pilot, Numerics(), Worker("cpu", 1))
+    level = found.numerics.level
+    pair = next(of[1:] for of in found.tried if of[0].numerics == found.numerics)
+    return level or 0, found.kept, shifts(pair, (at(level, others), at(ANSWER, others)), pilot.at_a_plate)
+
+
+def main() -> None:
+    """Draw scenes, print a line for each, and how many shifts are more than promised."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--scenes", type=int, default=16)
+    parser.add_argument("--hits", type=int, default=256, help="that show the shift (default: 256)")
+    parser.add_argument("--layers", action="store_true", help="targets of several layers, and bursts")
+    given = parser.parse_args()
+    found: list[Shift] = []
+    for index in range(given.scenes):
+        case = (drawn if given.layers else draw)(given.seed, index)
+        level, kept, rows = measured(case, given.hits)
+        print(f"{index:3} {case.name:50} level {level}{'' if kept else ', promise not kept'}", end="")
+        for one in rows:
+            more = " MORE" if one.is_more else ""
+            print(f"  {one.name} ± {one.promised:.2g}, shown {one.shown:+.2g} ± {one.unsure:.1g}{more}", end="")
+        print(flush=True)
+        found += [one for one in rows if not math.isnan(one.promised + one.shown)]
+    ratios = [abs(one.shown) / one.promised for one in found if one.promised > 0.0]
+    print(
+        f"{len(found)} measures, {sum(one.is_more for one in found)} shifted by more than promised; shown over "
+        f"promised: median {np.median(ratios):.2f}, worst tenth {np.quantile(ratios, 0.9):.2f}; "
+        f"{time.process_time():.0f} s of a core"
+    )
+
+
+if __name__ == "__main__":
+    main()
