@@ -48,13 +48,29 @@ def build(variant: Variant) -> SimpleNamespace:
         channel: wp.array(dtype=real)
         channel_nodes: wp.int32
 
+    # Native, because a CPU reads two neighbours at once in half the time.
+    @wp.func_native("""
+    assert(index >= 0 && index + 1 < field.shape[0]);
+    const auto* from = field.data + index;
+    using Real = decltype(0 * z);
+    #if !defined(__CUDA_ARCH__)
+    if constexpr (sizeof(Real) == 4) {
+        unsigned long long both;
+        memcpy(&both, from, sizeof(both));
+        const float first = __builtin_bit_cast(float, (unsigned)both);
+        return first + z * (__builtin_bit_cast(float, (unsigned)(both >> 32)) - first);
+    }
+    #endif
+    return from[0] + z * (from[1] - from[0]);
+    """)
+    def across(field: wp.array(dtype=real), index: wp.int32, z: real) -> real:
+        """Linear interpolation between the node `index` and the next one."""
+        ...
+
     @wp.func
     def gather(field: wp.array(dtype=real), stride: wp.int32, index: wp.int32, y: real, z: real):
         """Bilinear interpolation between the four nodes from `index` on."""
-        next = index + stride
-        low, high = read(field, index), read(field, next)
-        low += z * (read(field, index + 1) - low)
-        high += z * (read(field, next + 1) - high)
+        low, high = across(field, index, z), across(field, index + stride, z)
         return low + y * (high - low)
 
     @wp.func
@@ -326,6 +342,8 @@ def build(variant: Variant) -> SimpleNamespace:
         int j = 0;
     #if !defined(__CUDA_ARCH__)
         typedef Real Vector __attribute__((vector_size(LANES * sizeof(Real))));
+        typedef Real Pair __attribute__((vector_size(2 * LANES * sizeof(Real))));  // one waits while the other adds
+        for (; j + 2 * LANES <= count; j += 2 * LANES) sum(Pair{}, gained + j, into + j, kept + j);
         for (; j + LANES <= count; j += LANES) sum(Vector{}, gained + j, into + j, kept + j);
     #endif
         for (; j < count; ++j) sum((Real)0, gained + j, into + j, kept + j);

@@ -18,6 +18,8 @@ import warp as wp
 
 from .variant import Variant
 
+THREADS = 256
+"""Threads of a block in the simple layout on CUDA, each of which computes a shot by itself."""
 LANES = 32
 """Lanes of a block on CUDA: one warp, so that a barrier stops nothing else."""
 BLOCKS = 12

@@ -40,6 +40,8 @@ RUNS: Mapping[str, Sequence[str]] = {
     ),
 }
 """The benchmarks behind the page, by the name of their result."""
+KNOWN = {**RUNS, "gpu": ("gpu.py",)}
+"""The same and those that a machine measures only where it can."""
 SHORT = {
     "7.62 mm P80 core against a slotted plate": "slotted plate",
     "7.62 mm P80 core against a plate with round holes (illustrative)": "round holes",
@@ -64,7 +66,7 @@ def results(folder: Path = RESULTS) -> dict[str, Any]:
     """The results that are there, by name."""
     return {
         name: json.loads(path.read_text(encoding="utf-8"))
-        for name in RUNS
+        for name in KNOWN
         if (path := folder / f"{name}.json").exists()
     }
 
@@ -81,6 +83,7 @@ def rows(found: Mapping[str, Any]) -> Iterator[Row]:
         ("overheads", _overheads),
         ("design_page", _design_page),
         ("statistics_cost", _statistics),
+        ("gpu", _gpu),
     ):
         if name in found:
             yield from of(found[name])
@@ -92,7 +95,7 @@ def machines(found: Mapping[str, Any]) -> Iterator[str]:
         told = values.get("machine", {})
         if isinstance(told, dict):
             where = f"{told['processor']}, {told['cores']} cores, Python {told['python']}"
-            yield f"`{RUNS[name][0]}`: {where}, {told['date']}."
+            yield f"`{KNOWN[name][0]}`: {where}, {told['date']}."
 
 
 def _throughput(values: Mapping[str, Any]) -> Iterator[Row]:
@@ -256,6 +259,37 @@ def _statistics(values: Mapping[str, Any]) -> Iterator[Row]:
                 f"random points: {_milliseconds(ways['random'])}; 95 % interval",
                 sample,
             )
+
+
+def _gpu(values: Mapping[str, Any]) -> Iterator[Row]:
+    device, level = values["device"], values["level"]
+    for scene, ways in values["rates"].items():
+        for way, rates in ways.items():
+            count = max(rates, key=lambda one: rates[one])
+            yield Row(
+                f"level {level} on a GPU, hits per second",
+                f"{scene}; {way}",
+                _rounded(rates[count]),
+                f"wall time of the march on {device}",
+                f"least of two runs of {int(count):,} hits",
+            )
+    for name, one in values["agreement"].items():
+        yield Row(
+            f"level {level} on a GPU, difference from the CPU",
+            name,
+            ", ".join(f"{key} {one[key][0]:.2g} m/s and {one[key][1]:.2g}°" for key in ("90 %", "max")),
+            f"the same hits on the CPU; {one['end_otherwise']} end otherwise",
+            f"{one['hits']} Sobol hits",
+        )
+    if "file" in values:
+        one = values["file"]
+        yield Row(
+            f"run of {one['hits']:,} hits into a file, on a GPU",
+            f"slotted plate; {one['layout']}",
+            f"{one['seconds']:.3g} s, {one['bytes'] / 2**20:,.0f} MiB",
+            "wall time",
+            "one run",
+        )
 
 
 def _milliseconds(cost: float) -> str:

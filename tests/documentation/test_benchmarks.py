@@ -21,7 +21,7 @@ def found() -> Results:
 
 
 def test_every_benchmark_has_rows(found: Results) -> None:
-    assert set(found) == set(page.RUNS)
+    assert set(page.RUNS) <= set(found) <= set(page.KNOWN)
     for name, values in found.items():
         assert list(page.rows({name: values})), name
 
@@ -62,7 +62,7 @@ def test_a_result_that_is_missing_leaves_its_rows_out(found: Results) -> None:
 
 def test_the_machine_and_the_date_are_told(found: Results) -> None:
     told = list(page.machines(found))
-    assert len(told) == len(page.RUNS)
+    assert len(told) == len(found)
     assert all(re.search(r"\d{4}-\d\d-\d\d", sentence) for sentence in told)
 
 

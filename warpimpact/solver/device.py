@@ -18,6 +18,8 @@ from typing import Any, TypeVar
 import psutil
 import warp as wp
 
+from warpimpact.kernels import lanes
+
 _logger = logging.getLogger(__name__)
 Scratch = TypeVar("Scratch")
 _SUMS = "checksums.json"
@@ -94,8 +96,8 @@ def launching(threads: int | None) -> int:
 
 def block_size(kernel: Any, device: Any) -> int:
     """Threads of a block: on CUDA those of the layout, on a CPU 1 unless Warp is told to run blocks there."""
-    lanes: int = kernel.options.get("launch_bounds", (256,))[0]
-    return lanes if device.is_cuda or wp.config.enable_cpu_blocks else 1
+    threads: int = kernel.options.get("launch_bounds", (lanes.THREADS,))[0]
+    return threads if device.is_cuda or wp.config.enable_cpu_blocks else 1
 
 
 _LOADING = threading.RLock()

@@ -12,8 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import free_flight, march
-from warpimpact.kernels.lanes import LANES
+from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
@@ -239,9 +238,9 @@ class Memory:
         """March `count` shots from order[first] on; returns `count`."""
         bodies = [self.surfaces[0], self.sections[0], *self.tables]
         inputs = [*bodies, self.target, self.law, self.shots, self.prepared.rows, *scratch]
-        launch = partial(wp.launch, dim=count)
+        launch = partial(wp.launch, dim=count, block_dim=lanes.THREADS if self.device.is_cuda else 1)
         if self.variant.window:
-            launch = partial(wp.launch_tiled, dim=[count], block_dim=LANES)
+            launch = partial(wp.launch_tiled, dim=[count], block_dim=lanes.LANES)
         launch(
             self.stage.kernel,
             inputs=[first, slots, order, *inputs],

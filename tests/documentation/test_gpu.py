@@ -1,0 +1,62 @@
+"""The benchmark of a GPU, tried on the CPU: it runs, the page has its rows, its scenes need all builds."""
+
+import json
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from warpimpact.kernels.variant import Variant
+from warpimpact.solver.prepare import prepare
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+
+import gpu
+import page
+
+
+def test_one_call_measures_what_the_page_shows(tmp_path: Path) -> None:
+    path = tmp_path / "gpu.json"
+    sizes = ["--hits", "12", "--largest", "16", "--file-hits", "64", "--workers", "0"]
+    assert gpu.main(["--device", "cpu", "--only", gpu.SLOTS, *sizes, "--output", str(path)]) == 0
+    values = json.loads(path.read_text(encoding="utf-8"))
+    assert values["left_out"] == []
+    assert {name: one["hits"] for name, one in values["agreement"].items()} == {
+        "slotted plate, simple": 12,
+        "slotted plate, block": 12,
+    }
+    assert set(values["rates"][gpu.SLOTS]) == {gpu.SIMPLE.name, gpu.BLOCK.name}
+    assert values["file"]["bytes"] > 64 * 40
+    rows = list(page.rows({"gpu": values}))
+    assert len(rows) == 2 + 2 + 1
+    assert all(all(row) for row in rows)
+
+
+def test_answers_that_differ_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gpu, "LEVEL", 0)
+    here, there = (gpu.simulate(*gpu.scene_of(gpu.SLOTS, 8), numerics=gpu.Numerics(level=n)) for n in (0, 1))
+    assert gpu.difference(here, here)["same"]
+    assert not gpu.difference(there, here)["same"]
+    here.status[:2] = 1 - here.status[:2]
+    assert not gpu.difference(there, here)["same"]
+
+
+def test_no_gpu_is_a_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert gpu.main(["--device", "cuda:77"]) == 2
+    assert "gpu.py: error: " in capsys.readouterr().err
+
+
+def test_scenes_of_a_gpu_need_every_build_of_the_kernels() -> None:
+    variants = []
+    for name in gpu.SCENES:
+        for way in (gpu.SIMPLE, gpu.BLOCK):
+            scene, shots = gpu.scene_of(name, 6)
+            if way == gpu.BLOCK and name in gpu.SIMPLE_ONLY:
+                with pytest.raises(ValueError, match="cannot be combined with"):
+                    prepare(scene, shots, gpu.numerics_of(name, way))
+                continue
+            variants.append(prepare(scene, shots, gpu.numerics_of(name, way)).variant)
+            assert (variants[-1].window > 0) == (way == gpu.BLOCK), name
+    for field in fields(Variant):
+        assert {bool(getattr(one, field.name)) for one in variants} == {False, True}, field.name
