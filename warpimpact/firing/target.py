@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -92,8 +91,7 @@ def searched_target(
     Returns:
         The response, and attributes that say what the search took.
     """
-    search = replace(LimitMap.of(campaign, tolerance=tolerance), near=True)
-    team = local_team(campaign, device, search)
+    team = local_team(campaign, device, LimitMap.of(campaign, tolerance=tolerance))
     run_to_file(campaign, output, team=team, resume=resume, overwrite=overwrite, progress=progress, tell=tell)
     dataset = files.read(output)
     return response_of_limits(dataset), {f.SEARCH: float(dataset[v.LIMITS["velocity"].runs].values.mean())}

@@ -81,7 +81,7 @@ def unsymmetric(scatter: Scatter, layers: Sequence[Layer] = ()) -> dict[str, str
 
 def symmetries(plate: Plate, impact: Impact) -> tuple[Symmetry, ...]:
     """The symmetries that plate and shot both have, in the order of SYMMETRIES."""
-    return tuple(s for s in SYMMETRIES if s == IDENTITY or (_of_shot(s, impact) and _of_plate(s, plate)))
+    return tuple(s for s in SYMMETRIES if s == IDENTITY or (_of_shot(s, impact) and of_plate(s, plate)))
 
 
 def _of_shot(symmetry: Symmetry, impact: Impact) -> bool:
@@ -94,7 +94,7 @@ def _of_shot(symmetry: Symmetry, impact: Impact) -> bool:
     return all(abs(value) < _ROUNDING for value in turned) and (keeps_spin or impact.spin == 0.0)
 
 
-def _of_plate(symmetry: Symmetry, plate: Plate) -> bool:
+def of_plate(symmetry: Symmetry, plate: Plate) -> bool:
     """Whether the image of the plate is the plate itself."""
     if plate.size is not None and symmetry.centred:
         return False  # a rim removes the centring

@@ -1,6 +1,7 @@
 """Limits: the impact velocity at which each shot just perforates, or the thickness of plate that it just perforates.
 
-All shots are searched together, one run of each at a time (solver/limit_search.py).
+A few shots are searched first. What they tell is where the searches of the others begin (solver/limit_near.py). Every
+search goes on by what its own runs tell (solver/limit_search.py).
 """
 
 from __future__ import annotations
@@ -17,12 +18,13 @@ from warpimpact.records.limit import LIMITS
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.findings import LimitErrors
-from warpimpact.solver.limit_search import Search
+from warpimpact.solver.limit_near import Neighbours
+from warpimpact.solver.limit_search import Guess, Search
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import LADDER, at_level
-from warpimpact.solver.simulate import computed, spread
+from warpimpact.solver.simulate import computed, spread, spread_places
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
@@ -37,6 +39,9 @@ STEPS = 6.0
 """How many times shorter than elsewhere a step is. It follows from the impact velocity, but near its limit a core is
 slow for a while, and touches by a small share of its speed. With the step of a hit map limit velocities in a slotted
 plate are off by 140 m/s of 210 m/s (90 % of the hits), with this one by 2 m/s."""
+
+FIRST = 8
+"""Shots that are searched before anything is known. Then as many follow as are found."""
 
 
 @dataclass(frozen=True)
@@ -188,32 +193,93 @@ def limits(
     numerics: Numerics,
     worker: Worker,
     progress: Progress | None = None,
+    together: int | None = None,
 ) -> Limits:
-    """Find the limit of every shot, with numerics that fix the resolution."""
+    """Find the limit of every shot, with numerics that fix the resolution.
+
+    A limit may differ within the tolerance with the shots that are searched together, because the first ones that are
+    found tell where the searches of the others begin (solver/limit_near.py).
+
+    Args:
+        together: so many shots in turn are searched together; all if None.
+    """
     check_arrests(scene, shots)
-    search, put = _begun(scene, shots, sought)
-    numerics, total = short_steps(numerics), len(shots)
+    total, size = len(shots), together or max(1, len(shots))
+    parts = []
+    for first in range(0, total, size):
+
+        def told(done: int, _: int, first: int = first) -> None:
+            if progress is not None:
+                progress(first + done, total)
+
+        some = shots[first : first + size]
+        parts.append(_limits_of(scene, some, sought, short_steps(numerics), worker, told))
+    return _joined(parts, np.arange(total))
+
+
+def _limits_of(
+    scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress
+) -> Limits:
+    """The limits of shots that are searched together, with numerics as they are: at first those of FIRST shots, then of
+    twice as many in all, and so on."""
+    near = Neighbours(scene, shots, (sought.quantity, sought.layer), sought.tolerance)
+    order, parts, done = spread_places(len(shots), len(shots)), list[Limits](), 0
+    while done < len(shots):
+        which = order[done : max(FIRST, 2 * done)]
+
+        def told(ended: int, before: int = done) -> None:
+            progress(before + ended, len(shots))
+
+        search, found = _searched(scene, shots[which], sought, numerics, worker, near.guess(which), told)
+        near.learn(which, search)
+        parts.append(found)
+        done += len(which)
+    return _joined(parts, np.argsort(order))
+
+
+def _searched(
+    scene: Scene,
+    shots: Shots,
+    sought: Sought,
+    numerics: Numerics,
+    worker: Worker,
+    guess: Guess,
+    progress: Callable[[int], object],
+) -> tuple[Search, Limits]:
+    """The limits of some shots of which something is known, one run of each at a time, and their search."""
+    search, put = _begun(scene, shots, sought, guess)
+    total = len(shots)
     kept, failing = _Kept(total), _Kept(total)
     while len(which := search.pending):
         tried = search.trial(which)
         ended = computed(prepare(scene, put(shots[which], tried), numerics), worker)
         kept.take(search.learn(which, tried, ended), which, tried, ended)
         failing.take(np.flatnonzero(ended.status >= Status.UNFINISHED), which, tried, ended)
-        if progress is not None:
-            progress(total - len(search.pending), total)
+        progress(total - len(search.pending))
     failed = np.flatnonzero(search.failed)
     if len(failed):
         kept.take(failed, np.arange(total), failing.values, failing.outcomes)
-    return Limits(search.value(), *search.ends(), search.runs, search.converged, put(shots, kept.values), kept.outcomes)
+    shots, outcomes = put(shots, kept.values), kept.outcomes
+    return search, Limits(search.value(), *search.ends(), search.runs, search.converged, shots, outcomes)
 
 
-def _begun(scene: Scene, shots: Shots, sought: Sought) -> tuple[Search, Callable[[Shots, Array], Shots]]:
+def _joined(parts: list[Limits], order: NDArray[np.int64]) -> Limits:
+    """Limits one behind the other, in another order."""
+    numbers = ("value", "lower", "upper", "runs", "converged")
+    return Limits(
+        **{name: np.concatenate([getattr(part, name) for part in parts])[order] for name in numbers},
+        shots=Shots.joined([part.shots for part in parts])[order],
+        outcomes=Outcomes.joined([part.outcomes for part in parts])[order],
+    )
+
+
+def _begun(scene: Scene, shots: Shots, sought: Sought, guess: Guess) -> tuple[Search, Callable[[Shots, Array], Shots]]:
     """A search of limits, and what gives shots the values that are tried."""
     tolerance, highest, layer = sought.tolerance, sought.highest, sought.layer
     if sought.quantity == "velocity":
-        return Search(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest), with_velocity
+        return Search(shots.velocity, np.inf, np.zeros(len(shots)), tolerance, highest, guess), with_velocity
     start = np.broadcast_to(shots.own_of(scene.target, "thickness", layer), len(shots))
-    search = Search(start, 0.0, shots.velocity**2, tolerance, highest)
+    search = Search(start, 0.0, shots.velocity, tolerance, highest, guess)
     return search, partial(with_thickness, layer)
 
 

@@ -1,57 +1,178 @@
-"""Limits of many hits of one plate: each search begins at the limit of its nearest neighbour that is found already."""
+"""What the limits of some hits tell of those of others that hit near them, or arrive in nearly the same way."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Numerics, Scene, Shots
-from warpimpact.solver.limit import Limits, Sought, limits, with_velocity
-from warpimpact.solver.marching import Progress
-from warpimpact.solver.worker import Worker
+from warpimpact.scene import IDENTITY, Scene, Shots, Symmetry
+from warpimpact.scene.shots import OF_A_SHOT
+from warpimpact.scene.symmetry import SYMMETRIES, of_plate
+from warpimpact.solver.limit_search import DOUBT, Guess, Search
+from warpimpact.solver.simulate import spread_places
 
-_FIRST = 16
-"""Hits whose searches begin at their own velocities. Then as many follow as are found: each search begins nearer."""
+Array = NDArray[np.float64]
+
+NEAREST = 4
+"""Hits that tell of another one."""
+WITHIN = 0.75
+"""Share of the limits that lie within what they are expected to be off by."""
+LEAST, MOST = 0.02, 0.5
+"""Of the doubt of a limit (solver/limit_search.py)."""
+TRIED = 256
+"""Found limits that are compared with what the others tell of them."""
+PLACES = 0.0, 0.1, 0.3, 1.0, 3.0, 10.0
+"""Weights that the distance of hit points may have beside that of the other conditions."""
 
 
-def velocities_from_neighbours(
-    scene: Scene, shots: Shots, sought: Sought, numerics: Numerics, worker: Worker, progress: Progress | None = None
-) -> Limits:
-    """Find the limit velocity of every shot as `solver.limit.limits` does, with fewer runs.
+class Neighbours:
+    """All shots of a search, with the limits of those that are found.
 
-    Which limits are found first depends on the order of the shots; so a limit may differ from that of `limits` within
-    the tolerance.
+    Two shots are near by their hit points and by all conditions in which shots differ. A found limit is also that of
+    its images under the symmetries of the plate (scene/symmetry.py), and the map of hit points repeats with the cell of
+    the plate. Conditions count by how the limit changes with them. The weight of the hit points is that with which the
+    found limits tell each other best.
 
     Args:
-        shots: hit points that cover a cell in any order, as those of a Sobol sampling do.
+        scene, shots: what is shot at what.
+        sought: the quantity and the layer whose limit is searched, which are no condition.
+        tolerance: of the search.
     """
-    from scipy.spatial import KDTree  # a fifth of a second to import
 
-    period = np.array(scene.target.layers[0].sampled_cell)
-    points = np.mod(np.stack([shots.hit_y, shots.hit_z], axis=1) + 0.5 * period, period)
-    parts = list[Limits]()
-    done = 0
-    while done < len(shots):
-        end = min(len(shots), 2 * done or _FIRST)
-        some = shots[done:end]
-        if done:
-            found = np.concatenate([part.value for part in parts])
-            nearest = KDTree(points[:done], boxsize=period).query(points[done:end])[1]
-            start = found[nearest]
-            known = np.isfinite(start) & (start > 0.0)
-            some = with_velocity(some, np.where(known, start, some.velocity))
-        parts.append(limits(scene, some, sought, numerics, worker))
-        done = end
-        if progress is not None:
-            progress(done, len(shots))
-    return _joined(parts)
+    def __init__(self, scene: Scene, shots: Shots, sought: tuple[str, int], tolerance: float) -> None:
+        cell, self._tolerance = scene.target.layers[0].sampled_cell, tolerance
+        points, signed, others = _coordinates(shots, sought)
+        group = _symmetries(scene, signed)
+        images = [np.stack(each.image(points[:, 0], points[:, 1], cell), axis=1) for each in group]
+        self._points = [(image / cell + 0.5) % 1.0 for image in images]
+        columns = [np.column_stack([signed * _signs(each), others]) for each in group]
+        scale = columns[0].std(axis=0)
+        moved = scale > 1e-9 * np.abs(columns[0]).max(axis=0, initial=0.0)
+        mean, scale = columns[0].mean(axis=0), np.where(moved, scale, 1.0)
+        self._conditions = [((each - mean) / scale)[:, moved] for each in columns]
+        self._value, self._sums = np.full(len(shots), np.nan), np.zeros((5, len(shots)))
+        self._errors = np.full((3, len(shots)), np.nan)
+
+    def learn(self, which: NDArray[np.int64], search: Search) -> None:
+        """Take in limits that are found."""
+        self._value[which], self._sums[:, which] = search.value(), search.curve_sums()
+        self._errors[:, which] = search.errors()
+
+    def guess(self, which: NDArray[np.int64]) -> Guess:
+        """What is known of the limits of some shots."""
+        known = np.flatnonzero(np.isfinite(self._value) & (self._value > 0.0))
+        if len(known) <= NEAREST:
+            return Guess.nothing(len(which))
+        value, least = self._value[known], 1e-3 * self._tolerance
+        slopes = _slopes(self._conditions[0][known], value)
+        trend = [each @ slopes for each in self._conditions]
+        rest = np.concatenate([value - each[known] for each in trend])
+        weights = np.abs(slopes) / (np.std(value) + least)
+        some, best = spread_places(len(known), min(len(known), TRIED)), np.inf
+        for place in PLACES:
+            near = _Near(self._places(known, weights, place), place, len(known))
+            told, sure, _ = near.told(self._places(known[some], weights, place, images=1), rest, some)
+            off = np.abs(told - rest[some])
+            if off.mean() < best:
+                best, chosen, nearest = float(off.mean()), place, near
+                scale = np.quantile(off / (sure + least), WITHIN)
+        told, sure, who = nearest.told(self._places(which, weights, chosen, images=1), rest)
+        linear, square = _curve(self._sums[:, known[who]].sum(axis=2))
+        errors = [np.append(each[np.isfinite(each)], first) for each, first in zip(self._errors, DOUBT, strict=True)]
+        doubt = np.array([np.clip(np.quantile(each, WITHIN), LEAST, MOST) for each in errors])
+        found = np.maximum(trend[0][which] + told, 0.1 * value.min())
+        return Guess(found, np.minimum(scale * (sure + least), 0.5 * found), linear, square, doubt)
+
+    def _places(self, which: NDArray[np.int64], weights: Array, place: float, images: int | None = None) -> Array:
+        """Where some shots, and then their images, lie, shape [shots × images, 2 + conditions]; the first two columns
+        repeat with `place`."""
+        pairs = list(zip(self._points, self._conditions, strict=True))[:images]
+        at = [np.column_stack([point[which] * place, other[which] * weights]) for point, other in pairs]
+        return np.concatenate(at)
 
 
-def _joined(parts: list[Limits]) -> Limits:
-    """Limits one behind the other."""
-    numbers = ("value", "lower", "upper", "runs", "converged")
-    return Limits(
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in numbers},
-        shots=Shots.joined([part.shots for part in parts]),
-        outcomes=Outcomes.joined([part.outcomes for part in parts]),
-    )
+class _Near:
+    """Finds the nearest of some shots and their images.
+
+    Args:
+        places: theirs, the shots first.
+        period: with which the first two columns repeat.
+        count: how many shots that are.
+    """
+
+    def __init__(self, places: Array, period: float, count: int) -> None:
+        from scipy.spatial import KDTree  # a fifth of a second to import
+
+        self._count, self._images = count, len(places) // count
+        self._tree = KDTree(places, boxsize=[period, period, *np.zeros(places.shape[1] - 2)])
+
+    def told(
+        self, places: Array, values: Array, own: NDArray[np.int64] | None = None
+    ) -> tuple[Array, Array, NDArray[np.int64]]:
+        """What the nearest shots tell of others, how far off that may be, and which they are.
+
+        Args:
+            values: of the shots and their images.
+            own: which of the shots the others are, which do not tell of themselves.
+        """
+        count = NEAREST if own is None else NEAREST + self._images
+        distance, near = self._tree.query(places, min(count, self._count * self._images))
+        if own is not None:
+            distance = np.where(near % self._count == own[:, None], np.inf, distance)
+            order = np.argsort(distance, axis=1)[:, :NEAREST]
+            distance, near = (np.take_along_axis(each, order, axis=1) for each in (distance, near))
+        weight = 1.0 / (distance + 1e-9 + 0.1 * distance[:, -1:]) ** 2
+        weight /= weight.sum(axis=1, keepdims=True)
+        told = (weight * values[near]).sum(axis=1)
+        spread = np.sqrt((weight * (values[near] - told[:, None]) ** 2).sum(axis=1))
+        return told, spread + 0.3 * np.median(spread), near % self._count
+
+
+def _coordinates(shots: Shots, sought: tuple[str, int]) -> tuple[Array, Array, Array]:
+    """Hit points, shape [shots, 2]; the conditions whose sign changes with the images, in the order of `_signs`, shape
+    [shots, 5]; and the others."""
+    across = np.sin(shots.obliquity)
+    signed = (across * np.cos(shots.azimuth), across * np.sin(shots.azimuth), shots.yaw, shots.pitch, shots.spin)
+    used = (*OF_A_SHOT, "hit_y", "hit_z", "obliquity", "azimuth", "yaw", "pitch", "spin")
+    others = []
+    for name, values in shots.columns.items():
+        if name in used:
+            continue
+        table = np.asarray(values, dtype=np.float64).reshape(len(shots), -1)
+        others += [column for k, column in enumerate(table.T) if (name, k) != sought and np.isfinite(column).all()]
+    points = np.stack([shots.hit_y, shots.hit_z], axis=1)
+    return points, np.stack(signed, axis=1), np.stack(others, axis=1) if others else np.empty((len(shots), 0))
+
+
+def _signs(symmetry: Symmetry) -> Array:
+    """Factors of the flight along y and z, yaw, pitch and spin."""
+    y, z = symmetry.along_y, symmetry.along_z
+    return np.array([y, z, y, z, y * z], dtype=np.float64)
+
+
+def _symmetries(scene: Scene, signed: Array) -> list[Symmetry]:
+    """Those of the plate under which a condition that all shots have keeps its sign; the identity alone where another
+    layer may have others."""
+    if any(layer.open_area > 0.0 or layer.size is not None for layer in scene.target.layers[1:]):
+        return [IDENTITY]
+    alike = np.ptp(signed, axis=0) <= 1e-9 * np.abs(signed).max(axis=0)
+    kept = [each for each in SYMMETRIES if each == IDENTITY or of_plate(each, scene.target.layers[0])]
+    return [each for each in kept if not (alike & (_signs(each) < 0.0) & (np.abs(signed[0]) > 1e-9)).any()]
+
+
+def _slopes(conditions: Array, value: Array) -> Array:
+    """How the limit changes with each condition, by least squares with a small penalty."""
+    count = len(value)
+    design = np.column_stack([np.ones(count), conditions])
+    penalty = 1e-3 * count * np.diag([0.0, *np.ones(conditions.shape[1])])
+    return np.asarray(np.linalg.solve(design.T @ design + penalty, design.T @ value)[1:])
+
+
+def _curve(sums: Array) -> tuple[Array, Array]:
+    """b and c with the least squares of (b r + c r²) / d − 1, neither less than 0; NaN without passages."""
+    rr, rs, ss, r, s = sums
+    with np.errstate(invalid="ignore", divide="ignore"):
+        determinant = rr * ss - rs**2
+        b, c = (r * ss - s * rs) / determinant, (s * rr - r * rs) / determinant
+        only_b, only_c = r / rr, s / ss
+    return np.where(b < 0.0, 0.0, np.where(c < 0.0, only_b, b)), np.where(b < 0.0, only_c, np.where(c < 0.0, 0.0, c))

@@ -1,11 +1,15 @@
 """The values that a search of limits tries next, by what the runs before them told.
 
-A search keeps two ends: a value at which the core passes, and one at which it does not. The energy that a passing core
-has left tells where the limit lies. In a solid plate that does not weaken it is linear in v² and in the thickness,
-because the work of a straight passage is constant (docs/model.md §6.1). Bisection takes over where this does not help.
+A search keeps two ends: a value at which the core passes, and one at which it does not. The residual velocity r of
+cores that pass tells where the limit lies. With the drive D, which is v² or a thickness, |D − D_limit| = b r + c r². In
+a solid plate that does not weaken b = 0, because the work of a straight passage is constant (docs/model.md §6.1). Where
+a slow core meets less resistance, b > 0. Three passages give D_limit, b and c. Two give D_limit and the scale of the
+curve, one gives D_limit, with b and c of other hits. Bisection takes over where this does not help.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,43 +21,78 @@ Array = NDArray[np.float64]
 
 MOST_RUNS = 14
 """Runs of a shot at most."""
+STAGES = 3
+"""Passages after which more of them no longer change how a limit follows."""
+DOUBT = 0.35, 0.2, 0.12
+"""How uncertain the limit is that one, two and three passages tell, as a share of its distance from the nearest one, as
+long as no other hits have shown it."""
+FAR = 5.0
+"""Tolerances, beyond which a passage shows how far off a limit was that it told."""
 BESIDE = 0.4
-"""How far beside the expected limit a run is made, in tolerances: two runs on both sides of it then settle it."""
-MARGIN = 0.15
-"""The least such distance, as a share of that of the nearer end: the farther this is, the less certain is what is
-expected."""
-OUTWARD = 4.0
-"""How many times as large as the last value the next one is, at most, as long as one end is open."""
-AIMED = 2
-"""Runs that go outward by what is expected. Behind a perforated plate a core may keep more speed the thicker the plate
-is, and what is expected creeps: the others go by OUTWARD."""
-SLOW = 0.6
-"""Of the distance of the ends: where a run leaves more of it, the next one bisects. From then on a search also bisects
-where that just finishes it."""
+"""How far beside the expected limit a run is made that is to come close to it, in tolerances."""
+ACROSS = 0.98
+"""How far from a near end a run is made that is to settle a limit, in tolerances."""
+SETTLED = 1.2
+"""Doubt in tolerances, up to which runs are made so close."""
+OUTWARD = 1.4, 2.0, 4.0
+"""How many times as large as the last value the next one is as long as nothing is expected: at first, then, and from
+then on."""
+PATIENT = 4
+"""Runs after which those that follow go farther each time, if all have stopped or all have passed."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What is known of some limits before any run, each of shape [shots].
+
+    Attributes:
+        value: the limits as they are expected; NaN where nothing is known.
+        sure: how far off they may be.
+        linear, square: b and c of other hits; NaN where there are none.
+        doubt: as DOUBT, shape [STAGES].
+    """
+
+    value: Array
+    sure: Array
+    linear: Array
+    square: Array
+    doubt: Array
+
+    @classmethod
+    def nothing(cls, count: int) -> Guess:
+        """Where no other limits are known."""
+        unknown = np.full(count, np.nan)
+        return cls(unknown, unknown, unknown, unknown, np.array(DOUBT))
 
 
 class Search:
     """The state of all searches; arrays of shape [shots].
 
     `passed` is the value nearest to the limit at which the core passed, `stopped` that at which it was stopped. One of
-    them is 0 at first and the other infinite: a core at rest is stopped, one that meets no plate passes. The energy is
-    given per half of the mass [m²/s²]. It is nearly linear in the `drive`: the square of a velocity, or a thickness.
+    them is 0 at first and the other infinite: a core at rest is stopped, one that meets no plate passes.
 
     Args:
-        start: values to try first.
+        start: values to try first where nothing is known.
         passed: infinite for a velocity, 0 for a thickness.
-        left: energy of a core that passed there.
+        speed: residual velocity of a core that passed there.
         tolerance, highest: as in `limit_velocity`.
+        guess: what is known of the limits.
     """
 
-    def __init__(self, start: Array, passed: float, left: Array, tolerance: float, highest: float) -> None:
+    def __init__(
+        self, start: Array, passed: float, speed: Array, tolerance: float, highest: float, guess: Guess
+    ) -> None:
         count = len(start)
-        self.tolerance, self.highest, self.rising = tolerance, highest, passed > 0.0
+        self.tolerance, self.highest, self.rising, self.guess = tolerance, highest, passed > 0.0, guess
         self.start = np.minimum(start, highest)
         self.passed, self.stopped = np.full(count, passed), np.full(count, 0.0 if self.rising else np.inf)
-        self.left, self.slope = left.copy(), np.full(count, 1.0 if self.rising else np.nan)  # over the drive
+        self.drives, self.speeds = np.full((2, MOST_RUNS + 1, count), np.nan)  # of passages, the nearest first
+        if not self.rising:
+            unknown = ~np.isfinite(guess.value)
+            self.drives[0, unknown], self.speeds[0, unknown] = 0.0, speed[unknown]
+        self.foreseen, self.distance = np.full((2, STAGES, count), np.nan)
         self.runs = np.zeros(count, dtype=np.int8)
-        self.slow, self.doubtful, self.beyond, self.failed = np.zeros((4, count), dtype=bool)  # failed: at `stopped`
+        self.beyond, self.failed = np.zeros((2, count), dtype=bool)  # failed: at `stopped`
 
     @property
     def width(self) -> Array:
@@ -77,30 +116,33 @@ class Search:
 
     def trial(self, which: NDArray[np.int64]) -> Array:
         """The values of the next runs of some shots."""
-        passed, stopped, aimed = self.passed[which], self.stopped[which], self._aimed()[which]
+        passed, stopped, runs = self.passed[which], self.stopped[which], self.runs[which]
         low, high = np.minimum(passed, stopped), np.maximum(passed, stopped)
-        open_ended, wild = np.isinf(high), ~((aimed > low) & (aimed < high))
-        with np.errstate(divide="ignore"):
+        aimed = self._aimed()[which]
+        wild = np.logical_not((aimed > low) & (aimed < high))
+        further = np.array(OUTWARD)[np.clip(runs - 1, 0, 2)] * low
+        farthest = np.where(low > 0.0, OUTWARD[-1] * low, np.inf)
+        misled = (low == stopped) & (runs >= PATIENT)
+        outward = np.where(wild | misled, further, np.minimum(aimed, farthest))
+        with np.errstate(divide="ignore", invalid="ignore"):
             needed = np.ceil(np.log2((high - low) / self.tolerance))
-        left = MOST_RUNS - self.runs[which]  # runs, with this one
-        hurried = self.slow[which] | (self.doubtful[which] & (left == needed))
-        least = np.where(self.runs[which] > AIMED, OUTWARD * low, low)
-        outward = np.where(wild, 2.0 * low, np.clip(aimed, least, OUTWARD * low))
+        hurried = (low > 0.0) & (MOST_RUNS - runs <= needed)
         inward = np.where(wild | hurried, 0.5 * (low + high), aimed)
-        chosen = np.minimum(np.where(open_ended, outward, inward), self.highest)
-        return np.where(self.runs[which] == 0, self.start[which], chosen)
+        chosen = np.where(np.isinf(high), outward, inward)
+        unknown = (runs == 0) & ~np.isfinite(self.guess.value[which])
+        return np.asarray(np.minimum(np.where(unknown, self.start[which], chosen), self.highest))
 
     def learn(self, which: NDArray[np.int64], tried: Array, outcomes: Outcomes) -> NDArray[np.int64]:
         """Take in one run of some shots; returns the places of those that say how a shot ends at its limit."""
-        status, before = outcomes.status, self.width[which]
+        status = outcomes.status
         passes, failed, untouched = status == Status.PERFORATED, status >= Status.UNFINISHED, status == Status.MISSED
         through, back = which[passes], which[~passes]
         self.runs[which] += 1
-        self._take_energy(through, tried[passes], outcomes.residual_velocity[passes] ** 2)
+        for known, new in ((self.drives, self._drive(tried)), (self.speeds, outcomes.residual_velocity)):
+            known[1:, through] = known[:-1, through]
+            known[0, through] = new[passes]
         self.passed[through], self.stopped[back] = tried[passes], tried[~passes]
-        self.slow[which] = self.width[which] > SLOW * before
-        still_open = np.isinf(self.width[which]) & (self.runs[which] > AIMED)
-        self.doubtful[which] |= self.slow[which] | still_open
+        self._foresee(through)
         self.failed[back] = failed[~passes]
         self.passed[which[untouched]] = self.stopped[which[untouched]] = 0.0 if self.rising else np.inf
         self.beyond[which] = (tried >= self.highest) & (passes != self.rising)
@@ -108,9 +150,9 @@ class Search:
         return np.flatnonzero(passes | never)
 
     def value(self) -> Array:
-        """The limits: where a core is expected to have no energy left, or the middle of the ends."""
+        """The limits as they are expected, or the middle of the ends."""
         lower, upper = self.ends()
-        expected = self._expected()
+        expected = self._value(self.curve()[0])
         inside = (expected > lower) & (expected < upper)
         found = np.where(inside, expected, 0.5 * (lower + upper))
         return np.where(self.failed, np.nan, np.where(self.beyond, np.inf, found))
@@ -119,27 +161,85 @@ class Search:
         """The lower and the upper end."""
         return np.minimum(self.passed, self.stopped), np.maximum(self.passed, self.stopped)
 
+    def curve(self) -> tuple[Array, Array, Array]:
+        """The drive at which no speed is left, b and c, by the passages; NaN where there are none."""
+        sign = 1.0 if self.rising else -1.0
+        drive, (r1, r2, r3) = sign * self.drives, self.speeds[:3]
+        linear = np.where(np.isfinite(self.guess.linear), self.guess.linear, 0.0)
+        square = np.where(np.isfinite(self.guess.square), self.guess.square, 1.0 if self.rising else np.nan)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            near, far = (drive[0] - drive[1]) / (r1 - r2), (drive[1] - drive[2]) / (r2 - r3)
+            times = near / (linear + square * (r1 + r2))
+            scaled, alone = np.isfinite(times) & (times > 0.0), np.isfinite(near) & (near > 0.0)
+            linear = np.where(scaled, times * linear, np.where(alone, 0.0, linear))
+            square = np.where(scaled, times * square, np.where(alone, near / (r1 + r2), square))
+            bent = (near - far) / (r1 - r3)
+            steep = near - bent * (r1 + r2)
+            three = (bent >= 0.0) & (steep >= 0.0)
+            linear, square = np.where(three, steep, linear), np.where(three, bent, square)
+        return sign * (drive[0] - r1 * (linear + square * r1)), linear, square
+
+    def curve_sums(self) -> Array:
+        """Sums over the passages of a shot from which b and c follow by least squares of (b r + c r²) / d − 1.
+
+        d is the distance from the limit in the drive. With x = r / d and y = r² / d these are the sums of
+        xx, xy, yy, x and y, shape [5, shots]. A passage within two tolerances does not count.
+        """
+        limit = self.value()
+        with np.errstate(invalid="ignore", divide="ignore"):
+            d = np.abs(self.drives - self._drive(limit))
+            least = np.abs(self._drive(limit + 2.0 * self.tolerance) - self._drive(limit))
+            x, y = self.speeds / d, self.speeds**2 / d
+            terms = np.stack([x * x, x * y, y * y, x, y])
+        return np.asarray(np.where(np.isfinite(x) & (d > least), terms, 0.0).sum(axis=1))
+
+    def errors(self) -> Array:
+        """How far off the limits were that one, two and three passages told, as shares of their distances from the
+        nearest one, shape [STAGES, shots]; NaN where there were fewer or this one was within some tolerances."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.abs(self.foreseen - self.value()) / self.distance
+        return np.where(self.distance > FAR * self.tolerance, share, np.nan)
+
     def _drive(self, value: Array) -> Array:
         return value**2 if self.rising else value
 
-    def _expected(self) -> Array:
-        """Where a core has no energy left, if it is linear; NaN or beyond the ends where that cannot be told."""
+    def _value(self, drive: Array) -> Array:
         with np.errstate(invalid="ignore"):
-            drive = self._drive(self.passed) - self.left / self.slope
             return np.asarray(np.sqrt(drive) if self.rising else drive)
 
-    def _aimed(self) -> Array:
-        """Values beside the limit as it is expected, on the side of the farther end, which then comes close."""
-        expected = self._expected()
-        with np.errstate(invalid="ignore"):
-            passed, stopped = np.abs(self.passed - expected), np.abs(self.stopped - expected)
-            beside = np.maximum(BESIDE * self.tolerance, MARGIN * np.minimum(passed, stopped))
-            return np.asarray(expected + np.where((passed > stopped) == self.rising, beside, -beside))
+    def _foresee(self, which: NDArray[np.int64]) -> None:
+        """Note what the first passages of some shots tell."""
+        stage = np.isfinite(self.drives[:, which]).sum(axis=0) - 1
+        which, stage = which[stage < STAGES], stage[stage < STAGES]
+        value = self._value(self.curve()[0])[which]
+        self.foreseen[stage, which], self.distance[stage, which] = value, np.abs(self.passed[which] - value)
 
-    def _take_energy(self, which: NDArray[np.int64], tried: Array, left: Array) -> None:
-        """Take in the energy left of shots that passed, and its slope where two runs tell one."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            slope = (left - self.left[which]) / (self._drive(tried) - self._drive(self.passed[which]))
-        usable = np.isfinite(slope) & ((slope > 0.0) == self.rising) & (slope != 0.0)
-        self.slope[which] = np.where(usable, slope, self.slope[which])
-        self.left[which] = left
+    def _expected(self) -> tuple[Array, Array]:
+        """The limits as they are expected, and how uncertain that is."""
+        value, count = self._value(self.curve()[0]), np.isfinite(self.drives).sum(axis=0)
+        doubt = self.guess.doubt[np.clip(count - 1, 0, STAGES - 1)] * np.abs(self.passed - value)
+        known = np.isfinite(value)
+        return np.where(known, value, self.guess.value), np.where(known, doubt, self.guess.sure)
+
+    def _aimed(self) -> Array:
+        """The next values; NaN or beyond the ends where nothing is expected.
+
+        As long as the limit is not about known, runs are made where the core is expected to pass, since only passages
+        tell where it lies. If all of them pass, runs follow where it is expected to stop. In the sense in which cores
+        pass, `passed` lies ahead and `stopped` behind.
+        """
+        sign, tolerance = 1.0 if self.rising else -1.0, self.tolerance
+        expected, doubt = self._expected()
+        ahead, behind, expected = sign * self.passed, sign * self.stopped, sign * expected
+        with np.errstate(invalid="ignore"):
+            to_ahead, to_behind = ahead - expected, expected - behind
+            close = (doubt <= SETTLED * tolerance) & (to_behind > -SETTLED * tolerance)
+            refuted = behind + np.clip(-to_behind, BESIDE * tolerance, 0.5 * (ahead - behind))
+            beside = np.where(close, BESIDE * tolerance, doubt)
+            creeps = ((behind == 0.0) | np.isinf(behind)) & (self.runs >= PATIENT)
+            aimed = expected + np.where(creeps, -(2.0 ** (self.runs - PATIENT)), 1.0) * beside
+            aimed = np.where(to_behind <= 0.0, refuted, aimed)
+            near = ACROSS * tolerance - np.maximum(1.2 * doubt, 0.1 * tolerance)  # it then hardly lies farther
+            aimed = np.where(close & (to_behind <= near), behind + ACROSS * tolerance, aimed)
+            aimed = np.where(close & (to_ahead <= near), ahead - ACROSS * tolerance, aimed)
+        return np.asarray(sign * aimed)

@@ -22,6 +22,7 @@ from warpimpact.results.measures import dealing
 from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid, finer_hits, found_in, numerics_of, of_images, pilot_shots
 from warpimpact.runs.describe import computed_by, described, found_attributes
+from warpimpact.runs.shards import extent
 from warpimpact.runs.task import Task
 from warpimpact.scene import Numerics, Shots, Target, exclusions
 from warpimpact.solver.findings import LimitErrors
@@ -39,7 +40,6 @@ from warpimpact.solver.limit import (
     with_thickness,
     with_velocity,
 )
-from warpimpact.solver.limit_near import velocities_from_neighbours
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
@@ -62,12 +62,10 @@ Array = NDArray[np.float64]
 class LimitMap:
     """The limit of every hit, as a `runs.task.Computation`: what `warpimpact limit` computes.
 
-    Attributes:
-        near: whether searches of a velocity begin at limits of neighbours, with fewer runs.
+    The hits of a shard are searched together. So a limit depends on the campaign alone, whatever task it is part of.
     """
 
     sought: Sought
-    near: bool = False
     most_solid: ClassVar[int] = 256
 
     @classmethod
@@ -97,8 +95,7 @@ class LimitMap:
         """What decides the bits beside the campaign."""
         sought = self.sought
         of_layer = f" of layer {sought.layer}" if sought.layer else ""
-        begun = ", begun at neighbours" if self.near else ""
-        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}{begun}"}
+        return {"limit": f"{sought.quantity}{of_layer} within {sought.tolerance:g}, at most {sought.highest:g}"}
 
     @property
     def measures(self) -> tuple[str, ...]:
@@ -112,10 +109,10 @@ class LimitMap:
             progress: as in `simulate`.
         """
         sought, images, found = self.sought, len(campaign.symmetries), task.found
-        numerics, search = numerics_of(campaign, found), velocities_from_neighbours if self.near else limits
+        numerics, together = numerics_of(campaign, found), extent(len(campaign.sampler())) // images
         progress, shots = of_images(progress, images), task.shots[::images]
         begin = time.perf_counter()
-        searched = search(campaign.scene, shots, sought, numerics, worker, progress)
+        searched = limits(campaign.scene, shots, sought, numerics, worker, progress, together)
         elapsed = time.perf_counter() - begin
         attributes = {
             **computed_by(campaign, worker.device, len(shots), elapsed),

@@ -12,7 +12,8 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
 from warpimpact.solver.limit import Sought, limit_thickness, limit_velocity
-from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.limit_near import Neighbours
+from warpimpact.solver.limit_search import MOST_RUNS, Search
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.simulate import simulate
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
@@ -120,15 +121,48 @@ def test_a_plate_without_resistance_is_passed_at_any_velocity() -> None:
     assert limits.converged.item()
 
 
-def test_a_shot_does_not_depend_on_its_neighbours() -> None:
-    plate = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
-    scene, rng = Scene(core=CORE, target=plate), np.random.default_rng(1)
-    many = replace(shots(40), hit_y=rng.uniform(-4e-3, 4e-3, 40), hit_z=rng.uniform(-4e-3, 4e-3, 40))
+HOLES = PLATE.model_copy(update={"pattern": CirclePattern(diameter=5e-3, spacing=(8e-3, 8e-3))})
+BASE = Layer(thickness=3e-3, resistance=PLATE.resistance, shear_coefficient=0.05, gap=0.1)
+
+
+def scattered(count: int, **own: object) -> Shots:
+    rng = np.random.default_rng(1)
+    return replace(shots(count, **own), hit_y=rng.uniform(-4e-3, 4e-3, count), hit_z=rng.uniform(-4e-3, 4e-3, count))
+
+
+def test_a_limit_depends_on_those_searched_with_it_within_the_tolerance() -> None:
+    scene, many = Scene(core=CORE, target=HOLES), scattered(40)
     together = limit_velocity(scene, many, numerics=STANDARD, device="cpu", threads=2)
-    alone = limit_velocity(scene, many[np.arange(30, 40)], device="cpu", threads=1)
-    assert np.array_equal(together.value[30:], alone.value)
-    assert np.array_equal(together.outcomes.tilt[30:], alone.outcomes.tilt, equal_nan=True)
-    assert np.array_equal(together.shots.velocity[30:], alone.shots.velocity)
+    again = limit_velocity(scene, many, numerics=STANDARD, device="cpu", threads=1)
+    assert np.array_equal(together.value, again.value)
+    assert np.array_equal(together.shots.velocity, again.shots.velocity)
+    alone = limit_velocity(scene, many[np.arange(30, 40)], numerics=STANDARD, device="cpu")
+    assert together.value[30:] == pytest.approx(alone.value, abs=1.0)
+
+
+@pytest.mark.parametrize(("behind", "agreeing"), [((), 0.9), ((BASE,), 0.8)], ids=["holes", "base"])
+def test_searches_take_fewer_runs_together(behind: tuple[Layer, ...], agreeing: float) -> None:
+    many, scene = scattered(48), Scene(core=CORE, target=Target(layers=(HOLES, *behind)))
+    sought, worker, numerics = Sought("velocity", 1.0, 3000.0), Worker("cpu"), Numerics(level=0)
+    together, alone = (limit.limits(scene, many, sought, numerics, worker, together=count) for count in (None, 1))
+    assert together.converged.mean() > 0.95
+    assert together.runs.mean() < 0.8 * alone.runs.mean()
+    # At the coarsest level some cores pass, stop and pass again within a few m/s.
+    assert np.mean(np.abs(alone.value - together.value) <= 1.0) > agreeing
+
+
+def test_what_is_found_says_where_the_others_begin() -> None:
+    # A limit that depends on the obliquity alone, of a map with holes: it and its images are told from eight others.
+    many = replace(scattered(40), obliquity=np.linspace(0.0, 0.3, 40))
+    near = Neighbours(Scene(core=CORE, target=HOLES), many, ("velocity", 0), 1.0)
+    value, first = 300.0 + 100.0 * np.sin(many.obliquity), np.arange(0, 40, 5)
+    search = Search(value[first], np.inf, np.zeros(8), 1.0, 3000.0, near.guess(first))
+    assert np.isnan(search.guess.value).all()
+    search.passed, search.stopped = value[first] + 0.4, value[first] - 0.4
+    near.learn(first, search)
+    guess = near.guess(np.arange(40))
+    assert guess.value == pytest.approx(value, abs=0.5)
+    assert (np.abs(guess.value - value) < 3.0 * guess.sure).mean() > 0.8
 
 
 @pytest.mark.parametrize("search", [limit_velocity, limit_thickness])

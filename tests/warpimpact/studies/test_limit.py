@@ -1,6 +1,5 @@
 """Limits of a campaign: the command, its file, its figure, resuming it, and what it refuses."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,9 @@ from warpimpact.cli import main
 from warpimpact.kernels.status import Status
 from warpimpact.plotting.limit import limit_figure
 from warpimpact.results import files
+from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
+from warpimpact.runs import shards
 from warpimpact.runs.replay import replay
 from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
 from warpimpact.runs.task import Task
@@ -274,11 +275,13 @@ def test_published_limits_stand_beside_the_computed_ones(result: xarray.Dataset)
 OF = ["shots", "[1]"]
 
 
-def test_searches_that_begin_at_neighbours_take_fewer_runs(result: xarray.Dataset) -> None:
-    of = campaign()
-    near = replace(LimitMap.of(of), near=True)
-    task = Task(of.sampler().shots(0, 64), None, near.found_in(result))
-    table = near.compute(of, task, Worker("cpu"))
-    assert table["limit_runs"].values.mean() < 0.9 * float(result["limit_runs"].mean())
-    assert np.abs(table["limit_velocity"].values - result["limit_velocity"].values).max() <= 1.0
-    assert near.content != LimitMap.of(of).content
+@pytest.mark.parametrize("quantity", ["velocity", "thickness"])
+def test_limits_do_not_depend_on_the_tasks(quantity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shards, "FEWEST", 16)
+    of = campaign(TEXT.replace('fidelity = "draft"', "level = 0"))
+    job, shots = LimitMap.of(of, quantity), of.sampler().shots(0, 64)
+    whole = job.compute(of, Task(shots), Worker("cpu"))
+    parts = [job.compute(of, Task(shots[first:end]), Worker("cpu")) for first, end in ((0, 16), (16, 64))]
+    for name in v.LIMITS[quantity]:
+        values = [part[name].values for part in parts]
+        np.testing.assert_array_equal(np.concatenate(values), whole[name].values)
