@@ -257,6 +257,7 @@ def rates(values: dict[str, Any], asked: Asked) -> None:
             continue
         if time.monotonic() - asked.begin > BUDGET - FOR_THE_FILE:
             values["left_out"].append(f"{name}, {way.name}")
+            print(f"{name}, {way.name}: left out, for want of time", flush=True)
             continue
         for _, found in each(rate, [(name, way, asked)], min(1, asked.workers)):
             values["rates"].setdefault(name, {})[way.name] = found
