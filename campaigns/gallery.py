@@ -2,8 +2,11 @@
 
 Each function of warpimpact.plotting takes a Dataset and returns a matplotlib Figure: use them as this script does. The
 tests draw the pictures again and compare them with the stored ones.
+
+    python campaigns/gallery.py paper_fit.nc      # draws fits/ from a posterior of `warpimpact identify`
 """
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +16,9 @@ from PIL import Image
 
 from warpimpact import Campaign, replay, run
 from warpimpact.plotting import bursts_figure, dispersion, marginals, overview, trajectory, uncertainty, variable_maps
+from warpimpact.plotting.posterior import hits_figure, pairs_figure
 from warpimpact.plotting.pressure import pressure
+from warpimpact.results import posterior_file
 
 HERE = Path(__file__).parent
 HIT = 5.8e-3, -5.0e-3  # [m], at the edge of a slot: the core tumbles
@@ -40,19 +45,27 @@ def pictures() -> Iterator[tuple[str, Figure, int]]:
         yield f"gallery/{draw.__name__}.png", draw(hit), 900
 
 
-def save(figure: Figure, path: Path, width: int) -> None:
-    """Write a PNG of this width [px]."""
+def pictures_of_fit(posterior: Path) -> Iterator[tuple[str, Figure, int]]:
+    """The same of the posterior of fits/paper_fit.toml."""
+    tree = posterior_file.read(posterior)
+    yield "fits/paper_fit_hits.png", hits_figure(tree), 920
+    yield "fits/paper_fit_pairs.png", pairs_figure(tree), 1064
+
+
+def save(figure: Figure, path: Path, width: int, *, few_colours: bool = False) -> None:
+    """Write a PNG of this width [px], of 256 colours at most if asked for."""
     path.parent.mkdir(exist_ok=True)
     figure.savefig(path, dpi=width / figure.get_figwidth(), pil_kwargs={"optimize": True})
     with Image.open(path) as drawn:
-        drawn.convert("RGB").save(path, optimize=True)
+        picture = drawn.convert("RGB")
+        (picture.quantize(256, dither=Image.Dither.NONE) if few_colours else picture).save(path, optimize=True)
     if path.stat().st_size > LARGEST:
         raise SystemExit(f"{path}: is larger than {LARGEST / 1e3:.0f} kB, the limit for a picture")
 
 
 def main() -> None:
-    for name, figure, width in pictures():
-        save(figure, HERE / name, width)
+    for name, figure, width in pictures_of_fit(Path(sys.argv[1])) if sys.argv[1:] else pictures():
+        save(figure, HERE / name, width, few_colours=name.startswith("fits/"))
         print(f"{name}: {(HERE / name).stat().st_size / 1e3:.0f} kB")
 
 

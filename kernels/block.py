@@ -6,14 +6,15 @@ The passes, the law and the filter are those of the simple layout (kernels/conta
 are the place of the window, and how exposure is added to it: as whole numbers, because their sum does not depend on the
 order of the lanes. So an outcome has the same bits in every run. The front window, that of the plate or of the laminate
 that it begins, is in the block's shared memory. The windows of layers behind it are in global memory: a core arrives
-turned, so they are some 130 nodes wide, and shared memory would not hold them.
+turned, so they are some 130 nodes wide, and shared memory would not hold them. Nor would it hold several planes: where
+any layer is deep, all windows are in global memory.
 
 Where the barriers stand, and what would go wrong without each of them (E is the exposure, G the exposure gained):
 
 1. After the deposits: a lane converts nodes of G that all lanes add to.
 2. After the conversion: the filter reads nodes of G that other lanes have converted.
 3. Between the filter's directions, in `exposure.spread`: the second one reads what other lanes have filtered, and
-   overwrites G, which they read in the first one.
+   overwrites G, which they read in the first one. Likewise before what spreads over planes overwrites the filtered.
 4. Before the second pass: a patch reads nodes of E that other lanes have raised to mid-step.
 5. After the second pass: `settle` raises nodes of E that other lanes read as they are at mid-step.
 6. After `settle`: the next step adds to nodes of G that other lanes clear.
@@ -61,7 +62,7 @@ from .variant import Variant
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
-    """Device functions of a step's load in the block layout for one variant: float32, windows of one plane."""
+    """Device functions of a step's load in the block layout for one variant, in float32."""
     real = variant.real
     zero, half = real(0.0), real(0.5)
     use = variant.use(
@@ -87,7 +88,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def own_fields(fields: Fields, slot: wp.int32):
         """The fields of a block alone: those of its slot, and of a single plate in shared memory."""
         own = fields
-        if wp.static(variant.layered):
+        if wp.static(variant.layered or variant.deep):
             own = use.exposure.own_fields(fields, slot)
         else:
             if wp.static(variant.degrades):
@@ -102,7 +103,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def fields_of(fields: Fields, first: wp.int32):
         """The fields of a window that begins at a node of its slot; the front window is the first."""
         own = fields
-        if wp.static(variant.layered):
+        if wp.static(variant.layered and not variant.deep):
             if first == 0:
                 own = in_front(fields)
         return own
@@ -128,6 +129,12 @@ def build(variant: Variant) -> SimpleNamespace:
             if gain > zero:
                 cell = read_index(touches.cell, base + j)
                 y, z = read(touches.y, base + j), read(touches.z, base + j)
+                if wp.static(variant.deep):
+                    ahead = read(touches.x, base + j) * gain
+                    if ahead > zero:
+                        next = cell + window.nodes
+                        use.fixed_point.scatter(fields.gain, window.cells_z, next, y, z, ahead * units)
+                    gain -= ahead
                 use.fixed_point.scatter(fields.gain, window.cells_z, cell, y, z, gain * units)
             j += use.lanes.count()
 
@@ -158,6 +165,7 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """`load_on` where the fields of the window are known to be in shared or in global memory."""
         load = Load()
+        box = found.box
         begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
         base = use.core_surface.patches_before(surface, slot) - begin
         use.contact.find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
@@ -172,12 +180,14 @@ def build(variant: Variant) -> SimpleNamespace:
                     for index in range(found.first_closing, found.last_closing + 1):
                         coarsest = wp.max(coarsest, read(surface.area, index))
                     units = use.fixed_point.units(law, window, coarsest, wp.length(pose.velocity), dt)
-                    expose(fields, window, touches, base, begin, end, units)
-                    use.lanes.barrier()
-                    use.fixed_point.measure(fields.gain, window, found.box, units)
-                    use.lanes.barrier()
-                    use.exposure.spread(plate, fields, window, found.box)
-                    use.lanes.barrier()
+                    box = use.contact.gained_box(touches, found.box, base + begin, end - begin)
+                    if box.y_high > box.y_low:
+                        expose(fields, window, touches, base, begin, end, units)
+                        use.lanes.barrier()
+                        use.fixed_point.measure(fields.gain, window, box, units)
+                        use.lanes.barrier()
+                        use.exposure.spread(plate, fields, window, box)
+                        use.lanes.barrier()
             sums = use.contact.summed(
                 surface, law, fields, window, touches, pose, base, found.first_closing, found.last_closing
             )
@@ -190,9 +200,10 @@ def build(variant: Variant) -> SimpleNamespace:
             load.damping_ww = half * use.damping.damping_ww(slopes)
             if wp.static(variant.degrades):
                 if use.contact.weakens(window):
-                    use.lanes.barrier()
-                    use.exposure.settle(plate, fields, window, found.box)
-                    use.lanes.barrier()
+                    if box.y_high > box.y_low:
+                        use.lanes.barrier()
+                        use.exposure.settle(plate, fields, window, box)
+                        use.lanes.barrier()
         return load
 
     @wp.func
@@ -209,7 +220,7 @@ def build(variant: Variant) -> SimpleNamespace:
         dt: real,
     ):
         """As in the simple layout (kernels/contact.py), by all lanes of a block."""
-        if wp.static(variant.layered):  # two calls, so that none goes through generic addresses
+        if wp.static(variant.layered and not variant.deep):  # two calls, so that none goes through generic addresses
             if window.first > 0:
                 return load_in(surface, plate, law, fields, window, touches, slot, found, pose, dt)
             return load_in(surface, plate, law, in_front(fields), window, touches, slot, found, pose, dt)

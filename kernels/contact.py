@@ -37,6 +37,7 @@ def build(variant: Variant) -> SimpleNamespace:
     use = variant.use(
         channel, core_surface, damping, exposure, footprint, grip, interaction, lanes, plate_grid, rigid_body
     )
+    split = lanes.split(variant)
     Footprint, Sums = use.footprint.Footprint, use.damping.Sums
     Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
     Plate, Fields, Window = use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
@@ -183,7 +184,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
         # Native, because a compiler vectorises it only so.
         @wp.func_native(
-            """
+            split("""
         assert(start >= 0 && start + count <= gain.shape[0] && start + count <= place.shape[0]);
         const auto* __restrict__ given = gain.data + start;
         const int* __restrict__ at = place.data + start;
@@ -193,7 +194,9 @@ def build(variant: Variant) -> SimpleNamespace:
             found = here > found ? here : found;
         }
         return found;
-        """.replace("SIGN", sign).replace("LEAST", str(least))
+        """)
+            .replace("SIGN", sign)
+            .replace("LEAST", str(least))
         )
         def extreme_of(
             gain: wp.array(dtype=real), place: wp.array(dtype=wp.int32), start: wp.int32, count: wp.int32
@@ -215,6 +218,13 @@ def build(variant: Variant) -> SimpleNamespace:
             box.z_high = farthest_up(touches.gain, touches.column, start, count) + 1
             box.plane_low = -farthest_down(touches.gain, touches.plane, start, count)
             box.plane_high = farthest_up(touches.gain, touches.plane, start, count) + 1
+            if wp.static(variant.window > 0):
+                box.y_low = use.lanes.least(box.y_low)
+                box.y_high = use.lanes.most(box.y_high)
+                box.z_low = use.lanes.least(box.z_low)
+                box.z_high = use.lanes.most(box.z_high)
+                box.plane_low = use.lanes.least(box.plane_low)
+                box.plane_high = use.lanes.most(box.plane_high)
         return box
 
     def summing(weakened: bool) -> Any:

@@ -296,6 +296,18 @@ def build(variant: Variant) -> SimpleNamespace:
             use.lanes.barrier()  # the other direction reads what other lanes filter, and overwrites what they read
         filter_(fields.gain, fields.filtered, plate, start, strip.rows, strip, strip.stride)
 
+    in_vectors = """
+        int j = 0;
+    #if !defined(__CUDA_ARCH__)
+        typedef Real Vector __attribute__((vector_size(LANES * sizeof(Real))));
+        typedef Real Pair __attribute__((vector_size(2 * LANES * sizeof(Real))));  // one waits while the other adds
+        for (; j + 2 * LANES <= count; j += 2 * LANES) sum(Pair{}, gained + j, into + j, kept + j);
+        for (; j + LANES <= count; j += LANES) sum(Vector{}, gained + j, into + j, kept + j);
+    #endif
+        for (; j < count; ++j) sum((Real)0, gained + j, into + j, kept + j);
+    """
+    by_lanes = split("for (int j = 0; j < count; ++j) sum((Real)0, gained + j, into + j, kept + j);")
+
     # Σ over |i − plane| < reach, and half of the planes at ± reach: the trapezoidal rule over twice the depth. From one
     # plane to the next two planes come in by halves, and two go. The sums are those of a kernel with ends that three
     # linear interpolations blur (of what is scattered, of the trapezoidal rule, and of what is gathered), each with the
@@ -339,16 +351,9 @@ def build(variant: Variant) -> SimpleNamespace:
     for (int row = 0; row < rows; ++row, start += stride) {
         const auto* gained = gain.data + start;
         auto *into = exposure.data + start, *kept = later.data + start;
-        int j = 0;
-    #if !defined(__CUDA_ARCH__)
-        typedef Real Vector __attribute__((vector_size(LANES * sizeof(Real))));
-        typedef Real Pair __attribute__((vector_size(2 * LANES * sizeof(Real))));  // one waits while the other adds
-        for (; j + 2 * LANES <= count; j += 2 * LANES) sum(Pair{}, gained + j, into + j, kept + j);
-        for (; j + LANES <= count; j += LANES) sum(Vector{}, gained + j, into + j, kept + j);
-    #endif
-        for (; j < count; ++j) sum((Real)0, gained + j, into + j, kept + j);
+        COLUMNS
     }
-    """.replace("LANES", str(LANES))
+    """.replace("COLUMNS", by_lanes if variant.window else in_vectors).replace("LANES", str(LANES))
     )
     def add_half_of_planes(
         exposure: wp.array(dtype=real),
@@ -379,6 +384,8 @@ def build(variant: Variant) -> SimpleNamespace:
         """`spread` over several planes."""
         for plane in range(box.plane_low, box.plane_high + 1):
             filter_plane(plate, fields, strip, plane * window.nodes)
+        if wp.static(variant.window > 0):
+            use.lanes.barrier()  # what other lanes read of the filtered is overwritten
         add_half_of_planes(
             fields.exposure,
             fields.filtered,

@@ -76,7 +76,11 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def measure(field: wp.array(dtype=wp.float32), window: Window, box: Box, units: real):
         """The whole numbers in the rows of a box become exposure [s]."""
-        rows = box.y_high - box.y_low + 1
-        convert(field, window.first + box.y_low * window.cells_z, rows * window.cells_z, one / units)
+        start, count = window.first + box.y_low * window.cells_z, (box.y_high - box.y_low + 1) * window.cells_z
+        if wp.static(variant.deep):
+            for plane in range(box.plane_low, wp.min(box.plane_high, window.planes - 1) + 1):
+                convert(field, start + plane * window.nodes, count, one / units)
+        else:
+            convert(field, start, count, one / units)
 
     return SimpleNamespace(**locals())

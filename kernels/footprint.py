@@ -87,6 +87,8 @@ def build(variant: Variant) -> SimpleNamespace:
             not_through, not_back = use.lanes.most(not_through), use.lanes.most(not_back)
             y_low, y_high = use.lanes.least(y_low), use.lanes.most(y_high)
             z_low, z_high = use.lanes.least(z_low), use.lanes.most(z_high)
+            if wp.static(variant.deep):
+                plane_low, plane_high = use.lanes.least(plane_low), use.lanes.most(plane_high)
         found = Footprint()
         found.first_ring = first_ring
         found.last_ring = last_ring

@@ -79,10 +79,10 @@ def clicked(driver: Any) -> Iterator[Image.Image]:
 
 
 def film(driver: Any) -> Iterator[Image.Image]:
-    """The frames: ten seconds."""
+    """The frames: eight seconds."""
     yield from [taken(driver)] * 2
-    yield from slid(driver, "control-plate-pattern-width", np.linspace(4.2, 6.0, 10))
-    yield from slid(driver, "control-impact-obliquity", np.arange(3, 31, 3))
+    yield from slid(driver, "control-plate-pattern-width", np.linspace(4.2, 6.0, 6))
+    yield from slid(driver, "control-impact-obliquity", np.arange(5, 31, 5))
     yield from clicked(driver)
 
 
@@ -110,7 +110,7 @@ def main() -> None:
         save_picture(taken(driver), "design_page.png")
         frames = [frame.resize((SHOWN, SHOWN * TALL // WIDE), Image.Resampling.LANCZOS) for frame in film(driver)]
         path = GALLERY / "design.webp"
-        style: dict[str, Any] = {"save_all": True, "duration": FRAME, "loop": 0, "quality": 55, "method": 6}
+        style: dict[str, Any] = {"save_all": True, "duration": FRAME, "loop": 0, "quality": 50, "method": 6}
         frames[0].save(path, append_images=frames[1:], **style)
         print(path, path.stat().st_size, f"{1e-3 * FRAME * len(frames):.1f} s")
         shown(driver, address, dark=True)

@@ -25,10 +25,8 @@ from many import with_lengths
 from roads import (
     BY_PATH,
     NORMAL,
-    OGIVE,
     P80,
     ROADS,
-    ROUND,
     RUN,
     SLOTTED,
     Scenes,
@@ -49,9 +47,8 @@ from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
 
 ONE = Worker("cpu", 1)
-LIMITS = {
+LIMITS = {  # the pilot of the ogive at round holes takes minutes
     "slotted plate": P80 + SLOTTED.replace("[plate]", BY_PATH) + NORMAL,
-    "ogive with a shank, round holes of 5 mm": OGIVE + ROUND.replace("[plate]", BY_PATH) + NORMAL,
 }
 FIT = CHECKOUT / "campaigns" / "fits" / "paper_fit.toml"
 SLOTTED_HITS = 256

@@ -24,7 +24,7 @@ RUNS: Mapping[str, Sequence[str]] = {
     "peers": ("peers.py", "--hits", "256"),
     "throughput": ("throughput.py",),
     "roads": ("roads.py",),
-    "drawn": ("roads.py", "--seed", "1", "--scenes", "6"),
+    "drawn": ("roads.py", "--seed", "1", "--scenes", "4", "--hits", "64"),
     "loops": ("loops.py",),
     "many": ("many.py",),
     "overheads": ("overheads.py",),

@@ -31,8 +31,8 @@ from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import outcomes_of, pilot_of
 from warpimpact.solver.worker import NEVER, Worker
 
-RUN = 16384
-"""Hits of the run that a pilot is made for."""
+RUN, SMALL = 16384, 1024
+"""Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""
 ROUNDS, TIMED = 3, 0.4
 """Runs of each road, in turn with the slotted plate, and processor time of one of them [s]."""
 
@@ -144,12 +144,13 @@ def scene_and_shots(text: str, hits: int) -> tuple[Scene, Shots]:
     return campaign.scene, campaign.sampler().shots(0, hits * campaign.at_a_plate)
 
 
-def named(text: str, hits: int) -> Road:
-    """A road of ROADS."""
+def named(text: str, hits: int, run: int = RUN) -> Road:
+    """A road of ROADS, for a run of so many hits."""
     campaign = campaign_of(text)
     each = campaign.at_a_plate
-    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], RUN)) * each)
-    return road(campaign.scene, shots[: hits * each], shots, campaign.numerics)
+    shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], run)) * each)
+    pilot = shots[: pilot_size(PRESETS["standard"], run) * each]
+    return road(campaign.scene, shots[: hits * each], pilot, campaign.numerics)
 
 
 def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
@@ -158,7 +159,7 @@ def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
     for kind, draws in (("plate", draw), ("layers", drawn)):
         for index in range(scenes):
             case = draws(seed, index)
-            pilot = case.shots(pilot_size(PRESETS["standard"], RUN), seed=77)
+            pilot = case.shots(pilot_size(PRESETS["standard"], SMALL), seed=77)
             found[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics())
             print(f"{kind} {index}: {case.name}, pilot {found[f'{kind} {index}: {case.name}'].pilot:.1f} s", flush=True)
     return found
@@ -171,8 +172,9 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--seed", type=int, help="of scenes that are drawn, in place of the named ones")
     parser.add_argument("--scenes", type=int, default=6, help="of either kind that are drawn (default: 6)")
     given = parser.parse_args(argv)
-    slotted = named(ROADS["slotted plate"], given.hits)
-    values: dict[str, Any] = {"machine": machine(), "hits": given.hits, "run": RUN, "rounds": ROUNDS, "roads": {}}
+    run = RUN if given.seed is None else SMALL
+    slotted = named(ROADS["slotted plate"], given.hits, run)
+    values: dict[str, Any] = {"machine": machine(), "hits": given.hits, "run": run, "rounds": ROUNDS, "roads": {}}
     if given.seed is None:
         roads = {name: named(text, given.hits) for name, text in ROADS.items()}
     else:
@@ -181,7 +183,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     for name, one in roads.items():
         rounds = [(one.seconds(), slotted.seconds()) for _ in range(ROUNDS)]
         cost, reference = (min(times) for times in zip(*rounds, strict=True))
-        whole = [seconds * RUN + of.pilot for seconds, of in ((cost, one), (reference, slotted))]
+        whole = [seconds * run + of.pilot for seconds, of in ((cost, one), (reference, slotted))]
         values["roads"][name] = {
             "ratio": whole[0] / whole[1],
             "microseconds_per_hit": 1e6 * cost,

@@ -90,11 +90,15 @@ SCENES = {
     "beside the rim": Case(plate=SLOTTED.model_copy(update={"size": (9e-3, 30e-3)})),
     "layers": Case(impact=OBLIQUE, behind=(BASE, WEAK, LAMINATE)),
     "layers without degradation": Case(plate=SOUND, behind=(BASE, BASE.model_copy(update={"resistance": 8e9}))),
+    "thick layers": Case(
+        plate=SLOTTED.model_copy(update={"thickness": 6e-3}),
+        behind=(WEAK.model_copy(update={"thickness": 8e-3}), LAMINATE.model_copy(update={"gap": 5e-3})),
+    ),
     "a burst": Case(plate=SOUND, at_a_plate=3),
     "a burst at layers": Case(impact={"obliquity": 0.2}, behind=(WEAK,), at_a_plate=3),
 }
 EMULATED = ("slots", "oblique and yawed", "a shank in round holes", "no degradation", "layers")
-EMULATED += ("layers without degradation", "a burst", "a burst at layers")
+EMULATED += ("layers without degradation", "thick layers", "a burst", "a burst at layers")
 """Scenes whose lanes run one after another: every build takes seconds."""
 ROUNDING = {"residual_velocity": 0.1, "tilt": np.radians(0.5)}
 ROUNDING |= {"layer_residual_velocity": 0.1, "layer_tilt": np.radians(0.5), "depth": 1e-5}

@@ -37,7 +37,7 @@ class Rule(NamedTuple):
     why: str
 
 
-_BY_BLOCK = "a block remembers one depth of a layer, in single precision, and no bending moment"
+_BY_BLOCK = "a block computes the consistent scheme in single precision, without the bending moment"
 EXCLUDED = (
     Rule(BURST, IMAGES, "the hits of a burst have no images"),
     Rule(BURST, NODAL, "the nodal scheme does not know earlier hits"),
@@ -55,7 +55,7 @@ EXCLUDED = (
     Rule(BENDING, NODAL, "the nodal scheme has no bending moment"),
     Rule(DEEP, NODAL, "the nodal scheme weakens the whole thickness at once, so the depth must be no less"),
     Rule(BENDING, MASS_PROPERTIES, "it needs the mass of every slice, which follows from the shape alone"),
-    *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING, DEEP)),
+    *(Rule(BLOCK, other, _BY_BLOCK) for other in (NODAL, DOUBLE, BENDING)),
     Rule(IMAGES, TURNED, "a symmetry must hold for every shot; of the impact quantities only velocity may scatter"),
     Rule(IMAGES, HOLED_LAYERS, "only layers that are solid and unbounded leave the symmetry of the plate"),
     Rule(POSTERIOR, SCATTER_OF_MATERIAL, "the posterior gives it"),

@@ -90,8 +90,8 @@ class Numerics(_AsGiven):
         grid_spacing: spacing of the plate grid [m].
         precision: of the arithmetic.
         layout: of the work on a CUDA device. "simple" computes a shot per thread. "block" computes a shot per block of
-            32 threads, with its window of the plate in shared memory; no device has measured it yet. It computes layers
-            no thicker than their degradation depth where they weaken, in single precision, without the bending moment.
+            32 threads, with its window of the plate in shared memory; no device has measured it yet. It computes the
+            consistent scheme in single precision, without the bending moment.
     """
 
     fidelity: Literal["draft", "standard", "reference"] = "standard"

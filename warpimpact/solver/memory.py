@@ -149,7 +149,8 @@ class Memory:
         """Names of the fields that a slot needs."""
         if not (self.variant.nodal or self.variant.degrades):
             return []
-        if self.variant.window and self.device.is_cuda and not self.variant.layered:  # the others are in shared memory
+        everywhere = self.variant.layered or self.variant.deep
+        if self.variant.window and self.device.is_cuda and not everywhere:  # the others are in shared memory
             return ["filtered"]
         members, real = self.stage.Fields.vars.items(), self.variant.real
         names = [name for name, member in members if getattr(member.type, "dtype", None) is real]

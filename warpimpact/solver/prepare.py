@@ -127,7 +127,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
     time_steps = layer_steps(scene, shots, materials, resolution, own_lengths)
     conditions: dict[str, NDArray[Any]] = conditions_of(scene, shots, materials, time_steps)
     steps = int(steps_of(shots, conditions).max())
-    deep, simple = any(one.deep.any() for one in materials), resolution.nodal or resolution.block
+    deep = any(one.deep.any() for one in materials)
     plates, burst = list(enumerate(target.layers)), shots.burst_order is not None
     exclusions.check_together(
         {
@@ -142,8 +142,8 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         }
     )
     # A shot is computed by the same build in any company: what counts is which quantities may differ, not the values.
-    deep |= not simple and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
-    deep |= not simple and weakening[0] and "degradation_depth" in shots.columns
+    deep |= not resolution.nodal and any(weakening[k] and shots.differs("thickness", k) for k, _ in plates)
+    deep |= not resolution.nodal and weakening[0] and "degradation_depth" in shots.columns
     grids = [
         grids_of(target.layers, materials, one, own, deep=deep, shared=shared)
         for own, one in zip(lengths, resolutions, strict=True)

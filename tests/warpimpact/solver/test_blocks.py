@@ -17,7 +17,6 @@ from warpimpact.scene import (
     Shots,
     SlotPattern,
     Target,
-    exclusions,
 )
 from warpimpact.solver import replay, simulate, windows
 from warpimpact.solver.prepare import prepare
@@ -91,8 +90,6 @@ def test_shots_that_do_not_leave_theirs_keep_what_layers_and_histories_have_of_t
         ({}, {"precision": "double"}, 'numerics.precision = "double"'),
         ({}, {"scheme": "nodal"}, 'numerics.scheme = "nodal"'),
         ({"record": Record(bending=True)}, {}, "output.bending = true"),
-        ({"target": PLATE.model_copy(update={"thickness": 5e-3})}, {}, exclusions.DEEP),
-        ({"target": Target(layers=(PLATE, Layer(**PLATE.model_dump())))}, {}, exclusions.DEEP),
     ],
 )
 def test_what_a_block_does_not_compute_is_refused(scene: dict[str, Any], numerics: dict[str, Any], words: str) -> None:
