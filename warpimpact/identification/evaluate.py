@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from warpimpact.identification.aim import Aim, aim
 from warpimpact.identification.fit import Fit, MeasuredShot
 from warpimpact.identification.hits import Place
-from warpimpact.identification.likelihood import Data, Score, score
+from warpimpact.identification.likelihood import Compared, Data, Score
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
@@ -192,9 +192,10 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
             for place in bench.which:
                 shot = fit.shots[place]
                 own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
+                compared = Compared.of(data_of(fit, shot), own, run.outcomes)
                 for which in run.which.T:
                     some = {kind: scale[which] for kind, scale in scales.items()}
-                    scored[place].append((which, score(data_of(fit, shot), own, run.outcomes, some, rng)))
+                    scored[place].append((which, compared.score(some, rng)))
     return [_in_order(parts) for parts in scored.values()]
 
 

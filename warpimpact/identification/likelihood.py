@@ -95,49 +95,81 @@ class Score:
         return type(self)(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
 
 
+@dataclass(frozen=True)
+class Compared:
+    """Computed shots beside a measured one, before any scale of discrepancy; SI and radians.
+
+    Attributes:
+        computed: numbers of all points, shape [sets, points, observations]; `missed` is the square of computed less
+            measured.
+        possible: where the shot ended as the measured one did, with all its numbers, shape [sets, points].
+        counts: weight of each point, 0 where the shot would not have been measured, shape [sets, points].
+    """
+
+    data: Data
+    aim: Aim
+    computed: Array
+    missed: Array
+    possible: NDArray[np.bool_]
+    counts: Array
+
+    @classmethod
+    def of(cls, data: Data, aim: Aim, outcomes: Outcomes) -> Self:
+        """Compare sets of parameters with one measured shot.
+
+        Args:
+            outcomes: of all points of the aim at one set after the other, images included, shape [sets · points].
+        """
+        points = len(aim.weight)
+        sets = len(outcomes.status) // points
+        computed = np.empty((sets, points, len(data.observations)))
+        for place, one in enumerate(data.observations):
+            computed[:, :, place] = one.of(outcomes).reshape(sets, points)
+            if one.is_limit:
+                computed[:, :, place] = _median(computed[:, :, place], aim.weight)
+        counts = aim.weight * _counted(data, outcomes).reshape(sets, points)
+        missed = data.miss(computed) ** 2
+        possible = (counts > 0.0) & ~np.isnan(missed).any(axis=-1)
+        if data.status is not None:
+            possible &= outcomes.status.reshape(sets, points) == STATUSES[data.status]
+        return cls(data, aim, computed, missed, possible, counts)
+
+    def score(self, discrepancy: Mapping[str, Array], rng: np.random.Generator) -> Score:
+        """Score the sets with scales of discrepancy.
+
+        Args:
+            discrepancy: by kind, each of shape [sets].
+            rng: draws the hits that are kept.
+        """
+        spread = np.broadcast_to(self.data.spread(discrepancy), (len(self.computed), self.computed.shape[-1]))
+        log = -0.5 * (self.missed @ spread[..., None] ** -2.0)[..., 0]
+        log = log - np.log(np.sqrt(2.0 * np.pi) * spread).sum(axis=-1)[:, None]
+        log = np.where(self.possible, log, -np.inf)
+        log_likelihood, noise = _integrated(log, self.counts, self.aim)
+        stds = np.array([one.std for one in self.data.observations])
+        misfits = np.where(self.possible, self.missed @ stds**-2.0, np.inf)
+        nearest, row = misfits.argmin(axis=1), np.arange(len(misfits))
+        hits = np.stack([self.aim.shots.hit_y, self.aim.shots.hit_z], axis=-1)
+        relative = np.exp(log - np.where(np.isfinite(log), log, -1e300).max(axis=1, keepdims=True))
+        fitted, ahead = _drawn(relative, rng), _drawn(self.counts, rng)
+        errors = spread[:, None] * rng.standard_normal((len(row), KEPT, spread.shape[-1]))
+        return Score(
+            log_likelihood=log_likelihood,
+            noise=noise,
+            misfit=misfits[row, nearest],
+            best=self.computed[row, nearest],
+            best_hit=hits[nearest],
+            fitted=self.computed[row[:, None], fitted],
+            fitted_hit=hits[fitted],
+            predicted=self.computed[row[:, None], ahead] + errors,
+        )
+
+
 def score(
     data: Data, aim: Aim, outcomes: Outcomes, discrepancy: Mapping[str, Array], rng: np.random.Generator
 ) -> Score:
-    """Score sets of parameters against one measured shot.
-
-    Args:
-        outcomes: of all points of the aim at one set after the other, images included, shape [sets · points].
-        discrepancy: by kind, each of shape [sets].
-        rng: draws the hits that are kept.
-    """
-    points = len(aim.weight)
-    sets = len(outcomes.status) // points
-    computed = np.empty((sets, points, len(data.observations)))
-    for place, one in enumerate(data.observations):
-        computed[:, :, place] = one.of(outcomes).reshape(sets, points)
-        if one.is_limit:
-            computed[:, :, place] = _median(computed[:, :, place], aim.weight)
-    status = outcomes.status.reshape(sets, points)
-    counts = aim.weight * _counted(data, outcomes).reshape(sets, points)
-    miss, spread = data.miss(computed), data.spread(discrepancy)[:, None, :]
-    log = -0.5 * ((miss / spread) ** 2).sum(axis=-1) - np.log(np.sqrt(2.0 * np.pi) * spread).sum(axis=-1)
-    if data.status is not None:
-        log = np.where(status == STATUSES[data.status], log, -np.inf)
-    log = np.where((counts > 0.0) & ~np.isnan(log), log, -np.inf)
-    log_likelihood, noise = _integrated(log, counts, aim)
-    stds = np.array([one.std for one in data.observations])
-    misfits = np.where(np.isfinite(log), ((miss / stds) ** 2).sum(axis=-1), np.inf)
-    nearest, row = misfits.argmin(axis=1), np.arange(sets)
-    hits = np.stack([aim.shots.hit_y, aim.shots.hit_z], axis=-1)
-    relative = np.exp(log - np.where(np.isfinite(log), log, -1e300).max(axis=1, keepdims=True))
-    fitted, ahead = _drawn(relative, rng), _drawn(counts, rng)
-    with np.errstate(invalid="ignore"):
-        predicted = computed[row[:, None], ahead] + spread * rng.standard_normal((sets, KEPT, computed.shape[-1]))
-    return Score(
-        log_likelihood=log_likelihood,
-        noise=noise,
-        misfit=misfits[row, nearest],
-        best=computed[row, nearest],
-        best_hit=hits[nearest],
-        fitted=computed[row[:, None], fitted],
-        fitted_hit=hits[fitted],
-        predicted=predicted,
-    )
+    """Score sets of parameters against one measured shot; the arguments are those of `Compared`."""
+    return Compared.of(data, aim, outcomes).score(discrepancy, rng)
 
 
 def _counted(data: Data, outcomes: Outcomes) -> Array:
