@@ -49,8 +49,6 @@ def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, t
     found_at: dict[int, tuple[float, ...]] = {}
     for at, *outcomes in found.tried:
         levels = [_table(campaign, pilot[: len(one)], one) for one in outcomes]
-        if at.numerics.patches_axial is not None and at.numerics != found.numerics:
-            continue  # a level is told by its number alone
         assert at.numerics.level is not None
         found_at[at.numerics.level] = tuple(shift_of(one, (levels[0], levels[1])) or 0.0 for one in measures)
     return found_at

@@ -75,7 +75,6 @@ class HitErrors(Found):
     """Upper estimates of the errors of what becomes of the shots; infinite where the pilot could not tell.
 
     Attributes:
-        rung: of the pilot's ladder (`resolution.at_rung`).
         residual_velocity_error: [m/s]; the residual velocities behind all layers count.
         tilt_error: at the last stand-off [rad].
         depth_error: of the shots that stop in a layer [m]; NaN where none does.
@@ -90,7 +89,6 @@ class HitErrors(Found):
     depth_error: float = math.nan
     status_error: float = math.nan
     cost: Cost | None = field(default=None, compare=False)
-    rung: int = field(default=0, compare=False)
     shifts: Mapping[int, tuple[float, ...]] = field(default_factory=dict, compare=False)
     tried: tuple[Tried, ...] = field(default=(), compare=False, repr=False)
 

@@ -12,7 +12,6 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TypeAlias, TypeVar
 
 import numpy as np
@@ -23,7 +22,7 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
 from warpimpact.solver.changes import ended_otherwise, limit_changes, upper_errors
 from warpimpact.solver.findings import Found, HitErrors, LimitErrors, Tried
-from warpimpact.solver.resolution import LADDER, at_level, at_rung, coarsest_level
+from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
 Array = NDArray[np.float64]
 
@@ -46,8 +45,6 @@ STALLED = 0.7
 it converges, but not where cores barely pass or tumble."""
 ALIKE = 1.5
 """Errors of levels up to so many times the smallest are no reason for a finer one, where none keeps the promise."""
-STEEP = math.radians(10.0)
-"""Between a core's axis and the normal, from which on its flank presses."""
 FINE = 4
 FEWEST = 1.6
 """At least so many shots of a pilot lie beyond the promised percentile, in the mean."""
@@ -85,17 +82,12 @@ def _fewest(share: float) -> int:
     return math.ceil(FEWEST / (1.0 - share) - 1e-9)
 
 
-def is_inclined(shots: Shots) -> bool:
-    """Whether half of the shots meet the target with a core that is inclined by STEEP or more."""
-    return bool(np.median(shots.obliquity + np.hypot(shots.pitch, shots.yaw)) >= STEEP)
-
-
 Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
 """What outcomes of some shots at a level are off by over what is allowed, from those at a finer level."""
 
 
 def pilot_hits(
-    outcomes_at: Callable[[Numerics, Shots], Outcomes],
+    outcomes_at: Callable[[int, Shots], Outcomes],
     pilot: Shots,
     numerics: Numerics,
     free: Sequence[bool] = (True,),
@@ -104,7 +96,7 @@ def pilot_hits(
     """Find the coarsest level whose outcomes have the accuracy that is asked for.
 
     Args:
-        outcomes_at: computes some of the pilot's shots with the settings of a rung (`at_rung`).
+        outcomes_at: computes some of the pilot's shots on a level of LADDER.
         pilot: shots like those that are to be computed, some `pilot_size` of them, the first of which are like all. The
             rest is computed where the first leave the choice between two levels open.
         numerics: their accuracy, precision and layout count; other settings would promise nothing.
@@ -126,23 +118,20 @@ def pilot_hits(
     level = coarsest_level(accuracy.strictness) if excess_of is None else 0
     count = min(len(pilot), -(-_first(accuracy) // at_a_plate) * at_a_plate)
     some, rest = pilot[:count], pilot[count:]
-    known: dict[tuple[str, bool], Outcomes] = {}
+    known: dict[tuple[int, bool], Outcomes] = {}
     tried: dict[int, Tried] = {}
-    settings = partial(at_rung, numerics=numerics, inclined=is_inclined(pilot))
 
-    def computed(at: Numerics, whole: bool) -> Outcomes:
-        key = at.model_dump_json(), whole
-        if key not in known:
-            others = [computed(at, False), outcomes_at(at, rest)] if whole else []
-            known[key] = Outcomes.joined(others) if whole else outcomes_at(at, some)
-        return known[key]
+    def computed(index: int, whole: bool) -> Outcomes:
+        if (index, whole) not in known:
+            others = [computed(index, False), outcomes_at(index, rest)] if whole else []
+            known[index, whole] = Outcomes.joined(others) if whole else outcomes_at(index, some)
+        return known[index, whole]
 
     def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
         for whole in (False, True) if len(rest) else (False,):
             shots = pilot if whole else some
-            pair = computed(settings(index), whole), computed(at_level(finer, numerics), whole)
-            found, excess, nearly = _judged(*pair, shots, settings(index), accuracy, margin, free)
-            found = replace(found, rung=index)
+            pair = computed(index, whole), computed(finer, whole)
+            found, excess, nearly = _judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
             if excess_of is not None:
                 excess, nearly = excess_of(*pair, shots), False
                 found = replace(found, kept=excess <= 1.0)
@@ -159,7 +148,7 @@ def pilot_hits(
     levels = range(level, min(level + further, len(LADDER) - 2) + 1)
     found = _coarsest(judge, levels, len(LADDER) - 1, BEYOND)
     if found is None:
-        return HitErrors(settings(level), False, accuracy.share, math.inf, math.inf, rung=level)
+        return HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
     return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
 
 

@@ -95,25 +95,10 @@ NODAL: dict[str, Any] = {
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
 
 
-INCLINED, PLAIN = 1.5, 2
-"""Rings along a core that meets a plate inclined, in those of a level, beyond the level PLAIN. Its flank presses there,
-where the lengths of rings count. In 19 random scenes at 10 to 30°, half as many rings more left 0.69 of the error at
-1.21 times the cost, where the next level left 0.58 at 1.72 times."""
-
-
 def at_level(index: int, numerics: Numerics) -> Numerics:
     """A level of the ladder, in precision and layout of the numerics."""
     kept = {name: getattr(numerics, name) for name in ("precision", "layout") if name in numerics.model_fields_set}
     return Numerics(level=index, **kept)
-
-
-def at_rung(rung: int, numerics: Numerics, *, inclined: bool) -> Numerics:
-    """What a pilot tries at a rung of its ladder: the level of that number; for cores that meet a plate inclined the
-    level before it with more rings along the core, beyond PLAIN. It is compared with a level of the plain ladder."""
-    if not inclined or rung <= PLAIN:
-        return at_level(rung, numerics)
-    rings = math.ceil(INCLINED * LADDER[rung - 1].patches_axial)
-    return at_level(rung - 1, numerics).model_copy(update={"patches_axial": rings})
 
 
 def coarsest_level(strictness: float) -> int:

@@ -18,6 +18,7 @@ from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import Excess, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
+from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
 
 Array = NDArray[np.float64]
@@ -56,7 +57,7 @@ def simulate(
 
     if numerics.explicit is None:
         pilot, asked = spread(shots, pilot_size(numerics.asked, len(shots))), numerics
-        found = pilot_hits(lambda at, some: outcomes(some, at), pilot, asked, scene.free_behind)
+        found = pilot_hits(lambda level, some: outcomes(some, at_level(level, asked)), pilot, asked, scene.free_behind)
         numerics = found.numerics
     return outcomes(shots, numerics, progress)
 
@@ -89,24 +90,23 @@ def pilot_of(
         excess_of: as in `pilot_hits`.
     """
 
-    seconds: dict[str, float] = {}
+    seconds: dict[int, float] = {}
 
-    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
-        if at.level is not None:
-            trying(at.level)
-        memory = Memory(prepare(scene, some, at), find_device(worker.device))
+    def outcomes_at(level: int, some: Shots) -> Outcomes:
+        trying(level)
+        memory = Memory(prepare(scene, some, at_level(level, numerics)), find_device(worker.device))
         memory.build()
         begin = time.perf_counter()
         outcomes = marched(memory, worker)
-        seconds[at.model_dump_json()] = (time.perf_counter() - begin) / len(some)
+        seconds[level] = (time.perf_counter() - begin) / len(some)
         return outcomes
 
     found = pilot_hits(outcomes_at, pilot, numerics, scene.free_behind, excess_of)
-    if not found.tried:
+    if not found.tried or found.numerics.level is None:
         return found
     first = found.tried[0][0]
-    taken, before = (seconds[one.numerics.model_dump_json()] for one in (found, first))
-    cost = Cost(taken, before, first.numerics.level or 0, first.errors)
+    assert first.numerics.level is not None
+    cost = Cost(seconds[found.numerics.level], seconds[first.numerics.level], first.numerics.level, first.errors)
     return replace(found, cost=cost)
 
 

@@ -36,7 +36,6 @@ from warpimpact.solver.pilot import (
     pilot_size,
 )
 from warpimpact.solver.pilot_text import errors_text, upper_digits
-from warpimpact.solver.resolution import INCLINED, LADDER, PLAIN
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
@@ -141,7 +140,7 @@ def test_a_promise_ends_at_its_finest_level(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_levels_that_do_not_fit_the_memory_end_the_search() -> None:
-    def full(at: Numerics, some: Shots) -> Outcomes:
+    def full(level: int, some: Shots) -> Outcomes:
         raise MemoryError
 
     found = pilot_hits(full, PILOT[:4], Numerics())
@@ -280,9 +279,9 @@ def test_more_hits_are_computed_where_the_first_leave_the_level_open(
 ) -> None:
     counts = []
 
-    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+    def outcomes_at(level: int, some: Shots) -> Outcomes:
         counts.append(len(some))
-        return simulate(SCENE, some, numerics=at, device="cpu")
+        return simulate(SCENE, some, numerics=Numerics(level=level), device="cpu")
 
     monkeypatch.setattr(pilot, "SHOTS", 16)
     monkeypatch.setattr(pilot, "FURTHER", 0)
@@ -350,24 +349,3 @@ def test_errors_above_a_bound_never_read_as_if_they_kept_it(bound: float) -> Non
         assert error <= float(upper_digits(error)) <= bound
     assert errors_text(1.04, 0.3, 1.23e-4) == "1.1 m/s, 0.3 deg and 0.13 mm of depth"
     assert errors_text(math.inf, 123.0) == "inf m/s and 130 deg"
-
-
-@pytest.mark.parametrize(
-    ("angles", "inclined"),
-    [({}, False), ({"obliquity": 30.0}, True), ({"pitch": 8.0, "yaw": 8.0}, True), ({"obliquity": 9.0}, False)],
-)
-def test_the_ladder_of_inclined_cores_has_more_rings_along_the_core(angles: dict[str, float], inclined: bool) -> None:
-    shots = make_shots(Impact(velocity=820.0, **angles), Hits(count=16, seed=5), PLATE)
-    assert pilot.is_inclined(shots) == inclined
-    seen: list[tuple[int | None, int | None]] = []
-
-    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
-        seen.append((at.level, at.patches_axial))
-        return simulate(SCENE, some, numerics=Numerics(level=0), device="cpu")
-
-    found = pilot_hits(outcomes_at, shots, Numerics())  # errors of nothing: the first level is taken
-    assert seen == [(PLAIN, None), (PLAIN + 2, None)]
-    rings = math.ceil(INCLINED * LADDER[PLAIN].patches_axial)
-    beyond = pilot.at_rung(PLAIN + 1, Numerics(), inclined=pilot.is_inclined(shots))
-    assert (beyond.level, beyond.patches_axial) == ((PLAIN, rings) if inclined else (PLAIN + 1, None))
-    assert (found.kept, found.rung, found.numerics) == (True, PLAIN, Numerics(level=PLAIN))
