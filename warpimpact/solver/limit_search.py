@@ -37,7 +37,7 @@ SETTLED = 1.2
 OUTWARD = 1.4, 2.0, 4.0
 """How many times as large as the last value the next one is as long as nothing is expected: at first, then, and from
 then on."""
-PATIENT = 4
+PATIENT = 5
 """Runs after which those that follow go farther each time, if all have stopped or all have passed."""
 
 
@@ -120,7 +120,8 @@ class Search:
         low, high = np.minimum(passed, stopped), np.maximum(passed, stopped)
         aimed = self._aimed()[which]
         wild = np.logical_not((aimed > low) & (aimed < high))
-        further = np.array(OUTWARD)[np.clip(runs - 1, 0, 2)] * low
+        blind = runs - np.where(np.isfinite(self.guess.value[which]), PATIENT, 1)
+        further = np.array(OUTWARD)[np.clip(blind, 0, 2)] * low
         farthest = np.where(low > 0.0, OUTWARD[-1] * low, np.inf)
         misled = (low == stopped) & (runs >= PATIENT)
         outward = np.where(wild | misled, further, np.minimum(aimed, farthest))

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, S
 from warpimpact.solver import limit
 from warpimpact.solver.limit import Sought, limit_thickness, limit_velocity
 from warpimpact.solver.limit_near import Neighbours
-from warpimpact.solver.limit_search import MOST_RUNS, Search
+from warpimpact.solver.limit_search import MOST_RUNS, Guess, Search
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.simulate import simulate
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
@@ -163,6 +164,22 @@ def test_what_is_found_says_where_the_others_begin() -> None:
     guess = near.guess(np.arange(40))
     assert guess.value == pytest.approx(value, abs=0.5)
     assert (np.abs(guess.value - value) < 3.0 * guess.sure).mean() > 0.8
+
+
+def test_a_limit_that_others_tell_too_low_is_found_in_few_runs() -> None:
+    guess = Guess(np.full(1, 577.1), np.full(1, 0.33), np.zeros(1), np.full(1, 0.93), np.array([0.1, 0.05, 0.03]))
+    search = Search(np.full(1, 600.0), np.inf, np.zeros(1), 1.0, 3000.0, guess)
+    by_formula = outcomes_by(lambda some: (np.where(some.velocity > 584.6, 0, 1), speed_left(some.velocity, 584.6)))
+    while len(which := search.pending):
+        tried = search.trial(which)
+        search.learn(which, tried, by_formula(SimpleNamespace(shots=shots(1, tried.item()))))
+    assert search.converged.all()
+    assert search.value() == pytest.approx(584.6, abs=1.0)
+    assert search.runs.item() <= 8
+
+
+def speed_left(velocity: Array, limit_velocity: float) -> Array:
+    return np.asarray(np.sqrt(np.maximum(velocity**2 - limit_velocity**2, 0.0)))
 
 
 @pytest.mark.parametrize("search", [limit_velocity, limit_thickness])
