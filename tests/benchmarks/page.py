@@ -194,7 +194,7 @@ def _loops(values: Mapping[str, Any]) -> Iterator[Row]:
     fit = values["identify"]
     yield Row(
         "`warpimpact identify`, seconds and effective sample size",
-        "the paper's two shots (`paper_fit`)",
+        "two shots of the paper (`paper_fit`)",
         f"{fit['seconds']:.0f} s of a core, {fit['wall']:.0f} s wall time; {fit['effective']:.0f}",
         f"{fit['sets']} sets of parameters",
         "one fit",
