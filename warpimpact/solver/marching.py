@@ -45,11 +45,12 @@ class March:
     Attributes:
         memory: where the shots are. Windows that do not fit a block have another one, for the simple layout.
         cells: of the plate's window.
+        sizes: of windows that are tried, each twice as wide as the one before.
     """
 
     def __init__(self, memory: Memory, threads: int | None = None) -> None:
         self.memory, self.at_a_plate = memory, memory.at_a_plate
-        self.threads = launching(threads)
+        self.threads, self.sizes = launching(threads), MAX_DOUBLINGS
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:
@@ -63,11 +64,11 @@ class March:
                 progress(done, count)
 
         pending = np.arange(count)
-        for _ in range(MAX_DOUBLINGS):
+        for size in range(1, self.sizes + 1):
             self._march_some(pending, outcomes, _after(count - len(pending), reached))
             pending = whole_plates(outcomes.status.numpy() == Status.LEFT_WINDOW, self.at_a_plate)
             wider = 2 * self.cells[0], 2 * self.cells[1]
-            if not len(pending) or not self._fits(wider):
+            if not len(pending) or size == self.sizes or not self._fits(wider):
                 break
             self.widen(wider)
         outcomes.status.assign(spoilt(outcomes.status.numpy(), self.at_a_plate))

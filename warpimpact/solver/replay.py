@@ -167,6 +167,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     march = March(Memory(replace(prepared, rows=steps + 1), device))
     if len(shots) == march.at_a_plate:  # others would all be in the window that the widest one needs
         march.widen(first.cells)
+        march.sizes = 1  # a shot that leaves this window, too, would take more steps in a wider one
     return march, march.march()
 
 
