@@ -183,6 +183,7 @@ def test_lanes_that_run_one_after_another_compute_what_one_thread_computes(
         np.testing.assert_array_equal(getattr(again, column), values, err_msg=column)
 
 
+@IN_RELEASE
 @pytest.mark.parametrize("order", list(ORDERS))
 def test_order_of_the_lanes_changes_no_outcome(order: str, in_blocks: pytest.MonkeyPatch) -> None:
     scene, shots = scene_of("slots", 12)
@@ -192,6 +193,7 @@ def test_order_of_the_lanes_changes_no_outcome(order: str, in_blocks: pytest.Mon
     assert_same(simulate.simulate(scene, shots, numerics=BLOCK, device="cpu"), first)
 
 
+@IN_RELEASE
 @pytest.mark.parametrize("name", ["slots", "a burst at layers"])
 def test_lanes_that_do_not_wait_are_found(name: str, in_blocks: pytest.MonkeyPatch) -> None:
     scene, shots = scene_of(name, 12)
