@@ -201,6 +201,22 @@ def test_kinetic_energy_never_grows_and_momentum_is_the_impulse(device: str) -> 
         assert np.diff(history.position, axis=0) == pytest.approx(drift, abs=1e-12)
 
 
+@pytest.mark.parametrize("resistance", [0.8e9, 3e9])
+def test_a_base_that_stays_as_it_is_has_longer_steps_that_take_a_share_of_the_speed(resistance: float) -> None:
+    base = layer(solid_plate(degradation=1.0, resistance=resistance), gap=60e-3, thickness=8e-3)
+    shots = shots_at(Y, Z, obliquity=30.0)
+    share = 0.125 * resolution.LADDER[2].travel
+    longest = []
+    for history in histories(Target(layers=(paper_plate(), base)), shots):
+        shortest, x = history.step.min(), history.position[:, 0]
+        assert (history.step[x < 10e-3] < 1.001 * shortest).all()  # the base of the core is still in the plate
+        longest.append(history.step.max() / shortest)
+        speed = np.linalg.norm(history.velocity, axis=1)
+        taken = np.linalg.norm(np.diff(history.velocity, axis=0), axis=1) / speed[:-1]
+        assert (taken[history.step[1:] > 1.001 * shortest] < 1.2 * share).all()  # as foreseen by the step before
+    assert max(longest) > 2.0
+
+
 def mirrored(target: Target) -> Target:
     """A target of patterns that are their own mirror images, mirrored in y."""
     layers = tuple(one.model_copy(update={"offset": (-one.offset[0], one.offset[1])}) for one in target.layers[1:])
