@@ -149,10 +149,10 @@ class Resolution:
         acting = np.minimum(thickness, DEEP * np.asarray(depth)) if weakens else thickness
         return np.minimum(acting, self.slender)
 
-    def way_along(self, plate: Plate, length: ArrayLike, *, weakens: bool) -> Array:
+    def way_along(self, plate: Plate, length: ArrayLike, *, weakens: bool, behind: bool) -> Array:
         """The most of a step's way that may lie in the plane of a plate [m], for some degradation lengths [m], of their
-        shape; infinite where the plate is and stays the same everywhere."""
-        if isinstance(plate.pattern, NoPattern) and plate.size is None and not weakens:
+        shape; infinite where it stands behind another one, and is and stays the same everywhere."""
+        if behind and isinstance(plate.pattern, NoPattern) and plate.size is None and not weakens:
             return np.full(np.shape(length), math.inf)
         return self.along * np.asarray(length)
 
@@ -184,19 +184,19 @@ class Resolution:
             way = self.time_step * np.asarray(velocity)
         return np.asarray(np.minimum(way, passage) / velocity)
 
-    def step_of(self, impact: Impact, plate: Plate) -> float:
-        """Time step [s] of a plate that stands alone, or where it scatters, of its means."""
+    def step_of(self, impact: Impact, plate: Plate, *, behind: bool = False) -> float:
+        """Time step [s] of a plate that stands alone, or behind another one; where it scatters, of its means."""
         stress = self.static * plate.resistance
         decay = decay_rate(np.array(plate.degradation), plate.degradation_unit)
         longest_time = self.longest_time(decay, plate, impact.velocity, self.mass, stress)
         weakens = plate.degradation < 1.0
         passage = self.passage(plate.thickness, plate.degradation_depth, weakens=weakens)
-        way_along = self.way_along(plate, plate.degradation_length, weakens=weakens)
+        way_along = self.way_along(plate, plate.degradation_length, weakens=weakens, behind=behind)
         return float(self.step_at(impact.velocity, impact.obliquity, passage, longest_time, way_along))
 
     def step_in(self, impact: Impact, target: Target) -> float:
         """Time step [s] of a target, likewise: that of the layer that needs the shortest."""
-        return min(self.step_of(impact, plate) for plate in target.layers)
+        return min(self.step_of(impact, plate, behind=k > 0) for k, plate in enumerate(target.layers))
 
 
 def resolve(
@@ -254,9 +254,9 @@ def layer_steps(
             shots.obliquity,
             resolution.passage(own.thickness, own.depth, weakens=own.weakens),
             resolution.longest_time(own.decay_rate, layer, shots.velocity, mass, own.a0),
-            resolution.way_along(layer, length, weakens=own.weakens),
+            resolution.way_along(layer, length, weakens=own.weakens, behind=k > 0),
         )
-        for layer, own, length in zip(scene.target.layers, materials, lengths, strict=True)
+        for k, (layer, own, length) in enumerate(zip(scene.target.layers, materials, lengths, strict=True))
     ]
 
 
