@@ -12,6 +12,7 @@ import time
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,6 +45,7 @@ def find_device(name: str) -> Any:
         ) from None
 
 
+@cache
 def _start_warp() -> None:
     """Start Warp without its messages, ready for launches from several threads.
 

@@ -104,7 +104,7 @@ class Memory:
         structs = [self.stage.Sections() for _ in prepared.surfaces]
         for struct, own in zip(structs, prepared.surfaces, strict=True):
             for name in self.stage.Sections.vars if own.sections is not None else ():
-                setattr(struct, name, self.put(getattr(own.sections, name)))
+                setattr(struct, name, self.put(getattr(own.sections, name), aligned=True))
         return structs
 
     def _shots(self, prepared: Prepared) -> Any:

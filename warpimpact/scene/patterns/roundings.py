@@ -45,6 +45,34 @@ def distance(spine: Array, y: Array, z: Array) -> Array:
     return np.where(within, -nearest, nearest)
 
 
+def chords(spines: Array, rounding: float, z: Array, slack: float) -> tuple[Array, Array]:
+    """Ends along y [m] of what lines at z [m] have of shapes, each of shape [lines]; inf and −inf where a line misses
+    its shape by more than `slack` [m].
+
+    Args:
+        spines: of each line's shape, shape [lines, corners, 2] [m].
+
+    An end of a line within a convex shape lies on the arc about a corner or on a straight part of the outline, and both
+    are in the shape: the outermost counts.
+    """
+    low, high = np.full(len(z), np.inf), np.full(len(z), -np.inf)
+    for own, following in zip(*(np.moveaxis(of, 1, 0) for of in (spines, np.roll(spines, -1, axis=1))), strict=True):
+        from_y, from_z = own.T
+        apart = np.abs(z - from_z)
+        half = np.where(apart <= rounding + slack, np.sqrt(np.maximum(0.0, rounding**2 - apart**2)), -np.inf)
+        low, high = np.minimum(low, from_y - half), np.maximum(high, from_y + half)
+        if spines.shape[1] == 1:
+            break
+        along_y, along_z = (following - own).T
+        with np.errstate(divide="ignore", invalid="ignore"):  # of a part along y the arcs have the ends
+            outwards = rounding / np.hypot(along_y, along_z)
+            part = (z - from_z + outwards * along_y) / along_z
+            end = from_y + outwards * along_z + part * along_y
+        end = np.where((part >= 0.0) & (part <= 1.0), end, np.nan)
+        low, high = np.fmin(low, end), np.fmax(high, end)
+    return low, high
+
+
 def placed(spine: Array, places: Array) -> Array:
     """The spine turned by and moved to every place (y, z, turn) [m, rad]; shape [places, corners, 2]."""
     cosine, sine = np.cos(places[:, 2:]), np.sin(places[:, 2:])
