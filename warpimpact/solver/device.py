@@ -69,6 +69,10 @@ def _start_warp() -> None:
                     os.write(2, line)
 
 
+SMALL = 2**24
+"""Bytes that any machine has: whether so few are free is not asked, as the answer takes as long as some shots."""
+
+
 def free_memory() -> int:
     """Memory that this process may still take [bytes]: of the machine, its control group and its own limits."""
     process = psutil.Process()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.solver.device import free_memory
+from warpimpact.solver.device import SMALL, free_memory
 from warpimpact.solver.keys import Key
 from warpimpact.solver.materials import ROUNDING
 
@@ -206,8 +206,8 @@ def _tile(key: Key[Pattern], spacing: float, sharp: bool, real: Real) -> Tile:
     step = 1 if sharp else 2
     count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
     dy, dz = period_y / count_y, period_z / count_z
-    needed, free = 3 * 8 * count_y * count_z, free_memory()
-    if needed > free:
+    needed = 3 * 8 * count_y * count_z
+    if needed > SMALL and needed > (free := free_memory()):
         raise MemoryError(
             "numerics.grid_spacing or plate.degradation_length, which determines it, is too small: the period of the "
             f"plate, {period_y:g} m x {period_z:g} m, needs {needed / 2**30:.3g} GiB in cells of {spacing:.3g} m, and "

@@ -4,6 +4,7 @@ import math
 from abc import abstractmethod
 from copy import copy
 from functools import cached_property
+from itertools import pairwise
 from numbers import Real
 from typing import Annotated, Any, NamedTuple, Self
 
@@ -177,15 +178,17 @@ class LatticePattern(Pattern):
             line = np.arange(lines.sum()) + np.repeat(ends[some, 1] - np.cumsum(lines), lines)
             low, high = self._chords(places, np.repeat(some, lines), (line + 0.5) * fine[1], slack)
             first, behind = np.ceil((low - slack) / fine[0] - 0.5), np.floor((high + slack) / fine[0] + 0.5)
-            first, behind = (np.clip(end, 0, samples * counts[0]) for end in (first, behind))
             met = first < behind
-            for at, sign in ((first, 1), (behind, -1)):
-                _fill(inside, at[met].astype(np.int64), line[met] // samples, samples, sign)
-        return np.add.accumulate(inside, axis=0, out=inside)[: counts[0]]
+            for end, sign in ((first, 1), (behind, -1)):
+                at = np.clip(end[met], 0, samples * counts[0]).astype(np.int64)
+                _fill(inside, at, line[met] // samples, samples, sign)
+        for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
+            row += before
+        return inside[: counts[0]]
 
     def _chords(self, places: Array, hole: Numbers, z: Array, slack: float) -> tuple[Array, Array]:
         """`chords` of lines at z [m], each through the hole of this number among those at some places."""
-        return chords(placed(self.spine, places)[hole], self.rounding, z, slack)
+        return chords(placed(self.spine, places), self.rounding, hole, z, slack)
 
     def _deepest(self, y: Array, z: Array) -> Array:
         """Depth of points inside a hole [m]; negative outside, −inf where no hole is in sight."""

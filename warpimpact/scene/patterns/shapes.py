@@ -108,7 +108,7 @@ class EllipsePattern(_OblongPattern):
         square = (cosine / self.width) ** 2 + (sine / self.length) ** 2
         mixed = cosine * sine * (self.width**-2 - self.length**-2)
         left = 0.25 * square - (above / (self.width * self.length)) ** 2
-        half = np.where(left >= 0.0, np.sqrt(np.maximum(0.0, left)), -np.inf)
+        half = np.where(left >= 0.0, np.sqrt(np.maximum(0.0, left)), np.nan)
         return middle_y - (mixed * above + half) / square, middle_y - (mixed * above - half) / square
 
 
