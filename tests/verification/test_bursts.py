@@ -178,7 +178,7 @@ def test_any_thread_and_chunk(behind: Any, threads: int, chunk: int, monkeypatch
     shots = near_bursts()
     expected = simulate(paper_plate(), shots, behind)
     monkeypatch.setattr(marching, "launching", lambda _: threads)
-    monkeypatch.setattr(marching, "CPU_CHUNK", chunk)
+    monkeypatch.setattr(marching, "CHUNK", chunk)
     assert_identical(simulate(paper_plate(), shots, behind), expected)
 
 

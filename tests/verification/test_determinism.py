@@ -71,7 +71,7 @@ def test_any_number_of_threads(shots: Shots, threads: int, monkeypatch: pytest.M
 @KINDS
 def test_any_chunk(shots: Shots, monkeypatch: pytest.MonkeyPatch) -> None:
     expected = outcomes_of(shots, "cpu", {})
-    monkeypatch.setattr(marching, "CPU_CHUNK", 5)
+    monkeypatch.setattr(marching, "CHUNK", 5)
     assert_identical(outcomes_of(shots, "cpu", {}), expected)
 
 

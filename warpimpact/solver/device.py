@@ -12,6 +12,7 @@ import time
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -44,6 +45,7 @@ def find_device(name: str) -> Any:
         ) from None
 
 
+@cache
 def _start_warp() -> None:
     """Start Warp without its messages, ready for launches from several threads.
 
@@ -65,6 +67,10 @@ def _start_warp() -> None:
             for line in aside:
                 if b"find or load the NVIDIA CUDA driver" not in line:
                     os.write(2, line)
+
+
+SMALL = 2**24
+"""Bytes that any machine has: whether so few are free is not asked, as the answer takes as long as some shots."""
 
 
 def free_memory() -> int:

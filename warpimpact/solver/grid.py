@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.solver.device import free_memory
+from warpimpact.solver.device import SMALL, free_memory
 from warpimpact.solver.keys import Key
 from warpimpact.solver.materials import ROUNDING
 
@@ -21,7 +22,9 @@ if TYPE_CHECKING:
     from warpimpact.solver.resolution import Resolution
 
 Array = NDArray[np.float64]
-Numbers = NDArray[np.int64]
+Floats = NDArray[np.floating[Any]]
+Counts = NDArray[np.int16]
+Real = type[np.floating[Any]]
 
 FINER = 5
 """Cells of the tile per cell of the exposure's grid, in each direction. A patch reads the cell under its centre."""
@@ -36,11 +39,8 @@ BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
 SUBSAMPLES = 6
 """Points per cell and direction from which a material fraction is computed."""
-BLOCK, PARTS = 16, 4
-"""Cells of the tile along the sides of a block that is looked at first, and into how many parts they are divided where
-an edge of a hole crosses it; a power of it."""
-CROSSED = 2**9
-"""Blocks, or cells, that are divided together."""
+EDGE = 2**16
+"""Cells beside an edge that are summed together, about."""
 
 FEWEST_PLANES, PLANES = 3, 1.6
 """Per degradation depth: at least, and times the square root of its steps, as planes err by the fourth order of their
@@ -51,28 +51,29 @@ SPARE = 4
 
 @dataclass(frozen=True, eq=False)
 class Tile:
-    """One period of the pristine plate: material fractions, shape [cells_y, cells_z], cells of dy × dz [m]."""
+    """One period of the pristine plate: material fractions, shape [cells_y, cells_z], cells of dy × dz [m]. Both arrays
+    have the floating-point type of the kernels."""
 
-    material: Array
+    material: Floats
     dy: float
     dz: float
 
     @cached_property
-    def clearance(self) -> Array:
+    def clearance(self) -> Floats:
         """Lower bound of every cell's distance from the material of the whole lattice [m], shape of `material`."""
         # The search runs over blocks of cells. A block with any material is a wall.
         rows, columns = self.material.shape
         block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
-        starts = [np.arange(0, count, size) for count, size in zip(self.material.shape, block, strict=True)]
-        wall = np.maximum.reduceat(np.maximum.reduceat(self.material > 0.0, starts[0], axis=0), starts[1], axis=1)
+        wall = _any_of(_any_of(self.material > 0.0, block[0]).T, block[1]).T
         if not wall.any():
-            return np.full((rows, columns), math.inf)
-        widths = (self.dy * rows / len(starts[0]), self.dz * columns / len(starts[1]))
+            return np.full_like(self.material, math.inf)
+        widths = (self.dy * rows / len(wall), self.dz * columns / wall.shape[1])
         own = nearest_wall(wall, widths)
         # Two blocks are subtracted, as distances are from centre to centre and the last block of a period may be
         # narrower.
         kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
-        return np.asarray(np.repeat(np.repeat(kept, block[0], axis=0), block[1], axis=1)[:rows, :columns])
+        every = kept.astype(self.material.dtype).repeat(block[1], axis=1)[:, :columns].repeat(block[0], axis=0)[:rows]
+        return np.asarray(every)
 
 
 class Lengths(NamedTuple):
@@ -156,7 +157,7 @@ def _grid(
     cells = spacing if nodal else min(spacing / FINER, own.length / FINEST)
     if shared:
         cells = 2.0 ** (math.floor(SHARED * math.log2(cells)) / SHARED)
-    tile = tile_of(plate, cells, sharp=nodal)
+    tile = tile_of(plate, cells, sharp=nodal, double=resolution.double)
     if nodal:  # its nodes are the tile's cells, which fit the period
         spacing = min(tile.dy, tile.dz)
     size_y, size_z = plate.size or (math.inf, math.inf)
@@ -184,20 +185,20 @@ def _planes(depth: float, material: Materials, resolution: Resolution) -> Planes
     return Planes(math.floor(most * reach + ROUNDING) + SPARE, depth / reach, reach)
 
 
-def tile_of(plate: Plate, spacing: float, *, sharp: bool = False) -> Tile:
+def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool = False) -> Tile:
     """Material fraction about every cell of one period; cell (0, 0) has its corner at the origin.
 
     Cells are at most `spacing` wide and fit the period; fractions are means over BLUR × BLUR cells. `sharp` takes each
-    cell's centre alone, as the literal scheme does.
+    cell's centre alone, as the literal scheme does, and `double` has them in float64.
 
     Raises:
         MemoryError: the tile does not fit; the message is for the user.
     """
-    return _tile(Key(plate.pattern), spacing, sharp)
+    return _tile(Key(plate.pattern), spacing, sharp, np.float64 if double else np.float32)
 
 
 @lru_cache(maxsize=16)
-def _tile(key: Key[Pattern], spacing: float, sharp: bool) -> Tile:
+def _tile(key: Key[Pattern], spacing: float, sharp: bool, real: Real) -> Tile:
     """The tile of a pattern, kept for later shots at the same plate."""
     pattern = key.value
     period_y, period_z = pattern.period
@@ -205,65 +206,55 @@ def _tile(key: Key[Pattern], spacing: float, sharp: bool) -> Tile:
     step = 1 if sharp else 2
     count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
     dy, dz = period_y / count_y, period_z / count_z
-    needed, free = 3 * 8 * count_y * count_z, free_memory()
-    if needed > free:
+    needed = 3 * 8 * count_y * count_z
+    if needed > SMALL and needed > (free := free_memory()):
         raise MemoryError(
             "numerics.grid_spacing or plate.degradation_length, which determines it, is too small: the period of the "
             f"plate, {period_y:g} m x {period_z:g} m, needs {needed / 2**30:.3g} GiB in cells of {spacing:.3g} m, and "
             f"{free / 2**30:.3g} GiB are free"
         )
-    material = _fractions(pattern, (count_y, count_z), (dy, dz), 1 if sharp else SUBSAMPLES)
-    if not sharp:  # no running sum: its rounding would leave material in the middle of a hole
-        for axis in range(2):
-            beside = sum(np.roll(material, k, axis) + np.roll(material, -k, axis) for k in range(1, BLUR // 2 + 1))
-            material *= 1.0 / BLUR
-            material += (1.0 / BLUR) * beside
-    return Tile(material, dy, dz)
+    samples = 1 if sharp else SUBSAMPLES
+    inside = pattern.points_in_holes((count_y, count_z), (dy, dz), samples)
+    shares = 1.0 - np.arange(samples**2 + 1) / samples**2
+    return Tile(shares[inside].astype(real) if sharp else _blurred(inside, shares, real), dy, dz)
 
 
-def _fractions(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Array:
-    """Material fractions of so many cells from the origin on, with these sides [m], each of samples × samples points.
+def _blurred(inside: Counts, shares: Array, real: Real) -> Floats:
+    """Means of material over BLUR × BLUR cells of a period. Only cells beside an edge are summed.
 
-    Blocks of cells that no edge of a hole crosses are material or hole as a whole.
+    Args:
+        inside: points of each cell in holes.
+        shares: of material, by the number of such points.
     """
-    blocks = [-(-count // BLOCK) for count in counts]
-    first_row, first_column = (BLOCK * at.reshape(-1) for at in np.indices(blocks))
-    solid, row, column = _crossed(pattern, first_row, first_column, BLOCK, sides)
-    material = np.empty((blocks[0] * BLOCK, blocks[1] * BLOCK))
-    material.reshape(blocks[0], BLOCK, blocks[1], BLOCK)[:] = solid.reshape(blocks[0], 1, blocks[1], 1)
-    for first in range(0, len(row), CROSSED):
-        _refine(material, pattern, row[first : first + CROSSED], column[first : first + CROSSED], sides, samples)
-    return np.ascontiguousarray(material[: counts[0], : counts[1]])
+    rows, columns = inside.shape
+    wide = np.pad(inside, BLUR // 2, mode="wrap")
+    least, most = (
+        functools.reduce(extreme, (along[:, k : k + columns] for k in range(BLUR)))
+        for extreme in (np.minimum, np.maximum)
+        for along in [functools.reduce(extreme, (wide[k : k + rows] for k in range(BLUR)))]
+    )
+    material: Floats = (most == 0).astype(real)
+    edge = np.flatnonzero((most > 0) & (least < len(shares) - 1))
+    for lot in np.array_split(edge, 1 + len(edge) // EDGE):
+        row, column = np.divmod(lot, columns)
+        along = [_mean([shares[wide[row + k, column + m]] for k in range(BLUR)]) for m in range(BLUR)]
+        material[row, column] = _mean(along)
+    return material
 
 
-def _refine(
-    material: Array, pattern: Pattern, row: Numbers, column: Numbers, sides: tuple[float, float], samples: int
-) -> None:
-    """Fill in the blocks of cells that begin at some rows and columns: part by part, then cell by cell, then point by
-    point those cells that an edge crosses."""
-    size = BLOCK
-    while size > 1:
-        size, within = size // PARTS, np.arange(0, size, size // PARTS)
-        row, column = (row[:, None, None] + within[:, None], column[:, None, None] + within)
-        row, column = (at.reshape(-1) for at in np.broadcast_arrays(row, column))
-        inside = row[:, None, None] + np.arange(size)[:, None], column[:, None, None] + np.arange(size)
-        solid, row, column = _crossed(pattern, row, column, size, sides)
-        material[inside] = solid[:, None, None]
-    points = (np.arange(samples, dtype=np.float64) + 0.5) / samples - 0.5
-    for first in range(0, len(row), CROSSED):
-        some = row[first : first + CROSSED], column[first : first + CROSSED]
-        y, z = (np.asarray((at + 0.5) * side) for at, side in zip(some, sides, strict=True))
-        material[some] = 1.0 - pattern.hole_share(y, z, points * sides[0], points * sides[1])
+def _mean(values: Sequence[Array]) -> Array:
+    """Mean of so many values, their middle one on its own."""
+    middle = BLUR // 2
+    beside = sum(values[middle - k] + values[middle + k] for k in range(1, middle + 1))
+    return np.asarray(values[middle] * (1.0 / BLUR) + (1.0 / BLUR) * beside)
 
 
-def _crossed(
-    pattern: Pattern, row: Numbers, column: Numbers, size: int, sides: tuple[float, float]
-) -> tuple[NDArray[np.bool_], Numbers, Numbers]:
-    """Whether the middles of blocks of size × size cells are material; rows and columns of the blocks that an edge of a
-    hole may cross."""
-    y, z = (np.asarray((at + 0.5 * size) * side) for at, side in zip((row, column), sides, strict=True))
-    hole, edge = pattern.looked_at(y, z, 0.501 * size * math.hypot(*sides))
-    return ~hole, row[edge], column[edge]
+def _any_of(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
+    """Whether any of so many rows in a row is marked, column by column; the last ones may be fewer."""
+    found = marked[::size].copy()
+    for part in (marked[k::size] for k in range(1, size)):
+        found[: len(part)] |= part
+    return found
 
 
 def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
@@ -278,11 +269,12 @@ def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
     behind = np.minimum.accumulate(np.where(walls, number, math.inf)[:, ::-1], axis=1)[:, ::-1]
     along = np.minimum(number - before, behind - number)[:, columns : 2 * columns] * widths[1]
     nearest = np.full((rows, columns), math.inf)
-    square = np.square(along)
-    for shift in sorted(range(-(rows // 2), rows // 2 + 1), key=abs):
-        if (beyond := np.square(shift * widths[0])) >= nearest.max():
+    square = np.tile(np.square(along), (3, 1))
+    for shift in range(rows // 2 + 1):
+        if (beyond := (shift * widths[0]) ** 2) >= nearest.max():
             break
-        nearest = np.minimum(nearest, beyond + np.roll(square, shift, axis=0))
+        below, above = (square[rows + way : 2 * rows + way] for way in (-shift, shift))
+        nearest = np.minimum(nearest, beyond + np.minimum(below, above))
     return np.asarray(np.sqrt(nearest))
 
 

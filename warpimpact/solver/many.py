@@ -5,14 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from dataclasses import replace
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, launching
-from warpimpact.solver.marching import Progress
+from warpimpact.solver.marching import Helpers, March, Progress
+from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import computed
+from warpimpact.solver.simulate import outcomes_of
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
 _ANY = Worker()
@@ -26,9 +26,9 @@ def simulate_many(
 ) -> list[Outcomes]:
     """Compute the shots of many scenes. The outcomes of each are those of `simulate`, bit for bit.
 
-    On a CPU as many scenes as there are threads are prepared and marched at a time, and the last ones share the threads
-    that have no scene left. A GPU computes one scene after another. The scratch is that of the scenes that are computed
-    at a time.
+    On a CPU as many scenes as there are threads are prepared and marched at a time, and threads that have no scene left
+    help to march the last ones. A GPU computes one scene after another. The scratch is that of the scenes that are
+    computed at a time.
 
     Args:
         scenes: a scene and its shots each. They may differ in everything: cores, layers, what is recorded.
@@ -42,7 +42,8 @@ def simulate_many(
         DeviceError: the device is absent.
         ValueError, MemoryError: as in `prepare`, for the first scene that cannot be computed.
     """
-    threads = launching(worker.threads) if find_device(worker.device).is_cpu else 1
+    device = find_device(worker.device)
+    threads = launching(worker.threads) if device.is_cpu else 1
     stop, lock, total = Cancel(worker.cancel), threading.Lock(), sum(len(shots) for _, shots in scenes)
     done = [0] * len(scenes)
 
@@ -54,8 +55,11 @@ def simulate_many(
                     progress(sum(done), total)
 
         stop.check()
-        own = replace(worker, threads=-(-threads // (len(scenes) - number)), cancel=stop)
-        return computed(prepare(*scenes[number], numerics), own, told)
+        helped = threads > 1 and len(scenes) - number <= threads
+        memory = Memory(prepare(*scenes[number], numerics), device)
+        march = March(memory, 1, Helpers(pool, threads - 1) if helped else None)
+        contact = march.march(told, stop)
+        return outcomes_of(march.memory, contact)
 
     pool = ThreadPoolExecutor(threads)
     try:

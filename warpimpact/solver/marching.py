@@ -6,17 +6,19 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from warpimpact.kernels.status import Status
+from warpimpact.solver.chunks import CHUNK, SHARES, Chunks
 from warpimpact.solver.device import halving, launching, load
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.windows import Cells
@@ -26,31 +28,34 @@ Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 Progress = Callable[[int, int], None]
 Progress1 = Callable[[int], None]
+Launch = Callable[[Any, int, int, int], int]
 
-CPU_CHUNK = 64
-"""Most shots per launch on the CPU."""
-SHARES = 3
-"""Launches per thread into which the shots that are left would be divided at least."""
-CPU_LAUNCH = 0.25
-"""Seconds that a launch on the CPU is to take at most: a computation can be broken off between two of them."""
 FEWEST_CELLS = 16
 """Along a side of the plate's window, which would hold no core if it were smaller still."""
 MAX_DOUBLINGS = 6
 """Largest number of times that the windows are doubled for the shots that left theirs."""
 
 
+class Helpers(NamedTuple):
+    """A pool that computes scenes, one of which is marched on a thread of it, and how many other threads it has."""
+
+    pool: Executor
+    threads: int
+
+
 class March:
     """The march of what is in the memory of a device; see `simulate` for the arguments.
 
     Attributes:
+        helpers: who helps a thread that is not the main one, as soon as there is nothing else to do.
         memory: where the shots are. Windows that do not fit a block have another one, for the simple layout.
         cells: of the plate's window.
         sizes: of windows that are tried, each twice as wide as the one before.
     """
 
-    def __init__(self, memory: Memory, threads: int | None = None) -> None:
+    def __init__(self, memory: Memory, threads: int | None = None, helpers: Helpers | None = None) -> None:
         self.memory, self.at_a_plate = memory, memory.at_a_plate
-        self.threads, self.sizes = launching(threads), MAX_DOUBLINGS
+        self.threads, self.helpers, self.sizes = launching(threads), helpers, MAX_DOUBLINGS
         self.cells = self._window_cells()
 
     def march(self, progress: Progress | None = None, cancel: Cancel = NEVER) -> Any:
@@ -117,42 +122,57 @@ class March:
             wp.synchronize_device(memory.device)
             progress(first + count)
 
-    def _on_threads(self, launch: Callable[..., int], slots: list[Any], total: int, progress: Progress1) -> None:
-        """Distribute chunks over threads, each with one slot. A CPU launch runs its shots one after another on the
-        calling thread, without the interpreter lock."""
-        idle = SimpleQueue[Any]()
-        for scratch in slots:
-            idle.put(scratch)
-
-        def work(first: int, count: int) -> tuple[int, float]:
-            scratch, begin = idle.get(), time.perf_counter()
-            try:
-                return launch(scratch, 1, first, count), time.perf_counter() - begin
-            finally:
-                idle.put(scratch)
-
-        # The first launches are of one shot each, as some scenes take seconds per shot; so are the last ones, as no
-        # thread is to wait long for another.
-        most, begun, done = 1, 0, 0
-        waiting: set[Future[tuple[int, float]]] = set()
-        alone = len(slots) == 1 and threading.current_thread() is not threading.main_thread()  # which is interrupted
-        pool = _Here() if alone else ThreadPoolExecutor(len(slots))
-        # After each launch a thread may wait for the interpreter, while another one prepares its scene.
-        largest = total if alone else CPU_CHUNK
+    def _on_threads(self, launch: Launch, apiece: list[Any], total: int, progress: Progress1) -> None:
+        """Compute chunks of shots on threads, each with its own scratch. A CPU launch runs its shots one after another
+        on the calling thread, without the interpreter lock."""
+        if len(apiece) == 1 and threading.current_thread() is not threading.main_thread():
+            self._here(launch, apiece[0], total, progress)
+            return
+        chunks, ended = Chunks(total, self.at_a_plate, SHARES * len(apiece), CHUNK), SimpleQueue[int]()
+        # The main thread is interrupted, so it computes nothing. Who interrupts does not wait for a long shot.
+        pool = ThreadPoolExecutor(len(apiece))
         try:
-            while done < total:
-                while begun < total and len(waiting) < 2 * len(slots):
-                    share = total - begun if alone else max(1, (total - begun) // (SHARES * len(slots)))
-                    count = min(chunk_of(min(most, share), self.at_a_plate), total - begun)
-                    waiting.add(pool.submit(work, begun, count))
-                    begun += count
-                ended, waiting = wait(waiting, return_when=FIRST_COMPLETED)
-                for shots, seconds in (future.result() for future in ended):
-                    done += shots
-                    most = min(largest, max(1, int(CPU_LAUNCH * shots / max(seconds, 1e-9))))
-                progress(done)
-        finally:  # whoever interrupts does not wait for a shot that takes a minute
+            threads = [pool.submit(_work, launch, scratch, chunks, ended.put) for scratch in apiece]
+            for thread in threads:
+                thread.add_done_callback(lambda _: ended.put(0))
+            while chunks.done < total:
+                ended.get()
+                for thread in threads:
+                    if thread.done():
+                        thread.result()
+                progress(chunks.done)
+        finally:
+            chunks.end()
             pool.shutdown(wait=False, cancel_futures=True)
+
+    def _here(self, launch: Launch, scratch: Any, total: int, progress: Progress1) -> None:
+        """Compute chunks of shots on this thread, and on those of the helpers that have nothing else to do."""
+        memory, cells, helpers = self.memory, self.cells, self.helpers
+        # Without helpers few chunks: after each, this thread may wait for one that prepares another scene.
+        chunks = Chunks(total, self.at_a_plate, SHARES * (1 + helpers.threads) if helpers else 1, total)
+
+        def others_work() -> None:
+            with suppress(MemoryError):
+                _work(launch, halving(1, lambda slots: memory.scratch(slots, cells))[1], chunks, lambda _: None)
+
+        threads = [helpers.pool.submit(others_work) for _ in range(helpers.threads)] if helpers else []
+        try:
+            _work(launch, scratch, chunks, lambda _: progress(chunks.done))
+        finally:
+            chunks.end()
+            for thread in threads:
+                if not thread.cancel():
+                    thread.result()
+        progress(chunks.done)
+
+
+def _work(launch: Launch, scratch: Any, chunks: Chunks, ended: Callable[[int], object]) -> None:
+    """Take and compute chunks, until none is left."""
+    while (chunk := chunks.take())[1]:
+        begin = time.perf_counter()
+        launch(scratch, 1, *chunk)
+        chunks.computed(chunk[1], time.perf_counter() - begin)
+        ended(chunk[1])
 
 
 def apart(function: Callable[..., int], *arguments: Any) -> int:
@@ -162,15 +182,6 @@ def apart(function: Callable[..., int], *arguments: Any) -> int:
         return pool.submit(function, *arguments).result()
     finally:
         pool.shutdown(wait=False)
-
-
-class _Here(Executor):
-    """Calls on the thread that submits them."""
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        future = Future[Any]()
-        future.set_result(function(*arguments, **named))
-        return future
 
 
 def _after(finished: int, progress: Progress1) -> Progress1:
@@ -195,11 +206,6 @@ def turns(total: int, count: int, slots: int) -> Iterator[tuple[int, int]]:
     for first in range(0, total, slots * count):
         plates = min(slots, (total - first) // count)
         yield from ((first + turn * plates, plates) for turn in range(count))
-
-
-def chunk_of(most: int, count: int) -> int:
-    """Shots per launch, at most so many but at least one plate: those at one plate stay together."""
-    return max(1, most // count) * count
 
 
 def spoilt(status: NDArray[np.int32], count: int) -> NDArray[np.int32]:

@@ -16,7 +16,7 @@ from warpimpact.kernels import free_flight, lanes, march
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
-from warpimpact.solver.device import free_memory, load
+from warpimpact.solver.device import SMALL, free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, plate_of, plates_of, surface_of, table_of
 from warpimpact.solver.windows import Cells
@@ -104,7 +104,7 @@ class Memory:
         structs = [self.stage.Sections() for _ in prepared.surfaces]
         for struct, own in zip(structs, prepared.surfaces, strict=True):
             for name in self.stage.Sections.vars if own.sections is not None else ():
-                setattr(struct, name, self.put(getattr(own.sections, name)))
+                setattr(struct, name, self.put(getattr(own.sections, name), aligned=True))
         return structs
 
     def _shots(self, prepared: Prepared) -> Any:
@@ -165,9 +165,9 @@ class Memory:
         """Slots of scratch that the device's free memory and 32-bit indices allow, for so many threads of a CPU."""
         count, nodes = self.at_a_plate, max(sum(self.prepared.nodes(cells)), self._pierced(cells))
         wanted = threads if self.device.is_cpu else min(CUDA_CHUNK, len(self.prepared.shots) // count)
-        return min(
-            wanted, int(MEMORY_SHARE * self._free / self.slot_bytes(cells)), (2**31 - 1) // (count * max(nodes, 1))
-        )
+        bytes_of_one = self.slot_bytes(cells)
+        fitting = wanted if wanted * bytes_of_one <= SMALL else int(MEMORY_SHARE * self._free / bytes_of_one)
+        return min(wanted, fitting, (2**31 - 1) // (count * max(nodes, 1)))
 
     def too_large(self, cells: Cells) -> str:
         """Why there is no slot, if the plate's window has so many cells."""

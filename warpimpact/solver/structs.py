@@ -26,13 +26,17 @@ PROFILE = 128
 
 @dataclass(frozen=True)
 class Put:
-    """Puts values on the named device, by default in the floating-point type `real` of the kernels."""
+    """Puts values on the named device, by default in the floating-point type `real` of the kernels.
+
+    On a CPU values that have the type stay where they are, unless they are to be `aligned`, as loops over patches read
+    them best.
+    """
 
     device: str
     real: Any
 
-    def __call__(self, values: NDArray[Any], dtype: Any = None) -> Any:
-        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.real, device=self.device)
+    def __call__(self, values: NDArray[Any], dtype: Any = None, *, aligned: bool = False) -> Any:
+        return wp.array(np.ascontiguousarray(values), dtype=dtype or self.real, device=self.device, copy=aligned)
 
 
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
@@ -56,7 +60,7 @@ def _surface(struct: Any, key: Key[Core], rings: Rings, azimuth: bytes, put: Put
     values["patches"] = np.repeat(np.stack([values[name] for name in _OF_A_PATCH]), around)
     values["profile"] = core.radius(core.length * np.linspace(1.0, 0.0, PROFILE + 1))
     for name, array in values.items():
-        setattr(surface, name, put(array))
+        setattr(surface, name, put(array, aligned=True))
     surface.base, surface.per_station = core.mass_properties.centre_of_mass - core.length, PROFILE / core.length
     surface.rings, surface.around = len(area), around
     surface.most_rings, surface.most_patches = len(area), len(area) * around
@@ -99,7 +103,7 @@ def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
     kept = [plate_of(struct, grid, put) for grid in firsts.values()]
     values = dict(zip(firsts, (plate.numpy_value() for plate in kept), strict=True))
     table = np.array([values[grid.tile, grid.period, grid.half_size] for grid in grids], dtype=struct.numpy_dtype())
-    taps, counts = put(np.concatenate([grid.taps for grid in grids])), [len(grid.taps) for grid in grids]
+    taps, counts = put(np.concatenate([grid.taps for grid in grids]), aligned=True), [len(grid.taps) for grid in grids]
     table["taps"]["data"] = taps.ptr + taps.strides[0] * np.cumsum([0, *counts[:-1]])
     table["taps"]["shape"][:, 0] = counts
     members = {
@@ -122,7 +126,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     plate.period_y, plate.period_z = grid.period
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
-    plate.taps, plate.reach = put(grid.taps), grid.reach
+    plate.taps, plate.reach = put(grid.taps, aligned=True), grid.reach
     plate.planes, plate.per_plane, plate.plane_reach = grid.planes.number, 1.0 / grid.planes.spacing, grid.planes.reach
     return plate
 

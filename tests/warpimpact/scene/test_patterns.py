@@ -16,10 +16,13 @@ from warpimpact.scene import (
     EllipsePattern,
     HexagonPattern,
     LatticePattern,
+    LevelSetPattern,
     NoPattern,
+    Pattern,
     SlotPattern,
     SquarePattern,
     TrianglePattern,
+    Wave,
 )
 
 MM = 1e-3
@@ -312,6 +315,40 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
     there = turned.is_hole(cosine * y - sine * z, sine * y + cosine * z)
     assert np.array_equal(there[clear], shape.is_hole(y, z)[clear])
     assert clear.mean() > 0.99
+
+
+@pytest.mark.parametrize("samples", [1, 6])
+@pytest.mark.parametrize(
+    "pattern",
+    [
+        *(SLOT, CIRCLE, TRIANGLE, UP_AND_DOWN, SQUARE, HEXAGON, ELLIPSE, DIAGONAL, NoPattern()),
+        CIRCLE.bounded((30 * MM, 41 * MM), 2 * MM),
+        LevelSetPattern(
+            spacing=(8 * MM, 6 * MM), waves=(Wave(along_y=1, along_z=2), Wave(along_y=2, along_z=0)), share=0.3
+        ),
+    ],
+    ids=lambda pattern: getattr(pattern, "shape", pattern),
+)
+def test_points_in_holes_are_those_that_lie_in_a_hole(
+    pattern: Any, samples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("warpimpact.scene.patterns.lattice._LINES", 100)  # several lots
+    counts = (57, 46)
+    sides = (pattern.period[0] / counts[0], pattern.period[1] / counts[1])
+    exact = Pattern.points_in_holes(pattern, counts, sides, samples)  # looks at every point
+    assert np.array_equal(pattern.points_in_holes(counts, sides, samples), exact)
+    assert exact.mean() / samples**2 == pytest.approx(pattern.open_area, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "shape", [{"shape": "slot", "length": 12 * MM, "width": 4.05 * MM}, {"shape": "square", "side": 4.5 * MM}]
+)
+def test_a_point_on_an_edge_lies_in_the_hole_on_either_side(shape: dict[str, Any]) -> None:
+    kind = SlotPattern if shape["shape"] == "slot" else SquarePattern
+    pattern = kind.model_validate(shape | {"spacing": (8 * MM, 16 * MM), "staggered": True})
+    inside = pattern.points_in_holes((320, 320), (0.05 * MM, 0.05 * MM), 1)
+    assert np.array_equal(inside, inside[::-1])
+    assert np.array_equal(inside, inside[:, ::-1])
 
 
 @settings(deadline=None, max_examples=25)

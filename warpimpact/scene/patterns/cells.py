@@ -7,11 +7,14 @@ from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..exclusions import CELLS, MARGIN, check_together
 from ..model import Array
-from .pattern import BoolArray, Pattern, Range, half_sides
+from .pattern import BoolArray, Counts, Pattern, Range, half_sides, middles
 from .roundings import smallest_gap
+
+Numbers = NDArray[np.int64]
 
 
 class CellsPattern(Pattern):
@@ -38,11 +41,25 @@ class CellsPattern(Pattern):
         return 1 - float(self.material.mean())
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
+        return np.asarray(~self.material[self._indices(y, z)])
+
+    def _indices(self, y: Array, z: Array) -> tuple[Numbers, Numbers]:
+        """Those of the cells at coordinates y and z [m]."""
         i, j = (
             np.floor(coordinate / self.side + cells / 2).astype(np.int64) % cells
             for coordinate, cells in zip((y, z), self.material.shape, strict=True)
         )
-        return np.asarray(~self.material[i, j])
+        return i, j
+
+    def points_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Counts:
+        i, j = self._indices(*middles(counts, sides, samples))
+        along = np.zeros((len(self.material), counts[1]), dtype=np.int16)
+        for k in range(samples):
+            along += ~self.material[:, j[k::samples]]
+        inside = np.zeros(counts, dtype=np.int16)
+        for k in range(samples):
+            inside += along[i[k::samples]]
+        return inside
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """Closed outlines, each of shape [points, 2] [m], of holes; the rectangle cuts them."""

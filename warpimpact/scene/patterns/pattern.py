@@ -12,7 +12,14 @@ from ..model import Array, Model
 from .roundings import distance_to, pieces
 
 BoolArray = NDArray[np.bool_]
+Counts = NDArray[np.int16]
 Range = tuple[float, float]
+
+
+def middles(counts: tuple[int, int], sides: tuple[float, float], samples: int) -> tuple[Array, Array]:
+    """Coordinates y and z [m] of so many points per cell and direction, for so many cells from the origin on."""
+    y, z = ((np.arange(samples * n) + 0.5) * (side / samples) for n, side in zip(counts, sides, strict=True))
+    return np.asarray(y, dtype=np.float64), np.asarray(z, dtype=np.float64)
 
 
 def half_sides(size: tuple[float, float], cell: tuple[float, float], reach: Array) -> Array:
@@ -56,15 +63,18 @@ class Pattern(Model, ABC):
         """
         return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
-    def looked_at(self, y: Array, z: Array, reach: float) -> tuple[BoolArray, BoolArray]:
-        """`is_hole` and `has_edge` of the same points."""
-        return self.is_hole(y, z), self.has_edge(y, z, reach)
+    def points_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Counts:
+        """How many of samples × samples points, evenly in each cell, lie in a hole; shape `counts`.
 
-    def hole_share(self, y: Array, z: Array, from_y: Array, from_z: Array) -> Array:
-        """Share of points that lie in a hole, about middles y, z [m] of shape [middles]: those at all `from_y` and
-        `from_z` from them [m]."""
-        share: Array = self.is_hole(y[:, None, None] + from_y[:, None], z[:, None, None] + from_z).mean(axis=(1, 2))
-        return share
+        Args:
+            counts: cells of a period along y and z, from the origin on.
+            sides: of a cell [m].
+        """
+        y, z = middles(counts, sides, samples)
+        inside = np.empty(counts, dtype=np.int16)
+        for row, of_row in enumerate(y.reshape(-1, samples, 1)):
+            inside[row] = self.is_hole(of_row, z).reshape(samples, -1, samples).sum(axis=(0, 2))
+        return inside
 
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,

@@ -45,6 +45,37 @@ def distance(spine: Array, y: Array, z: Array) -> Array:
     return np.where(within, -nearest, nearest)
 
 
+def chords(spines: Array, rounding: float, which: Any, z: Array, slack: float) -> tuple[Array, Array]:
+    """Ends along y [m] of what lines at z [m] have of shapes, each of shape [lines]; NaN where a line misses its shape
+    by more than `slack` [m].
+
+    Args:
+        spines: of the shapes, shape [shapes, corners, 2] [m].
+        which: shape that each line may cross, shape [lines].
+
+    An end of a line within a convex shape lies on the arc about a corner or on a straight part of the outline, and both
+    are in the shape: the outermost counts.
+    """
+    low, high = np.full(len(z), np.nan), np.full(len(z), np.nan)
+    for own, following in zip(*(np.moveaxis(of, 1, 0) for of in (spines, np.roll(spines, -1, axis=1))), strict=True):
+        from_y, from_z = own.T
+        left = rounding**2 - np.square(z - from_z[which])
+        half = np.sqrt(np.maximum(left, 0.0))
+        half[left < -slack * (slack + 2.0 * rounding)] = np.nan
+        low, high = np.fmin(low, from_y[which] - half), np.fmax(high, from_y[which] + half)
+        if spines.shape[1] == 1:
+            break
+        along_y, along_z = (following - own).T
+        with np.errstate(divide="ignore", invalid="ignore"):  # of a part along y the arcs have the ends
+            outwards = rounding / np.hypot(along_y, along_z)
+            above = z - (from_z - outwards * along_y)[which]
+            part = above * (1.0 / along_z)[which]
+            end = (from_y + outwards * along_z)[which] + above * (along_y / along_z)[which]
+        end[~((part >= 0.0) & (part <= 1.0))] = np.nan
+        low, high = np.fmin(low, end), np.fmax(high, end)
+    return low, high
+
+
 def placed(spine: Array, places: Array) -> Array:
     """The spine turned by and moved to every place (y, z, turn) [m, rad]; shape [places, corners, 2]."""
     cosine, sine = np.cos(places[:, 2:]), np.sin(places[:, 2:])
