@@ -194,10 +194,13 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(1, seed)))
     for bench in benches(fit):
         for run in runs(fit, bench, points, seed=seed, device=device):
+            changes = dict[tuple[Any, ...], Array]()
             for place in bench.which:
                 shot = fit.shots[place]
                 own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
-                compared = Compared.of(data_of(fit, shot), own, run.outcomes)
+                numbers = tuple((one.name, one.standoff, one.is_limit and place) for one in shot.observations)
+                compared = Compared.of(data_of(fit, shot), own, run.outcomes, changes.get(numbers))
+                changes[numbers] = compared.changes
                 scored[place] += _scored(compared, run.which, scales, rng)
     return [_in_order(parts) for parts in scored.values()]
 

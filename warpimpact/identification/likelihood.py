@@ -119,11 +119,12 @@ class Compared:
     counts: Array
 
     @classmethod
-    def of(cls, data: Data, aim: Aim, outcomes: Outcomes) -> Self:
+    def of(cls, data: Data, aim: Aim, outcomes: Outcomes, known: Array | None = None) -> Self:
         """Compare sets of parameters with one measured shot.
 
         Args:
             outcomes: of all points of the aim at one set after the other, images included, shape [sets · points].
+            known: `changes`, if another shot of the same numbers has them already.
         """
         sets, points = aim.weight.shape
         computed = np.empty((sets, points, len(data.observations)))
@@ -136,7 +137,8 @@ class Compared:
         possible = (counts > 0.0) & ~np.isnan(missed).any(axis=-1)
         if data.status is not None:
             possible &= outcomes.status.reshape(sets, points) == STATUSES[data.status]
-        return cls(data, aim, computed, missed, changes(data.observations, aim, computed), possible, counts)
+        about = changes(data.observations, aim, computed) if known is None else known
+        return cls(data, aim, computed, missed, about, possible, counts)
 
     def score(
         self, discrepancy: Mapping[str, Array], rng: np.random.Generator, of: NDArray[np.int64] | None = None
