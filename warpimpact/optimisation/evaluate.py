@@ -97,8 +97,8 @@ def is_even(tables: Mapping[str, Any]) -> bool:
 
 def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
     """Hits of a campaign that are computed: none is an image of another."""
-    images = len(campaign.symmetries)
-    return campaign.sampler().shots(first * images, count * images)[::images]
+    sampler = campaign.sampler()
+    return sampler.shots(first * sampler.images, count * sampler.images)[:: sampler.images]
 
 
 def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: int | None = None) -> list[Said]:
