@@ -144,7 +144,7 @@ def measured(case: Layered, hits: int) -> dict[str, Any]:
     for name in NAMES:
         begin = time.process_time()
         pilot = case.shots(pilot_size(PRESETS[name], RUN), seed=77)
-        promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
+        promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"), hits=RUN)
         taken, velocity, tilt = time.process_time() - begin, promise.residual_velocity_error, promise.tilt_error
         begin = time.process_time()
         found = computed(case, shots, promise.numerics)

@@ -59,6 +59,8 @@ STANDOFF = 0.13
 """Where tilt is compared [m]."""
 FINE = (Level(96, 96, 8.0, 0.05), Level(136, 136, 11.0, 0.035))
 """Levels behind the answer; each is extrapolated from its step and twice its step, of second order."""
+RUN = 4096
+"""Hits of the run for which a pilot is made."""
 LONG = 0.1
 """Processor time [s] from which on a run is timed as it is, once."""
 PAPER = {"coefficients": (3.0e-4, 0.24, -5.29), "length": 27.86e-3, "diameter": 6.044e-3}
@@ -278,8 +280,8 @@ class Row:
 
 def named(bench: Bench, case: Case, truth: Answer, name: str) -> Row:
     """The promise of a name, found by a pilot of other hits."""
-    pilot = case.shots(pilot_size(PRESETS[name]), seed=77)
-    promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"))
+    pilot = case.shots(pilot_size(PRESETS[name], RUN), seed=77)
+    promise = pilot_of(case.scene, pilot, Numerics(fidelity=name), Worker("cpu"), hits=RUN)
     answer, cost = bench.run(case, promise.numerics)
     velocity, tilt = off(answer, truth)
     allowed = PRESETS[name]

@@ -117,12 +117,12 @@ class Road:
         return (time.process_time() - begin) / count
 
 
-def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics) -> Road:
-    """A scene and its shots with what their pilot finds."""
+def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics, run: int) -> Road:
+    """A scene and its shots with what their pilot finds for a run of so many hits."""
     worker = Worker("cpu", 1)
     pilot_of(scene, pilot[: pilot.at_a_plate], asked, worker)  # builds the kernels
     begin = time.process_time()
-    found = pilot_of(scene, pilot, asked, worker)
+    found = pilot_of(scene, pilot, asked, worker, hits=run)
     return Road(scene, shots, found.numerics, found.kept, time.process_time() - begin)
 
 
@@ -150,7 +150,7 @@ def named(text: str, hits: int, run: int = RUN) -> Road:
     each = campaign.at_a_plate
     shots = campaign.sampler().shots(0, max(hits, pilot_size(PRESETS["standard"], run)) * each)
     pilot = shots[: pilot_size(PRESETS["standard"], run) * each]
-    return road(campaign.scene, shots[: hits * each], pilot, campaign.numerics)
+    return road(campaign.scene, shots[: hits * each], pilot, campaign.numerics, run)
 
 
 def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
@@ -160,7 +160,7 @@ def drawn_roads(seed: int, scenes: int, hits: int) -> dict[str, Road]:
         for index in range(scenes):
             case = draws(seed, index)
             pilot = case.shots(pilot_size(PRESETS["standard"], SMALL), seed=77)
-            found[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics())
+            found[f"{kind} {index}: {case.name}"] = road(case.scene, case.shots(hits), pilot, Numerics(), SMALL)
             print(f"{kind} {index}: {case.name}, pilot {found[f'{kind} {index}: {case.name}'].pilot:.1f} s", flush=True)
     return found
 
@@ -188,6 +188,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             "ratio": whole[0] / whole[1],
             "microseconds_per_hit": 1e6 * cost,
             "level": one.numerics.level,
+            "coarser": str(one.numerics.coarser or ""),
             "kept": one.kept,
             "pilot_share": one.pilot / whole[0],
         }

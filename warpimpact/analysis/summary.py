@@ -17,6 +17,7 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, shift_of
+from warpimpact.scene import Coarser
 from warpimpact.scene.display import STORED
 from warpimpact.solver.pilot_text import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -112,7 +113,9 @@ def _level_for(told: Mapping[str, Any]) -> str:
 
 
 def _level(told: Mapping[str, Any]) -> str:
-    return f"level {json.loads(told[attr.RESOLUTION])['level']}"
+    found = json.loads(told[attr.RESOLUTION])
+    coarser = Coarser(**found.get("coarser") or {})
+    return f"level {found['level']}" + (f" ({coarser})" if str(coarser) else "")
 
 
 def breaks_promise(dataset: Result) -> bool:

@@ -1,4 +1,4 @@
-"""The points over which a measured shot is integrated, which every set of parameters shares."""
+"""The points over which a measured shot is integrated: each set of parameters has points of its own."""
 
 from __future__ import annotations
 
@@ -10,53 +10,79 @@ from warpimpact.identification.fit import MeasuredShot, Sampling
 from warpimpact.identification.hits import CLASSES, Place
 from warpimpact.scene import Core, Hits, Plate, Sampler, Shots, Symmetry, symmetries_used
 from warpimpact.scene.model import Array
+from warpimpact.scene.symmetry import irreducible_part
 
 REPLICATES = 8
-"""Independent scramblings of the hit points: their spread tells how well the hits are integrated out."""
+"""Parts of the hit points, every eighth point each: their spread tells how well the hits are integrated out."""
+STEPS = 0.7548776662466927, 0.5698402909980532
+"""From one point to the next along y and z, as shares of the part of the cell, modulo 1: the powers of the root of
+x³ = x + 1, whose points leave no wide gaps (M. Roberts, "The unreasonable effectiveness of quasirandom sequences",
+2018)."""
 
 
 @dataclass(frozen=True)
 class Aim:
-    """The points over which one shot is integrated, at one scene.
+    """The points over which one shot is integrated at some sets of parameters, at one scene.
 
     Attributes:
-        shots: with all images, shape [points].
+        shots: with all images, those of one set after the other, shape [sets · points].
         group: symmetries, by which the images of a shot follow each other; `computed` are the first of each group.
-        weight: 1 where a point is of the shot's class, else 0, shape [points].
-        replicates: the computed shots are dealt out to so many independent scramblings in turn.
+        weight: 1 where a point is of the shot's class, else 0, shape [sets, points].
+        replicates: the computed shots of a set are dealt out to so many parts in turn.
+        part: extent of the part of the unit cell that the computed points cover evenly [m], and of the whole cell, each
+            along y and z; None where they do not, or differ in more than their place.
     """
 
     shots: Shots
     group: tuple[Symmetry, ...]
     weight: Array
     replicates: int
+    part: tuple[Array, Array] | None = None
 
     @property
     def computed(self) -> Shots:
         return self.shots[:: len(self.group)]
 
+    @property
+    def hits(self) -> Array:
+        """Places of the points [m], shape [sets, points, 2]."""
+        return np.stack([self.shots.hit_y, self.shots.hit_z], axis=-1).reshape(*self.weight.shape, 2)
+
     def of(self, hit: str | Place, plate: Plate, core: Core) -> Aim:
         """The same points for another class."""
         inside = CLASSES[hit](plate, core, self.shots.hit_y, self.shots.hit_z) if isinstance(hit, str) else None
-        weight = np.ones(len(self.shots)) if inside is None else inside.astype(np.float64)
+        weight = np.ones_like(self.weight) if inside is None else inside.reshape(self.weight.shape).astype(np.float64)
         return replace(self, weight=weight)
 
 
-def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling) -> Aim:
-    """Points for a shot: the same numbers at every set of parameters, spread over the cell of the plate."""
+def aim(shot: MeasuredShot, plate: Plate, core: Core, sampling: Sampling, shifts: Array) -> Aim:
+    """Points for a shot at some sets of parameters, spread over the cell of the plate.
+
+    Args:
+        shifts: uniform numbers that move the points of each set, shape [sets, 2]. So the error that few points leave
+            differs from set to set, and the weights of the sets know it.
+    """
     placed = isinstance(shot.hit, Place)
     turned = any(name != "velocity" for name, _ in shot.scatter.given)
     solid = plate.open_area == 0.0 and plate.size is None
     alone = not shot.scatter.given and (solid or (isinstance(shot.hit, Place) and shot.hit.is_exact))
     count = 1 if alone else sampling.hits
     replicates = 1 if alone else REPLICATES
-    hits = Hits(count=count, seed=sampling.seed, irreducible=not (placed or turned or alone), replicates=replicates)
-    group = symmetries_used(shot.impact, hits, plate)
-    hits = hits.model_copy(update={"count": count * len(group)})
-    sampler = Sampler(shot.impact, hits, plate, shot.scatter, replicates)
-    shots = sampler.shots(0, len(sampler))
+    alike = Hits(count=count, seed=sampling.seed, irreducible=not (placed or turned or alone))
+    group, cell = symmetries_used(shot.impact, alike, plate), np.array(plate.sampled_cell)
+    numbers = alike.model_copy(update={"irreducible": False})  # of what scatters: images share them
+    shots = Sampler(shot.impact, numbers, plate, shot.scatter).shots(0, count)
+    shares = np.mod(shifts[:, None] + np.arange(count)[:, None] * STEPS, 1.0).reshape(-1, 2).T
     if isinstance(shot.hit, Place):
-        shares = (at / side + 0.5 for at, side in zip((shots.hit_y, shots.hit_z), plate.sampled_cell, strict=True))
         hit_y, hit_z = shot.hit.at(*shares)
-        shots = replace(shots, hit_y=hit_y, hit_z=hit_z)
-    return Aim(shots, group, np.ones(len(shots)), replicates).of(shot.hit, plate, core)
+    else:
+        (low_y, high_y), (low_z, high_z) = irreducible_part(group)
+        y, z = cell[0] * (low_y + (high_y - low_y) * shares[0]), cell[1] * (low_z + (high_z - low_z) * shares[1])
+        images = np.array([symmetry.image(y, z, (cell[0], cell[1])) for symmetry in group])
+        hit_y, hit_z = images.transpose(1, 2, 0).reshape(2, -1)
+    own = np.tile(np.repeat(np.arange(count), len(group)), len(shifts))
+    shots = replace(shots[own], hit_y=hit_y, hit_z=hit_z)
+    even = not (placed or shot.scatter.given or plate.size is not None or alone)
+    part = (np.array([high_y - low_y, high_z - low_z]) * cell, cell) if even else None
+    weight = np.ones((len(shifts), count * len(group)))
+    return Aim(shots, group, weight, replicates, part).of(shot.hit, plate, core)

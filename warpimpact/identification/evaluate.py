@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 AT_A_TIME = 2**15
 """Shots per computation at most, images not counted: what is kept of them fits into some ten megabytes."""
+SCORED = 2**14
+"""Points, images counted, that are scored at a time: they fit into a cache."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +48,7 @@ class Run:
     Attributes:
         which: the sets, shape [computed sets, sets alike]: those in a row differ in the scales of discrepancy alone.
         scene: what was shot at what; quantities that differ from set to set are at their medians.
-        aim: the points, without a class.
+        aim: the points of the computed sets, without a class.
         outcomes: images included, shape [computed sets · points].
     """
 
@@ -66,26 +68,30 @@ def benches(fit: Fit) -> list[Bench]:
     return [Bench(fit.shots[places[0]], tuple(places)) for places in found.values()]
 
 
-def runs(fit: Fit, bench: Bench, points: Array, *, device: str = "auto") -> Iterator[Run]:
+def runs(fit: Fit, bench: Bench, points: Array, *, seed: int = 0, device: str = "auto") -> Iterator[Run]:
     """Compute a bench at sets of parameters.
 
     Args:
         points: standard normal numbers, one column per parameter of the fit, shape [sets, parameters].
+        seed: of the places of the hits.
     """
     alike = _alike(points[:, [one.path[0] != "discrepancy" for one in fit.parameters]])
     values = {one.path: one.at(points[alike[:, 0], column]) for column, one in enumerate(fit.parameters)}
     own = {one.path: values[one.path] for one in fit.scene_parameters if one.path not in bench.shot.own}
     columns = _as_columns(fit, own)
     of_scene = {path: column for path, column in own.items() if path not in columns}
+    shifts = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(4, seed))).random(
+        (len(alike), 2)
+    )
+    per_call = max(1, AT_A_TIME // fit.sampling.hits)
     jobs = list[_Job]()
     for rows in _of_one_scene(of_scene, len(alike)):
         scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in of_scene.items()})
-        targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling)
-        per_call = max(1, AT_A_TIME // len(targets.computed))
         for first in range(0, len(rows), per_call):
             some = rows[first : first + per_call]
+            targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, shifts[some])
             of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.layers[0])
-            jobs.append(_Job(alike[some], scene, targets, repeated(targets.computed, of_sets, len(some))))
+            jobs.append(_Job(alike[some], scene, targets, with_own(targets.computed, of_sets)))
             if sum(len(job.shots) for job in jobs) >= AT_A_TIME:
                 yield from _run(fit, bench, jobs, device)
                 jobs = []
@@ -153,15 +159,14 @@ def _of_one_scene(of_scene: Mapping[Path, Array], count: int) -> Iterator[NDArra
         yield np.flatnonzero(which == one)
 
 
-def repeated(shots: Shots, columns: Mapping[str, Array], sets: int) -> Shots:
-    """All shots with the quantities of the first set, then with those of the second, and so on.
+def with_own(shots: Shots, columns: Mapping[str, Array]) -> Shots:
+    """Shots of some sets, equally many each and one set after the other, with the quantities of their sets.
 
     Args:
         columns: by the name of the quantity, each of shape [sets].
     """
-    again = shots[np.tile(np.arange(len(shots)), sets)]
-    own: dict[str, Any] = {name: np.repeat(column, len(shots)) for name, column in columns.items()}
-    return replace(again, **own)
+    own: dict[str, Any] = {name: np.repeat(column, len(shots) // len(column)) for name, column in columns.items()}
+    return replace(shots, **own)
 
 
 def data_of(fit: Fit, shot: MeasuredShot) -> Data:
@@ -183,7 +188,7 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
 
     Args:
         points: standard normal numbers, shape [sets, parameters].
-        seed: of the hits that are kept.
+        seed: of the places of the hits, and of those that are kept.
 
     Returns:
         One score per shot, over the sets.
@@ -192,15 +197,29 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
     scored: dict[int, list[tuple[NDArray[np.int64], Score]]] = {place: [] for place in range(len(fit.shots))}
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(1, seed)))
     for bench in benches(fit):
-        for run in runs(fit, bench, points, device=device):
+        for run in runs(fit, bench, points, seed=seed, device=device):
             for place in bench.which:
                 shot = fit.shots[place]
                 own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
                 compared = Compared.of(data_of(fit, shot), own, run.outcomes)
-                for which in run.which.T:
-                    some = {kind: scale[which] for kind, scale in scales.items()}
-                    scored[place].append((which, compared.score(some, rng)))
+                scored[place] += _scored(compared, run.which, scales, rng)
     return [_in_order(parts) for parts in scored.values()]
+
+
+def _scored(
+    compared: Compared, which: NDArray[np.int64], scales: Mapping[str, Array], rng: np.random.Generator
+) -> Iterator[tuple[NDArray[np.int64], Score]]:
+    """Some sets of a run at a time, and their score.
+
+    Args:
+        which: as in `Run`.
+        scales: of all sets, by kind.
+    """
+    alike, at_a_time = which.shape[1], max(1, SCORED // compared.counts.shape[1])
+    for first in range(0, which.size, at_a_time):
+        some = which.reshape(-1)[first : first + at_a_time]
+        own = {kind: scale[some] for kind, scale in scales.items()}
+        yield some, compared.score(own, rng, np.arange(first, first + len(some)) // alike)
 
 
 def _in_order(parts: list[tuple[NDArray[np.int64], Score]]) -> Score:

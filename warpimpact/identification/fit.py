@@ -32,10 +32,10 @@ class Sampling(Model):
     """
 
     sets: Annotated[int, Field(strict=True, ge=64, le=2**20)] = 4096
-    hits: Annotated[int, Field(strict=True, ge=32, le=2**16, multiple_of=8)] = 512
+    hits: Annotated[int, Field(strict=True, ge=32, le=2**16, multiple_of=8)] = 256
     draws: Annotated[int, Field(strict=True, ge=50, le=2**16)] = 1000
     effective: Annotated[int, Field(strict=True, ge=10, le=2**16)] = 400
-    shared: Annotated[int, Field(strict=True, ge=1, le=64)] = 4
+    shared: Annotated[int, Field(strict=True, ge=1, le=64)] = 1
     seed: Annotated[int, Field(strict=True, ge=0, lt=2**63)] = 0
 
 

@@ -21,9 +21,11 @@ from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
 
-FIRST_SHARE, ROUNDS = 0.25, 8
-"""Share of the sets that is drawn from the prior, and how many rounds draw the others."""
-DISCREPANCIES = 4
+FIRST, FIRST_SHARE = 192, 0.25
+"""Sets of the first round, which is drawn from the prior, and the largest share of all sets that they may be."""
+GROWTH = 0.1
+"""Sets of a later round, as a share of all before it; at least half of the first round."""
+DISCREPANCIES = 8
 """Scales of discrepancy per set of parameters: they need no runs of their own."""
 BATCH = 32
 """Sets per file on the disk."""
@@ -80,12 +82,14 @@ def sample(fit: Fit, *, device: str = "auto", store: Store | None = None, progre
     plan, follow = fit.sampling, progress or (lambda now: None)
     sampler = ImportanceSampler(len(fit.parameters), shared(fit), plan.seed)
     work = _Work(fit, device, store, follow)
+    checked = False
     for count in rounds(plan):
         points = sampler.propose(count)
         sampler.tell(work.round(points))
         weights = sampler.weighed()
-        if len(sampler.points) == count:
+        if not checked and work.done >= FIRST_SHARE * plan.sets - plan.shared:
             _check_reach(fit, work.scores())
+            checked = True
         effective = weights.effective(DISCREPANCIES)
         work.tell(effective, weights.pareto_k)
         if effective >= plan.effective and weights.pareto_k <= LARGEST_K:
@@ -101,11 +105,11 @@ def shared(fit: Fit) -> list[tuple[int, int]]:
 
 def rounds(plan: Sampling) -> list[int]:
     """Draws of the first round, from the prior, and of the others; whole blocks."""
-    block = plan.shared * DISCREPANCIES
     blocks = plan.sets // plan.shared
-    first = max(1, int(FIRST_SHARE * blocks))
-    each = max(1, (blocks - first) // ROUNDS)
-    return [first * block, *[each * block] * ROUNDS]
+    counts = [max(1, int(min(FIRST / plan.shared, FIRST_SHARE * blocks)))]
+    while (left := blocks - sum(counts)) > 0:
+        counts.append(min(left, max(1, counts[0] // 2, int(GROWTH * sum(counts)))))
+    return [count * plan.shared * DISCREPANCIES for count in counts]
 
 
 class _Work:

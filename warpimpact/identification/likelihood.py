@@ -5,6 +5,9 @@
 over points h of the cell: w is 1 in the class of the hit, S is 1 where the shot would have been measured (selection), σ
 is the uncertainty of the measurement and δ the discrepancy of the model. Given the parameters, shots are independent:
 their ln L add up. So are the discrepancies of different numbers; a bias that all shots share is not part of the model.
+
+A point stands for its share of the cell, over which numbers follow a plane (between.py). So the covariance of N is
+σ² + δ² along the diagonal, and C Cᵀ, where C are the changes of the numbers over a standard deviation along y and z.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.identification.aim import Aim
+from warpimpact.identification.between import changes, signs
 from warpimpact.identification.measured import Observation
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
@@ -100,8 +104,8 @@ class Compared:
     """Computed shots beside a measured one, before any scale of discrepancy; SI and radians.
 
     Attributes:
-        computed: numbers of all points, shape [sets, points, observations]; `missed` is the square of computed less
-            measured.
+        computed: numbers of all points, shape [sets, points, observations]; `missed` is computed less measured.
+        changes: of the numbers about each computed point, shape [sets, computed points, 2, observations].
         possible: where the shot ended as the measured one did, with all its numbers, shape [sets, points].
         counts: weight of each point, 0 where the shot would not have been measured, shape [sets, points].
     """
@@ -110,6 +114,7 @@ class Compared:
     aim: Aim
     computed: Array
     missed: Array
+    changes: Array
     possible: NDArray[np.bool_]
     counts: Array
 
@@ -120,49 +125,72 @@ class Compared:
         Args:
             outcomes: of all points of the aim at one set after the other, images included, shape [sets · points].
         """
-        points = len(aim.weight)
-        sets = len(outcomes.status) // points
+        sets, points = aim.weight.shape
         computed = np.empty((sets, points, len(data.observations)))
         for place, one in enumerate(data.observations):
             computed[:, :, place] = one.of(outcomes).reshape(sets, points)
             if one.is_limit:
                 computed[:, :, place] = _median(computed[:, :, place], aim.weight)
         counts = aim.weight * _counted(data, outcomes).reshape(sets, points)
-        missed = data.miss(computed) ** 2
+        missed = data.miss(computed)
         possible = (counts > 0.0) & ~np.isnan(missed).any(axis=-1)
         if data.status is not None:
             possible &= outcomes.status.reshape(sets, points) == STATUSES[data.status]
-        return cls(data, aim, computed, missed, possible, counts)
+        return cls(data, aim, computed, missed, changes(data.observations, aim, computed), possible, counts)
 
-    def score(self, discrepancy: Mapping[str, Array], rng: np.random.Generator) -> Score:
+    def score(
+        self, discrepancy: Mapping[str, Array], rng: np.random.Generator, of: NDArray[np.int64] | None = None
+    ) -> Score:
         """Score the sets with scales of discrepancy.
 
         Args:
             discrepancy: by kind, each of shape [sets].
             rng: draws the hits that are kept.
+            of: the computed sets that these sets are, which differ from them in the scales alone; shape [sets].
         """
-        spread = np.broadcast_to(self.data.spread(discrepancy), (len(self.computed), self.computed.shape[-1]))
-        log = -0.5 * (self.missed @ spread[..., None] ** -2.0)[..., 0]
-        log = log - np.log(np.sqrt(2.0 * np.pi) * spread).sum(axis=-1)[:, None]
-        log = np.where(self.possible, log, -np.inf)
-        log_likelihood, noise = _integrated(log, self.counts, self.aim)
+        row = np.arange(len(self.computed)) if of is None else of
+        spread = np.broadcast_to(self.data.spread(discrepancy), (len(row), self.computed.shape[-1]))
+        log = np.where(self.possible[row], self._log_density(spread, row), -np.inf)
+        log_likelihood, noise, relative = _integrated(log, self.counts[row], self.aim)
         stds = np.array([one.std for one in self.data.observations])
-        misfits = np.where(self.possible, self.missed @ stds**-2.0, np.inf)
-        nearest, row = misfits.argmin(axis=1), np.arange(len(misfits))
-        hits = np.stack([self.aim.shots.hit_y, self.aim.shots.hit_z], axis=-1)
-        relative = np.exp(log - np.where(np.isfinite(log), log, -1e300).max(axis=1, keepdims=True))
-        fitted, ahead = _drawn(relative, rng), _drawn(self.counts, rng)
+        misfits = np.where(self.possible, self.missed**2 @ stds**-2.0, np.inf)
+        nearest = misfits.argmin(axis=1)[row]
+        hits = self.aim.hits
+        fitted, ahead = _drawn(relative, rng), _drawn(self.counts[row], rng)
         errors = spread[:, None] * rng.standard_normal((len(row), KEPT, spread.shape[-1]))
         return Score(
             log_likelihood=log_likelihood,
             noise=noise,
             misfit=misfits[row, nearest],
             best=self.computed[row, nearest],
-            best_hit=hits[nearest],
+            best_hit=hits[row, nearest],
             fitted=self.computed[row[:, None], fitted],
-            fitted_hit=hits[fitted],
+            fitted_hit=hits[row[:, None], fitted],
             predicted=self.computed[row[:, None], ahead] + errors,
         )
+
+    def _log_density(self, spread: Array, row: NDArray[np.int64]) -> Array:
+        """ln N(measured | about each point), shape [sets, points].
+
+        Args:
+            spread: shape [sets, observations].
+            row: as `of` in `score`.
+        """
+        points, numbers = self.missed.shape[1:]
+        images = len(self.aim.group)
+        scaled = self.changes[row] / spread[:, None, None]
+        miss = self.missed[row].reshape(len(row), points // images, images, numbers) / spread[:, None, None]
+        # With unit variances, |I + C Cᵀ| = |I + Cᵀ C| and (I + C Cᵀ)⁻¹ = I − C (I + Cᵀ C)⁻¹ Cᵀ.
+        yy, zz = 1.0 + (scaled**2).sum(axis=-1).transpose(2, 0, 1)
+        yz = (scaled[..., 0, :] * scaled[..., 1, :]).sum(axis=-1)
+        determinant = yy * zz - yz**2
+        along = (miss * signs(self.data.observations, self.aim.group)) @ scaled.swapaxes(-1, -2)
+        along_y, along_z = along[..., 0], along[..., 1]
+        explained = zz[..., None] * along_y**2 - 2.0 * yz[..., None] * along_y * along_z + yy[..., None] * along_z**2
+        squares = (miss**2).sum(axis=-1) - explained / determinant[..., None]
+        scale = np.log(np.sqrt(2.0 * np.pi) * spread).sum(axis=-1)[:, None, None]
+        log: Array = -0.5 * (squares + np.log(determinant)[..., None]) - scale
+        return log.reshape(len(row), points)
 
 
 def score(
@@ -194,23 +222,24 @@ def holds(condition: Measure, outcomes: Outcomes, standoffs: Sequence[float]) ->
 
 def _median(values: Array, weight: Array) -> Array:
     """Median over the points of the class, shape [sets, 1]; NaN without such a point."""
-    inside = values[:, weight > 0.0]
-    return np.median(inside, axis=1, keepdims=True) if inside.size else np.full((len(values), 1), np.nan)
+    medians = [
+        np.median(own[inside]) if inside.any() else np.nan for own, inside in zip(values, weight > 0.0, strict=True)
+    ]
+    return np.array(medians)[:, None]
 
 
-def _integrated(log: Array, counts: Array, aim: Aim) -> tuple[Array, Array]:
-    """ln of the mean over the points, and its standard error from the spread of the replicates; both [sets]."""
+def _integrated(log: Array, counts: Array, aim: Aim) -> tuple[Array, Array, Array]:
+    """ln of the mean over the points, and its standard error from the spread of the replicates, both of shape [sets];
+    what each point contributes to the mean, as a share of the largest, shape [sets, points]."""
     highest = np.where(np.isfinite(log), log, -1e300).max(axis=1)
     relative = np.exp(log - highest[:, None]) * counts
     total = counts.sum(axis=1)
-    images = len(aim.group)
-    replicate = np.arange(log.shape[1]) // images % aim.replicates
-    sums = np.stack([relative[:, replicate == one].sum(axis=1) for one in range(aim.replicates)])
+    sums = relative.reshape(len(log), -1, aim.replicates, len(aim.group)).sum(axis=(1, 3)).T
     with np.errstate(divide="ignore", invalid="ignore"):
         log_likelihood = np.where(total > 0.0, highest + np.log(relative.sum(axis=1) / total), -np.inf)
         spread = sums.std(axis=0, ddof=1) / sums.mean(axis=0) if aim.replicates > 1 else np.zeros(len(log))
     log_likelihood = np.where(highest > -1e300, log_likelihood, -np.inf)
-    return log_likelihood, np.nan_to_num(spread / np.sqrt(aim.replicates), nan=np.inf)
+    return log_likelihood, np.nan_to_num(spread / np.sqrt(aim.replicates), nan=np.inf), relative
 
 
 def _drawn(weights: Array, rng: np.random.Generator) -> NDArray[np.int64]:

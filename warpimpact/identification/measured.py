@@ -76,7 +76,10 @@ class Observation:
 
     def miss(self, computed: Array) -> Array:
         """Computed less measured, of the same shape; an angle the short way round."""
-        difference = computed - self.value
+        return self.shortest(computed - self.value)
+
+    def shortest(self, difference: Array) -> Array:
+        """A difference of two such numbers; of angles the short way round."""
         return np.remainder(difference + np.pi, 2.0 * np.pi) - np.pi if self.kind == "angle" else difference
 
 

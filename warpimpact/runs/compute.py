@@ -57,7 +57,8 @@ class HitMap:
         if campaign.numerics.explicit is not None:
             return None
         pilot = pilot_shots(campaign, pilot_most(campaign))
-        found = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, excess_of_stop(campaign))
+        hits = len(campaign.sampler()) // len(campaign.symmetries)
+        found = pilot_of(campaign.scene, pilot, campaign.numerics, worker, trying, excess_of_stop(campaign), hits)
         return replace(found, shifts=shifts_of(campaign, pilot, found), tried=())
 
     def found_in(self, result: Result) -> HitErrors | None:

@@ -176,4 +176,6 @@ def _asked(campaign: Campaign) -> str:
     numerics = campaign.numerics
     if numerics.explicit is None:
         return "accuracy in numbers" if numerics.accuracy is not None else f"{numerics.fidelity} fidelity"
-    return "given resolution" if numerics.level is None else f"level {numerics.level}"
+    if numerics.level is None:
+        return "given resolution"
+    return f"level {numerics.level}" + (f" ({numerics.coarser})" if numerics.coarser else "")

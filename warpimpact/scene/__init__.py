@@ -7,7 +7,7 @@ imports no other room: neither a kernel nor a Dataset.
 from .burst import Burst, BurstSampler
 from .core import AnyCore, ConeCore, Core, MassProperties, OgiveCore, PolynomialCore, ProfileCore
 from .interaction import Interaction
-from .numerics import PRESETS, Accuracy, Numerics
+from .numerics import PRESETS, Accuracy, Coarser, Numerics
 from .patterns import (
     AnyPattern,
     CirclePattern,

@@ -8,6 +8,9 @@ from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, mod
 from .model import Model
 from .units import PositiveAngle, PositiveLength, PositiveSpeed, PositiveTime
 
+AtLevel = Annotated[int, Field(strict=True, ge=0, le=9)]
+"""A level of the ladder of resolutions."""
+
 
 class _AsGiven(Model):
     """A model that writes only the keys that were given."""
@@ -71,6 +74,24 @@ PRESETS = {"draft": _preset(0.2, 0.02), "standard": _preset(1.0, 0.006), "refere
 """What a fidelity stands for."""
 
 
+class Coarser(_AsGiven):
+    """Levels of single settings, where a coarser one than the level of all is enough.
+
+    Attributes:
+        along, around: of the patches along the core and around it.
+        grid: of the plate grid.
+        step: of the way per time step.
+    """
+
+    along: AtLevel | None = None
+    around: AtLevel | None = None
+    grid: AtLevel | None = None
+    step: AtLevel | None = None
+
+    def __str__(self) -> str:
+        return ", ".join(f"{name} {level}" for name, level in self if level is not None)
+
+
 class Numerics(_AsGiven):
     """What resolution to compute with: an accuracy, for which a pilot finds it, or a level and single settings.
 
@@ -81,6 +102,8 @@ class Numerics(_AsGiven):
         level: of the ladder of resolutions, 0 (coarse) to 9, in place of an accuracy: no pilot chooses, and nothing is
             promised. A single setting below does that, too; the others are then those of the level, or of the coarsest
             one at which the accuracy would be looked for.
+        coarser: coarser levels of single settings beside `level`: `along` and `around` (patches), `grid` and `step`. A
+            pilot of a long run finds them where they keep the promise, too.
         scheme: "consistent", or "nodal" for the paper's literal scheme (docs/model.md §4).
         time_step: length of a step [s].
         travel: way per time step at impact velocity, as a share of the thickness of the plate, in place of time_step.
@@ -96,7 +119,8 @@ class Numerics(_AsGiven):
 
     fidelity: Literal["draft", "standard", "reference"] = "standard"
     accuracy: Accuracy | None = None
-    level: Annotated[int, Field(strict=True, ge=0, le=9)] | None = None
+    level: AtLevel | None = None
+    coarser: Coarser | None = None
     scheme: Literal["consistent", "nodal"] = "consistent"
     time_step: PositiveTime | None = None
     travel: Annotated[float, Field(gt=0.0, le=2.0)] | None = None
@@ -123,6 +147,10 @@ class Numerics(_AsGiven):
         other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
         if "fidelity" in self.model_fields_set and other is not None:
             raise ValueError(f"fidelity and {other} cannot be combined: each sets the resolution")
+        finer = [name for name, own in self.coarser or () if own is not None and own > (self.level or 0)]
+        if self.coarser is not None and (self.level is None or finer):
+            ill = f"{finer[0]} is finer than level {self.level}" if self.level is not None else "there is no level"
+            raise ValueError(f"coarser gives levels below level, but {ill}")
         if self.accuracy is not None and self.explicit is not None:
             raise ValueError(f"{self.explicit} and accuracy cannot be combined: each sets the resolution")
         if self.travel is not None and (self.time_step is not None or self.scheme == "nodal"):

@@ -23,7 +23,7 @@ from warpimpact.solver.limit_search import Guess, Search
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.resolution import LADDER, at_level
+from warpimpact.solver.resolution import at_level, level_of
 from warpimpact.solver.simulate import computed, spread, spread_places
 from warpimpact.solver.worker import Worker
 
@@ -297,7 +297,7 @@ def short_steps(numerics: Numerics) -> Numerics:
     """Numerics as limits need them: a level has steps that are STEPS times shorter."""
     if numerics.level is None or numerics.travel is not None or numerics.explicit == "scheme" or numerics.time_step:
         return numerics
-    return numerics.model_copy(update={"travel": LADDER[numerics.level].travel / STEPS})
+    return numerics.model_copy(update={"travel": level_of(numerics).travel / STEPS})
 
 
 def check_arrests(scene: Scene, shots: Shots | None = None) -> None:

@@ -131,7 +131,8 @@ def pilot_hits(
         for whole in (False, True) if len(rest) else (False,):
             shots = pilot if whole else some
             pair = computed(index, whole), computed(finer, whole)
-            found, excess, nearly = _judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
+            found, excess, weighed = judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
+            nearly = weighed <= 1.0
             if excess_of is not None:
                 excess, nearly = excess_of(*pair, shots), False
                 found = replace(found, kept=excess <= 1.0)
@@ -152,7 +153,7 @@ def pilot_hits(
     return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
 
 
-def _judged(
+def judged(
     coarse: Outcomes,
     fine: Outcomes,
     shots: Shots,
@@ -160,25 +161,34 @@ def _judged(
     accuracy: Accuracy,
     margin: float,
     free: Sequence[bool],
-) -> tuple[HitErrors, float, bool]:
-    """What is known of a level from some shots: the finding, its errors over what is allowed, and whether it nearly
-    keeps the promise."""
+    between: Outcomes | None = None,
+) -> tuple[HitErrors, float, float]:
+    """What is known of a resolution from some shots: the finding, its errors over what is allowed, and the same with
+    errors weighed by the energy of slow cores.
+
+    Args:
+        margin: how many times the change to the fine outcomes the error is at most.
+        between: outcomes at a level between, if the margin is that level's. What it has beyond 1 is then the error of
+            the fine outcomes, over the change from there.
+    """
+
+    def upper(impact: Array | None, relative: tuple[float, float]) -> Array:
+        told = (shots.at_a_plate, accuracy.share, impact, relative, free)
+        if between is None:
+            return margin * upper_errors(coarse, fine, *told)
+        return upper_errors(coarse, fine, *told) + (margin - 1.0) * upper_errors(between, fine, *told)
+
     layered = LAYER_RESIDUAL_VELOCITY in coarse
     relative = (accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt)
-    told, counted, weighed = (
-        margin * upper_errors(coarse, fine, shots.at_a_plate, accuracy.share, impact, given, free)
-        for impact, given in (
-            (None, (0.0, 0.0)),
-            (None, relative if layered else (0.0, 0.0)),
-            (shots.velocity, relative if layered else (0.0, 0.0)),
-        )
-    )
+    if not layered:
+        relative = (0.0, 0.0)
+    told, counted, weighed = upper(None, (0.0, 0.0)), upper(None, relative), upper(shots.velocity, relative)
     status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
     excess = _excess(accuracy, counted, layered)
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in told)
     found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
-    return found, excess, _excess(accuracy, weighed, layered) <= 1.0
+    return found, excess, _excess(accuracy, weighed, layered)
 
 
 def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:

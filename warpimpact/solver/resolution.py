@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpimpact.scene import Impact, Numerics, Plate, Scene, Shots, Target
+from warpimpact.scene import Coarser, Impact, Numerics, Plate, Scene, Shots, Target
 from warpimpact.scene.patterns import NoPattern
 from warpimpact.scene.quantities import BY_LAYER
 from warpimpact.solver.materials import Materials, decay_rate
@@ -95,10 +95,19 @@ NODAL: dict[str, Any] = {
 """The paper's own resolution; its time step is the one that meets its rows (docs/model.md §4)."""
 
 
-def at_level(index: int, numerics: Numerics) -> Numerics:
-    """A level of the ladder, in precision and layout of the numerics."""
+def at_level(index: int, numerics: Numerics, **coarser: int) -> Numerics:
+    """A level of the ladder, in precision and layout of the numerics; with coarser levels of single settings."""
     kept = {name: getattr(numerics, name) for name in ("precision", "layout") if name in numerics.model_fields_set}
-    return Numerics(level=index, **kept)
+    return Numerics(level=index, **kept, **({"coarser": Coarser(**coarser)} if coarser else {}))
+
+
+def level_of(numerics: Numerics) -> Level:
+    """What fills in what the numerics do not give."""
+    index, own = base_level(numerics), numerics.coarser or Coarser()
+    along, around, grid, step = (
+        LADDER[index if level is None else level] for level in (own.along, own.around, own.grid, own.step)
+    )
+    return Level(along.patches_axial, around.patches_around, grid.cells_per_length, step.travel)
 
 
 def coarsest_level(strictness: float) -> int:
@@ -209,7 +218,7 @@ def resolve(
         lengths: over which the layers weaken [m], in the place of those of the scene.
     """
     core, every = scene.core, lengths or [layer.degradation_length for layer in scene.target.layers]
-    nodal, level = numerics.scheme == "nodal", LADDER[base_level(numerics)]
+    nodal, level = numerics.scheme == "nodal", level_of(numerics)
     finest = min((length for length, does in zip(every, weakening, strict=True) if does), default=every[0])
     width = level.patch_width * finest if any(weakening) else math.inf
     defaults: dict[str, Any] = {

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
+from warpimpact.solver.easing import eased, worth_easing
 from warpimpact.solver.findings import Cost, HitErrors
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
@@ -56,9 +57,8 @@ def simulate(
         return computed(prepare(scene, some, at), worker, progress)
 
     if numerics.explicit is None:
-        pilot, asked = spread(shots, pilot_size(numerics.asked, len(shots))), numerics
-        found = pilot_hits(lambda level, some: outcomes(some, at_level(level, asked)), pilot, asked, scene.free_behind)
-        numerics = found.numerics
+        pilot = spread(shots, pilot_size(numerics.asked, len(shots)))
+        numerics = pilot_of(scene, pilot, numerics, worker, hits=len(shots)).numerics
     return outcomes(shots, numerics, progress)
 
 
@@ -81,32 +81,41 @@ def pilot_of(
     worker: Worker,
     trying: Callable[[int], object] = lambda level: None,
     excess_of: Excess | None = None,
+    hits: int = 0,
 ) -> HitErrors:
-    """Find the level of resolution for an accuracy (solver/pilot.py).
+    """Find the resolution for an accuracy: the level (solver/pilot.py), and for a long run coarser levels of single
+    settings (solver/easing.py).
 
     Args:
         pilot: some of the shots.
         trying: called with every level that is computed.
         excess_of: as in `pilot_hits`.
+        hits: of the run that the resolution is for.
     """
 
-    seconds: dict[int, float] = {}
+    seconds: dict[Numerics, float] = {}
 
-    def outcomes_at(level: int, some: Shots) -> Outcomes:
-        trying(level)
-        memory = Memory(prepare(scene, some, at_level(level, numerics)), find_device(worker.device))
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        assert at.level is not None
+        trying(at.level)
+        memory = Memory(prepare(scene, some, at), find_device(worker.device))
         memory.build()
         begin = time.perf_counter()
         outcomes = marched(memory, worker)
-        seconds[level] = (time.perf_counter() - begin) / len(some)
+        seconds[at] = (time.perf_counter() - begin) / len(some)
         return outcomes
 
-    found = pilot_hits(outcomes_at, pilot, numerics, scene.free_behind, excess_of)
-    if not found.tried or found.numerics.level is None:
+    def at_one(level: int, some: Shots) -> Outcomes:
+        return outcomes_at(at_level(level, numerics), some)
+
+    found = pilot_hits(at_one, pilot, numerics, scene.free_behind, excess_of)
+    if not found.tried:
         return found
     first = found.tried[0][0]
+    if excess_of is None and worth_easing(found, hits):
+        found = eased(found, outcomes_at, pilot, numerics, scene.free_behind)
     assert first.numerics.level is not None
-    cost = Cost(seconds[found.numerics.level], seconds[first.numerics.level], first.numerics.level, first.errors)
+    cost = Cost(seconds[found.numerics], seconds[first.numerics], first.numerics.level, first.errors)
     return replace(found, cost=cost)
 
 

@@ -1,90 +1,30 @@
 """Adaptive importance sampling of a posterior whose prior is standard normal, and how far its weights can be trusted.
 
-Rounds of draws: the first from the prior, later ones from a Student's t distribution with mean and covariance of the
-weighted draws so far. All draws of all rounds count, weighted by prior · likelihood over the mixture of all proposals
-(Cornuet, Marin, Mira and Robert, "Adaptive multiple importance sampling", 2012). The largest weights are smoothed, and
-their Pareto index k says whether they can be trusted (Vehtari, Simpson, Gelman, Yao and Gabry, "Pareto smoothed
-importance sampling", 2024).
+Rounds of draws: the first from the prior, later ones from a mixture of Student's t distributions that is fitted to the
+weighted draws so far (mixture.py). All draws of all rounds count, weighted by prior · likelihood over the mixture of
+all proposals (Cornuet, Marin, Mira and Robert, "Adaptive multiple importance sampling", 2012). The largest weights are
+smoothed, and their Pareto index k says whether they can be trusted (Vehtari, Simpson, Gelman, Yao and Gabry, "Pareto
+smoothed importance sampling", 2024).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.statistics.mixture import Mixture, Shared, fitted, log_prior, normal_numbers
+
 Array = NDArray[np.float64]
 
-FREEDOM = 5.0
-"""Degrees of freedom of a proposal: its tails are heavier than a posterior's, so that no weight is without bound."""
-FROM_PRIOR = 0.1
-"""Share of later rounds that is drawn from the prior."""
-FEWEST_PER_DIMENSION = 10
-"""Effective draws per dimension that a round is shaped by; where weights give fewer, they are tempered."""
+FEWEST_PER_DIMENSION = 5
+"""Effective blocks of draws per dimension that a round is shaped by; where weights give fewer, they are tempered."""
 LARGEST_K = 0.7
 """Pareto index up to which weights can be trusted."""
 _FEWEST_TAIL = 5
-
-
-Shared = Sequence[tuple[int, int]]
-"""How many of the first numbers are the same within blocks of how many draws, such as ((3, 16), (6, 4))."""
-
-
-def _with_shared(numbers: Array, shared: Shared) -> Array:
-    """Draws whose first numbers are those of the first draw of their block."""
-    numbers = numbers.copy()
-    for first, block in sorted(shared, reverse=True):  # blocks that share less are larger
-        of = np.arange(len(numbers)) // block * block
-        numbers[:, :first] = numbers[of, :first]
-    return numbers
-
-
-@dataclass(frozen=True)
-class Student:
-    """Student's t distribution, mixed with FROM_PRIOR of the prior.
-
-    One with the whole covariance was measured to give more effective draws than mixtures of narrower kernels about the
-    draws of large weight: these are few at first, and a mixture of few is rough.
-
-    Attributes:
-        centre: shape [dimensions].
-        factor: lower Cholesky factor of its scale matrix, shape [dimensions, dimensions].
-    """
-
-    centre: Array
-    factor: Array
-
-    def draw(self, rng: np.random.Generator, count: int, shared: Shared) -> Array:
-        """Draws in blocks that share their first numbers, shape [count, dimensions].
-
-        Within a block the scale and the first normal numbers are the same. As the factor is triangular, so are the
-        first numbers of the draws; each draw alone still has the whole distribution.
-        """
-        largest = max((block for _, block in shared), default=1)
-        blocks = -(-count // largest)
-        of = np.repeat(np.arange(blocks), largest)[:count]
-        normal = _with_shared(rng.standard_normal((count, len(self.centre))), shared)
-        scale = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, blocks))[of]
-        from_prior = (rng.random(blocks) < FROM_PRIOR)[of]
-        own = self.centre + scale[:, None] * (normal @ self.factor.T)
-        return np.where(from_prior[:, None], normal, own)
-
-    def log_density(self, points: Array) -> Array:
-        """Logarithm of the density at points, shape [points]."""
-        from scipy.stats import multivariate_t
-
-        own = multivariate_t.logpdf(points, self.centre, self.factor @ self.factor.T, FREEDOM)
-        density: Array = np.logaddexp(math.log1p(-FROM_PRIOR) + own, math.log(FROM_PRIOR) + log_prior(points))
-        return density
-
-
-def log_prior(points: Array) -> Array:
-    """Logarithm of the standard normal density, shape [points]."""
-    return np.asarray(-0.5 * (points**2).sum(axis=1) - 0.5 * points.shape[1] * math.log(2.0 * math.pi))
 
 
 @dataclass
@@ -102,7 +42,7 @@ class ImportanceSampler:
     seed: int
     points: Array = field(init=False)
     log_likelihood: Array = field(init=False)
-    _proposals: list[tuple[int, Student | None]] = field(init=False, default_factory=list)
+    _proposals: list[tuple[int, Mixture | None]] = field(init=False, default_factory=list)
     _densities: list[Array] = field(init=False, default_factory=list)
     """Logarithm of every proposal's density at the points, as many of them as were there when it was last asked."""
 
@@ -114,9 +54,9 @@ class ImportanceSampler:
         """The points of the next round, shape [count, dimensions]."""
         sequence = np.random.SeedSequence(self.seed, spawn_key=(len(self._proposals),))
         rng = np.random.default_rng(sequence)
-        student = self._student() if len(self.points) else None
-        new = self._from_prior(rng, count) if student is None else student.draw(rng, count, self.shared)
-        self._proposals.append((count, student))
+        mixture = self._mixture(rng) if len(self.points) else None
+        new = self._from_prior(rng, count) if mixture is None else mixture.draw(rng, count, self.shared)
+        self._proposals.append((count, mixture))
         self.points = np.concatenate([self.points, new])
         return new
 
@@ -129,31 +69,26 @@ class ImportanceSampler:
         from scipy.stats.qmc import Sobol
 
         uniform = Sobol(self.dimensions, rng=rng).random(1 << (count - 1).bit_length())[:count]
-        uniform = _with_shared(uniform, self.shared)
-        normal: Array = ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31))
-        return normal
+        return normal_numbers(ndtri(np.clip(uniform, 2.0**-31, 1.0 - 2.0**-31)), self.shared, rng)
 
-    def _student(self) -> Student | None:
+    def _mixture(self, rng: np.random.Generator) -> Mixture | None:
         """The proposal of the next round; None where no draw has a likelihood."""
         raw = self._raw()
         if not np.isfinite(raw).any():
             return None
-        weights = _tempered(raw, FEWEST_PER_DIMENSION * self.dimensions)
-        centre = weights @ self.points
-        apart = self.points - centre
-        covariance = (weights[:, None] * apart).T @ apart + 1e-6 * np.eye(self.dimensions)
-        factor: Array = np.linalg.cholesky(covariance).astype(np.float64)
-        return Student(centre, factor)
+        block = min((block for _, block in self.shared), default=1)
+        weights = _tempered(raw, FEWEST_PER_DIMENSION * self.dimensions, block)
+        return fitted(self.points, weights, _effective(weights, block), rng)
 
     def _raw(self) -> Array:
         """Logarithms of the weights, not normalised."""
         from scipy.special import logsumexp
 
         total = sum(count for count, _ in self._proposals)
-        for place, (_, student) in enumerate(self._proposals):
+        for place, (_, mixture) in enumerate(self._proposals):
             known = self._densities[place] if place < len(self._densities) else np.empty(0)
             new = self.points[len(known) :]
-            at_new = log_prior(new) if student is None else student.log_density(new)
+            at_new = log_prior(new) if mixture is None else mixture.log_density(new)
             self._densities[place : place + 1] = [np.concatenate([known, at_new])]
         terms = [
             math.log(count / total) + density
@@ -187,12 +122,17 @@ class Weights:
 
     def effective(self, block: int = 1) -> float:
         """Effective sample size; draws of a block count as one, since they share most of their numbers."""
-        return effective_size(np.add.reduceat(self.values, np.arange(0, len(self.values), block)))
+        return _effective(self.values, block)
 
 
 def effective_size(weights: Array) -> float:
     """Number of draws of equal weight that tell as much (Kish)."""
     return float(weights.sum() ** 2 / (weights**2).sum())
+
+
+def _effective(weights: Array, block: int) -> float:
+    """Effective size of draws of which those of a block count as one."""
+    return effective_size(np.add.reduceat(weights, np.arange(0, len(weights), block)))
 
 
 def resampled(weights: Array, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
@@ -203,21 +143,21 @@ def resampled(weights: Array, count: int, rng: np.random.Generator) -> NDArray[n
     return chosen
 
 
-def _tempered(raw: Array, effective: float) -> Array:
-    """Normalised weights to the largest power up to 1 that leaves them this effective size."""
+def _tempered(raw: Array, effective: float, block: int) -> Array:
+    """Normalised weights to the largest power up to 1 that leaves them this effective size by blocks."""
 
     def at(power: float) -> Array:
         log = np.where(np.isfinite(raw), power * raw, -np.inf)
         weights: Array = np.exp(log - log.max())
         return np.asarray(weights / weights.sum())
 
-    wanted = min(effective, 0.5 * np.isfinite(raw).sum())
+    wanted = min(effective, 0.5 * np.isfinite(raw).sum() / block)
     low, high = 0.0, 1.0
-    if effective_size(at(1.0)) >= wanted:
+    if _effective(at(1.0), block) >= wanted:
         return at(1.0)
     for _ in range(40):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if effective_size(at(middle)) >= wanted else (low, middle)
+        low, high = (middle, high) if _effective(at(middle), block) >= wanted else (low, middle)
     return at(low)
 
 

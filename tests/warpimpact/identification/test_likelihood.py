@@ -31,18 +31,19 @@ def outcomes_of(velocity: np.ndarray, angle: np.ndarray, status: Any = Status.PE
     return Outcomes(**columns | {"status": np.broadcast_to(np.int8(status), count), "residual_velocity": velocity})
 
 
-def aim_of(weight: np.ndarray, replicates: int = 8) -> Aim:
-    zeros = np.zeros(len(weight))
+def aim_of(weight: np.ndarray, replicates: int = 8, sets: int = 2) -> Aim:
+    zeros = np.zeros(sets * len(weight))
     shots = Shots(
         **dict.fromkeys(("velocity", "obliquity", "azimuth", "pitch", "yaw", "spin"), zeros),
-        hit_y=np.arange(float(len(weight))),
+        hit_y=np.tile(np.arange(float(len(weight))), sets),
         hit_z=zeros,
     )
-    return Aim(shots, (IDENTITY,), weight, replicates)
+    return Aim(shots, (IDENTITY,), np.tile(weight, (sets, 1)), replicates)
 
 
 VELOCITY = Observation("residual_velocity", None, None, 600.0, 10.0)
 YAW = Observation("yaw", 0, 0.05, np.radians(170.0), np.radians(3.0))
+SHIFTS = np.array([[0.2, 0.7]])
 SCALES = {"velocity": np.array([0.0, 5.0]), "angle": np.radians([0.0, 4.0])}
 
 
@@ -94,7 +95,7 @@ def test_a_selection_conditions_the_likelihood(computed: Outcomes) -> None:
         )
         scales = {kind: scale[[one]] for kind, scale in SCALES.items()}
         by_hand = score(
-            Data((VELOCITY,), None), aim_of(np.ones(inside[one].sum()), 1), alone, scales, np.random.default_rng(0)
+            Data((VELOCITY,), None), aim_of(np.ones(inside[one].sum()), 1, 1), alone, scales, np.random.default_rng(0)
         )
         assert found[one] == pytest.approx(by_hand.log_likelihood[0])
 
@@ -123,7 +124,7 @@ def test_kept_hits_follow_their_posterior() -> None:
     scales = {"velocity": np.zeros(sets), "angle": np.zeros(sets)}
     data = Data((VELOCITY,), None)
     found = score(
-        data, aim_of(np.ones(2), 1), outcomes_of(velocity, np.zeros(2 * sets)), scales, np.random.default_rng(0)
+        data, aim_of(np.ones(2), 1, sets), outcomes_of(velocity, np.zeros(2 * sets)), scales, np.random.default_rng(0)
     )
     assert (found.fitted[..., 0] == 620.0).mean() == pytest.approx(1.0 / (1.0 + np.exp(2.0)), abs=0.01)
     assert (found.fitted_hit[..., 0] == (found.fitted[..., 0] == 620.0)).all()
@@ -135,7 +136,7 @@ def test_hits_cover_the_cell_and_know_their_class(make_fit: FitMaker) -> None:
     fit = make_fit()
     scene = fit.scene_of(fit.shots[0])
     plate, core = scene.target.layers[0], scene.core
-    points = aim(fit.shots[0], plate, core, fit.sampling)
+    points = aim(fit.shots[0], plate, core, fit.sampling, SHIFTS)
     assert len(points.group) == 4
     assert len(points.computed) == fit.sampling.hits
     share = 1.0 - np.pi * 4.0**2 / 12.0**2
@@ -151,12 +152,12 @@ def test_a_place_with_its_uncertainty_is_drawn(make_fit: FitMaker) -> None:
     place = '{ y = "6 mm", z = { distribution = "normal", mean = "5 mm", std = "0.5 mm" } }'
     fit = make_fit(('hit = "between holes"', f"hit = {place}"))
     scene = fit.scene_of(fit.shots[0])
-    points = aim(fit.shots[0], scene.target.layers[0], scene.core, fit.sampling)
+    points = aim(fit.shots[0], scene.target.layers[0], scene.core, fit.sampling, SHIFTS)
     assert (points.shots.hit_y == 6e-3).all()
     assert points.shots.hit_z.mean() == pytest.approx(5e-3, abs=5e-5)
     assert points.shots.hit_z.std() == pytest.approx(0.5e-3, rel=0.1)
     exact = make_fit(('hit = "between holes"', 'hit = { y = "6 mm", z = "5 mm" }'))
-    assert len(aim(exact.shots[0], scene.target.layers[0], scene.core, fit.sampling).shots) == 1
+    assert len(aim(exact.shots[0], scene.target.layers[0], scene.core, fit.sampling, SHIFTS).shots) == 1
 
 
 def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMaker) -> None:
@@ -176,7 +177,8 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     values = {one.path: float(one.at(points[1:, i])[0]) for i, one in enumerate(fit.parameters)}
     scene = fit.scene_of(fit.shots[0], values)
     assert scene.target.layers[0].degradation_interval == values["plate", "degradation_interval"]
-    alone = simulate(scene, run.aim.computed, numerics=fit.numerics, device="cpu")
+    own = run.aim.computed[fit.sampling.hits :]
+    alone = simulate(scene, own, numerics=fit.numerics, device="cpu")
     again = run.outcomes.residual_velocity.reshape(2, -1, len(run.aim.group))[1, :, 0]
     assert again == pytest.approx(alone.residual_velocity, abs=0.02)
 
@@ -187,8 +189,8 @@ def test_sets_that_differ_in_discrepancy_alone_share_their_runs(make_fit: FitMak
     points[[1, 3], :2] = points[[0, 2], :2]
     (bench,) = benches(fit)
     assert sum(len(run.which) for run in runs(fit, bench, points, device="cpu")) == 2
-    together = evaluate(fit, points, seed=0, device="cpu")
-    for row in range(4):
+    together = evaluate(fit, points[:2], seed=0, device="cpu")  # each set has hits of its own
+    for row in range(2):
         alone = evaluate(fit, points[[row]], seed=0, device="cpu")
         for one, other in zip(together, alone, strict=True):
             assert one.log_likelihood[row] == pytest.approx(other.log_likelihood[0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import genpareto, multivariate_normal
 
-from warpimpact.statistics.importance import ImportanceSampler, Student, Weights, log_prior, pareto_fit, resampled
+from warpimpact.statistics.importance import ImportanceSampler, Weights, pareto_fit, resampled
 
 
 @pytest.fixture(scope="module")
@@ -53,16 +53,6 @@ def test_blocks_share_their_first_numbers(linear: tuple[np.ndarray, np.ndarray, 
         assert len(np.unique(points, axis=0)) == 64
 
 
-def test_a_proposal_is_a_density() -> None:
-    student = Student(np.array([0.5, -1.0]), np.array([[0.6, 0.0], [0.3, 0.4]]))
-    points = np.random.default_rng(0).standard_normal((200_000, 2)) * 2.0
-    # ∫ q = E[q/p] over draws of p, a wider normal distribution.
-    wider = multivariate_normal(np.zeros(2), 4.0 * np.eye(2)).logpdf(points)
-    assert np.exp(student.log_density(points) - wider).mean() == pytest.approx(1.0, abs=0.02)
-    drawn = student.draw(np.random.default_rng(1), 100_000, [])
-    assert drawn.mean(axis=0) == pytest.approx(0.9 * student.centre, abs=0.02)  # a tenth comes from the prior
-
-
 def test_the_pareto_index_is_found() -> None:
     for k in (0.2, 0.5, 0.9):
         found, scale = pareto_fit(genpareto.rvs(k, scale=3.0, size=4000, random_state=5))
@@ -84,8 +74,3 @@ def test_resampling_keeps_the_weights() -> None:
     weights = np.array([0.1, 0.0, 0.6, 0.3])
     chosen = resampled(weights, 1000, np.random.default_rng(0))
     assert np.bincount(chosen, minlength=4) == pytest.approx(1000 * weights, abs=1)
-
-
-def test_the_prior_is_standard_normal() -> None:
-    points = np.random.default_rng(0).standard_normal((5, 3))
-    assert log_prior(points) == pytest.approx(multivariate_normal(np.zeros(3), np.eye(3)).logpdf(points))

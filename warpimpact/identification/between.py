@@ -1,0 +1,66 @@
+"""What lies between two hit points: numbers follow the plane through those of the nearest points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.identification.aim import Aim
+from warpimpact.identification.measured import MEASURABLE, Observation
+from warpimpact.scene import Symmetry
+
+Array = NDArray[np.float64]
+
+NEAREST = 6
+"""Points about each one, images included, that the plane goes through, by least squares."""
+
+
+def signs(observations: Sequence[Observation], group: Sequence[Symmetry]) -> Array:
+    """How numbers change from a computed point to its images, shape [images, observations]."""
+    mirrors = [MEASURABLE[one.name].mirror for one in observations]
+    factors = [[1.0 if one is None else getattr(symmetry, one) for one in mirrors] for symmetry in group]
+    return np.array(factors, dtype=np.float64).reshape(len(group), len(mirrors))
+
+
+def changes(observations: Sequence[Observation], aim: Aim, computed: Array) -> Array:
+    """Change of numbers over a standard deviation of the places that a computed point stands for.
+
+    Args:
+        computed: numbers of all points, NaN where there is none, shape [sets, points, observations].
+
+    Returns:
+        Shape [sets, computed points, 2, observations], along y and z; 0 where too few neighbours have the numbers, and
+        where the points do not cover a part of the unit cell evenly.
+    """
+    images = len(aim.group)
+    sets, points, numbers = computed.shape
+    if aim.part is None:
+        return np.zeros((sets, points // images, 2, numbers))
+    part, cell = aim.part
+    places, period = aim.hits / part, cell / part
+    each = [_slopes(observations, *own, period, images) for own in zip(places, computed, strict=True)]
+    side = np.sqrt(images / points)  # of the square that a point stands for; its variance is a twelfth of its square
+    return np.asarray(np.stack(each) * (side / np.sqrt(12.0)))
+
+
+def _slopes(observations: Sequence[Observation], places: Array, computed: Array, period: Array, images: int) -> Array:
+    """Slopes of the planes about the computed points of a set, shape [computed points, 2, observations]."""
+    from scipy.spatial import cKDTree  # a while to import
+
+    inside = np.minimum(np.mod(places, period), np.nextafter(period, 0.0))
+    _, near = cKDTree(inside, boxsize=period).query(inside[::images], k=NEAREST + 1)
+    near = near[:, 1:]
+    apart = places[near] - places[::images, None]
+    apart -= period * np.round(apart / period)
+    change = computed[near] - computed[::images, None]
+    for place, one in enumerate(observations):
+        change[..., place] = one.shortest(change[..., place])
+    there = ~np.isnan(change).any(axis=-1)
+    change, count = np.where(there[..., None], change, 0.0), there.sum(axis=1)
+    weight = there / ((apart**2).sum(axis=-1) + 1e-12)
+    square = np.einsum("nk,nka,nkb->nab", weight, apart, apart)
+    square += np.where(count < 3, 1.0, 1e-9)[:, None, None] * np.eye(2)
+    slopes = np.linalg.solve(square, np.einsum("nk,nka,nkd->nad", weight, apart, change))
+    return np.where((count < 3)[:, None, None], 0.0, slopes)
