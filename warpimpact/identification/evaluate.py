@@ -16,8 +16,8 @@ from warpimpact.identification.likelihood import Compared, Data, Score
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Scene, Shots
 from warpimpact.solver.columns import COLUMNS, UNITS_OF_EXPOSURE, Path, columns_of
-from warpimpact.solver.limit import limit_velocity
-from warpimpact.solver.many import simulate_many
+from warpimpact.solver.limit import Limits, limit_velocity
+from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]
@@ -131,7 +131,11 @@ def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], device: str) -> list
     outcomes = simulate_many(scenes, fit.numerics, Worker(device)) if other or not limited else []
     if not limited:
         return outcomes
-    limits = [limit_velocity(scene, shots, numerics=fit.numerics, device=device) for scene, shots in scenes]
+
+    def limit(number: int, worker: Worker, _: Any) -> Limits:
+        return limit_velocity(*scenes[number], numerics=fit.numerics, device=worker.device, threads=worker.threads)
+
+    limits = side_by_side(limit, len(scenes), Worker(device))
     return [
         one.assign(limit_velocity=found.value)
         for one, found in zip(outcomes or [found.outcomes for found in limits], limits, strict=True)

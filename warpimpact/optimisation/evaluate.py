@@ -23,7 +23,7 @@ from warpimpact.results.table import Table
 from warpimpact.runs.compute import at_solid
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.scene.units import Radians
-from warpimpact.solver.many import simulate_many
+from warpimpact.solver.many import side_by_side, simulate_many
 from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.simulate import pilot_of
 from warpimpact.solver.worker import Worker
@@ -97,8 +97,8 @@ def is_even(tables: Mapping[str, Any]) -> bool:
 
 def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
     """Hits of a campaign that are computed: none is an image of another."""
-    images = len(campaign.symmetries)
-    return campaign.sampler().shots(first * images, count * images)[::images]
+    sampler = campaign.sampler()
+    return sampler.shots(first * sampler.images, count * sampler.images)[:: sampler.images]
 
 
 def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: int | None = None) -> list[Said]:
@@ -115,11 +115,20 @@ def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: 
         draws = np.zeros(0) if shots.posterior_draw is None else shots.posterior_draw
         places = np.array([shots.hit_y, shots.hit_z])
         said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
-    for job, of, (_, scene, shots) in zip(jobs, said, scenes, strict=True):
-        numerics = Numerics.model_validate_json(job.level)
-        for row, key in enumerate(design.keys):
-            if key.is_limit and not (job.solid and key.layer):
-                of.values[row] = limits_said(scene, shots, key, numerics, Worker(device, threads))
+    limits = [
+        (number, row)
+        for number, job in enumerate(jobs)
+        for row, key in enumerate(design.keys)
+        if key.is_limit and not (job.solid and key.layer)
+    ]
+
+    def limit(which: int, worker: Worker, _: Any) -> Array:
+        number, row = limits[which]
+        numerics = Numerics.model_validate_json(jobs[number].level)
+        return limits_said(*scenes[number][1:], design.keys[row], numerics, worker)
+
+    for (number, row), values in zip(limits, side_by_side(limit, len(limits), Worker(device, threads)), strict=True):
+        said[number].values[row] = values
     return said
 
 

@@ -57,6 +57,11 @@ class Sampler:
     def __len__(self) -> int:
         return self._hits.total(self._extent) * len(self._group)
 
+    @property
+    def images(self) -> int:
+        """Shots in a row that are images of the first of them, itself included."""
+        return len(self._group)
+
     def shots(self, first: int, count: int) -> Shots:
         """`count` shots from number `first` on."""
         count = min(count, len(self) - first)

@@ -32,7 +32,7 @@ FEW = 0.1
 
 def worth_easing(found: HitErrors, hits: int) -> bool:
     """Whether a run of so many hits is long enough for trials beside its pilot."""
-    return found.kept and hits >= PART * len(_known(found)[1])
+    return hits >= PART * len(_known(found)[1])
 
 
 def eased(
@@ -42,10 +42,10 @@ def eased(
     asked: Numerics,
     free: Sequence[bool],
 ) -> HitErrors:
-    """The level that a pilot found, with coarser levels of single settings where they keep the promise.
+    """The level that a pilot found, with coarser levels of single settings where they keep the promise. Where the level
+    keeps it only with errors weighed by the energy of slow cores, the settings do, too.
 
     Args:
-        found: a level that keeps its promise.
         outcomes_at: computes some of the pilot's shots.
         asked, free: as in `pilot_hits`.
     """
@@ -54,8 +54,8 @@ def eased(
     shots, margin = pilot[: len(fine)], MARGIN[min(2, len(LADDER) - 1 - level)]
 
     def judge(outcomes: Outcomes, at: Numerics) -> tuple[HitErrors, float]:
-        errors, excess, _ = judged(outcomes, fine, shots, at, asked.asked, margin, free, between)
-        return errors, excess
+        errors, excess, weighed = judged(outcomes, fine, shots, at, asked.asked, margin, free, between)
+        return errors, excess if found.kept else weighed
 
     (best, excess), outcomes = judge(between, found.numerics), between
     coarser: dict[str, int] = {}
@@ -66,8 +66,10 @@ def eased(
             at = at_level(level, asked, **coarser, **{name: level - down})
             trial = outcomes_at(at, shots)
             errors, now = judge(trial, at)
-            _logger.info("level %d with %s: errors of %s", level, at.coarser, errors.errors)
-            if errors.kept:
+            _logger.info(
+                "level %d with %s: errors of %s, %.2f of what is allowed", level, at.coarser, errors.errors, now
+            )
+            if now <= 1.0 and not errors.status_error > max(best.status_error, asked.asked.status_share):
                 coarser[name] = level - down
                 best, excess, outcomes = errors, now, trial
                 break

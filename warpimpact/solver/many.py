@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from dataclasses import replace
+from typing import TypeVar
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
@@ -15,6 +17,7 @@ from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import outcomes_of
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
+Value = TypeVar("Value")
 _ANY = Worker()
 
 
@@ -42,28 +45,47 @@ def simulate_many(
         DeviceError: the device is absent.
         ValueError, MemoryError: as in `prepare`, for the first scene that cannot be computed.
     """
-    device = find_device(worker.device)
-    threads = launching(worker.threads) if device.is_cpu else 1
-    stop, lock, total = Cancel(worker.cancel), threading.Lock(), sum(len(shots) for _, shots in scenes)
+    device, lock, total = find_device(worker.device), threading.Lock(), sum(len(shots) for _, shots in scenes)
     done = [0] * len(scenes)
 
-    def outcomes(number: int) -> Outcomes:
+    def outcomes(number: int, own: Worker, helpers: Helpers | None) -> Outcomes:
         def told(some: int, _: int) -> None:
             with lock:
                 done[number] = some
                 if progress is not None:
                     progress(sum(done), total)
 
-        stop.check()
-        helped = threads > 1 and len(scenes) - number <= threads
         memory = Memory(prepare(*scenes[number], numerics), device)
-        march = March(memory, 1, Helpers(pool, threads - 1) if helped else None)
-        contact = march.march(told, stop)
+        march = March(memory, 1, helpers)
+        contact = march.march(told, own.cancel)
         return outcomes_of(march.memory, contact)
 
-    pool = ThreadPoolExecutor(threads)
+    return side_by_side(outcomes, len(scenes), worker)
+
+
+def side_by_side(
+    compute: Callable[[int, Worker, Helpers | None], Value], count: int, worker: Worker = _ANY
+) -> list[Value]:
+    """What is computed for the numbers from 0 on: on a CPU as many at a time as there are threads.
+
+    Args:
+        compute: called with a number, with its share of the threads, which no other number has, and with those who may
+            help it, where there is nothing else for them to do.
+
+    Raises:
+        DeviceError: the device is absent.
+    """
+    threads = launching(worker.threads) if find_device(worker.device).is_cpu else 1
+    stop, pool = Cancel(worker.cancel), ThreadPoolExecutor(threads)
+
+    def computed(number: int) -> Value:
+        stop.check()
+        left = count - number
+        helpers = Helpers(pool, threads - 1) if left <= threads > 1 else None
+        return compute(number, replace(worker, threads=-(-threads // left), cancel=stop), helpers)
+
     try:
-        futures = [pool.submit(outcomes, number) for number in range(len(scenes))]
+        futures = [pool.submit(computed, number) for number in range(count)]
         wait(futures, return_when=FIRST_EXCEPTION)
     finally:  # after an error or an interrupt the others are worth nothing, and nobody waits for them
         stop.cancel()

@@ -131,7 +131,8 @@ def pilot_hits(
         for whole in (False, True) if len(rest) else (False,):
             shots = pilot if whole else some
             pair = computed(index, whole), computed(finer, whole)
-            found, excess, nearly = judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
+            found, excess, weighed = judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
+            nearly = weighed <= 1.0
             if excess_of is not None:
                 excess, nearly = excess_of(*pair, shots), False
                 found = replace(found, kept=excess <= 1.0)
@@ -161,9 +162,9 @@ def judged(
     margin: float,
     free: Sequence[bool],
     between: Outcomes | None = None,
-) -> tuple[HitErrors, float, bool]:
-    """What is known of a resolution from some shots: the finding, its errors over what is allowed, and whether it
-    nearly keeps the promise.
+) -> tuple[HitErrors, float, float]:
+    """What is known of a resolution from some shots: the finding, its errors over what is allowed, and the same with
+    errors weighed by the energy of slow cores.
 
     Args:
         margin: how many times the change to the fine outcomes the error is at most.
@@ -187,7 +188,7 @@ def judged(
     kept = excess <= 1.0 and not status > accuracy.status_share
     velocity, tilt, depth = (float(error) for error in told)
     found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
-    return found, excess, _excess(accuracy, weighed, layered) <= 1.0
+    return found, excess, _excess(accuracy, weighed, layered)
 
 
 def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:

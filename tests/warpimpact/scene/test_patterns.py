@@ -332,7 +332,7 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
 def test_points_in_holes_are_those_that_lie_in_a_hole(
     pattern: Any, samples: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("warpimpact.scene.patterns.lattice._LINES", 100)  # several lots
+    monkeypatch.setattr("warpimpact.scene.patterns.lines._LINES", 100)  # several lots
     counts = (57, 46)
     sides = (pattern.period[0] / counts[0], pattern.period[1] / counts[1])
     exact = Pattern.points_in_holes(pattern, counts, sides, samples)  # looks at every point

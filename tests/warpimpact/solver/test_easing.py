@@ -21,7 +21,7 @@ from warpimpact.scene import (
 )
 from warpimpact.solver import easing
 from warpimpact.solver.changes import changes
-from warpimpact.solver.easing import FEW, PART, ROOM, WIDE, eased, worth_easing
+from warpimpact.solver.easing import FEW, PART, ROOM, WIDE, eased
 from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
@@ -66,9 +66,9 @@ def trials(excess: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> tuple[l
         tried.append(str(at.coarser))
         return nothing
 
-    def judged(coarse: object, fine: object, shots: object, at: Numerics, *_: object) -> tuple[HitErrors, float, bool]:
+    def judged(coarse: object, fine: object, shots: object, at: Numerics, *_: object) -> tuple[HitErrors, float, float]:
         over = excess[str(at.coarser or "")]
-        return HitErrors(at, over <= 1.0, 0.9, over, 0.0), over, False
+        return HitErrors(at, over <= 1.0, 0.9, over, 0.0), over, math.inf
 
     monkeypatch.setattr(easing, "judged", judged)
     return tried, eased(found, outcomes_at, PILOT, Numerics(), (True,))
@@ -98,8 +98,27 @@ def test_a_level_that_does_not_keep_its_promise_stays_as_it_is() -> None:
     asked = Numerics(accuracy={"residual_velocity": 1e-6})
     found = pilot_of(SCENE, PILOT[:2], asked, Worker("cpu"), hits=10**6)
     assert not found.kept
-    assert not worth_easing(found, 10**6)
     assert found.numerics.coarser is None
+
+
+@pytest.mark.parametrize(("status", "taken"), [(0.02, "step 3"), (0.03, ""), (math.nan, "step 3")])
+def test_a_level_that_keeps_it_with_weighed_errors_is_judged_by_them(
+    status: float, taken: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = simulate(SCENE, PILOT[:1], numerics=Numerics(level=0), device="cpu")
+
+    def judged(*given: object) -> tuple[HitErrors, float, float]:
+        at = given[3]
+        assert isinstance(at, Numerics)
+        other = 0.02 if at.coarser is None else status
+        weighed = {"": 0.6, "step 3": 0.95}.get(str(at.coarser or ""), 2.0)
+        return HitErrors(at, False, 0.9, 9.0, 0.0, status_error=other), 9.0, weighed
+
+    monkeypatch.setattr(easing, "judged", judged)
+    found = HitErrors(Numerics(level=4), False, 0.9, 9.0, 0.0)
+    found = HitErrors(Numerics(level=4), False, 0.9, 9.0, 0.0, tried=((found, nothing, nothing),))
+    best = eased(found, lambda at, some: nothing, PILOT, Numerics(), (True,))
+    assert (best.kept, str(best.numerics.coarser or "")) == (False, taken)
 
 
 def test_errors_of_the_finer_level_count_as_much_as_the_level_between_says() -> None:

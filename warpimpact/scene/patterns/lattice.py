@@ -3,18 +3,17 @@
 import math
 from abc import abstractmethod
 from copy import copy
-from functools import cached_property
-from itertools import pairwise
+from functools import cached_property, partial
 from numbers import Real
 from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
 from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array
 from ..units import Angle, Length, PositiveLength, quantity
+from .lines import Numbers, points_in
 from .pattern import BoolArray, Counts, Pattern, Range, half_sides
 from .roundings import area, chords, distance, geometries, neighbours, outline, placed
 
@@ -22,12 +21,6 @@ _MOST_HOLES = 20_000
 _SAME = 1e-9
 """Two lengths are equal if they differ by less than this share of the period."""
 
-_ON_EDGE = 1e-6
-"""A point that is no more of the side of a cell outside a hole lies in it: symmetric holes have symmetric tiles."""
-_LINES = 2**16
-"""Lines of points that are looked at together, about."""
-
-Numbers = NDArray[np.int64]
 _PAIR = tuple[PositiveLength, PositiveLength]
 
 
@@ -167,24 +160,9 @@ class LatticePattern(Pattern):
         return np.asarray(~(np.abs(deepest) > reach) if reach <= self._sight else np.ones(deepest.shape, dtype=bool))
 
     def points_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Counts:
-        """A line of points along y lies in a convex hole from one end to another, and no hole overlaps another."""
-        fine, slack = np.array(sides) / samples, _ON_EDGE * min(sides)
         ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
         places = self._repeated(self._places, self.period, ranges[0], ranges[1])
-        ends = np.clip(self._boxes(places)[:, :, 1] / fine[1] + (-1.5, 1.5), 0, samples * counts[1]).astype(np.int64)
-        inside = np.zeros((counts[0] + 2, counts[1]), dtype=np.int16)
-        for some in _in_lots(ends[:, 1] - ends[:, 0]):
-            lines = ends[some, 1] - ends[some, 0]
-            line = np.arange(lines.sum()) + np.repeat(ends[some, 1] - np.cumsum(lines), lines)
-            low, high = self._chords(places, np.repeat(some, lines), (line + 0.5) * fine[1], slack)
-            first, behind = np.ceil((low - slack) / fine[0] - 0.5), np.floor((high + slack) / fine[0] + 0.5)
-            met = first < behind
-            for end, sign in ((first, 1), (behind, -1)):
-                at = np.clip(end[met], 0, samples * counts[0]).astype(np.int64)
-                _fill(inside, at, line[met] // samples, samples, sign)
-        for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
-            row += before
-        return inside[: counts[0]]
+        return points_in(partial(self._chords, places), self._boxes(places)[:, :, 1], counts, sides, samples)
 
     def _chords(self, places: Array, hole: Numbers, z: Array, slack: float) -> tuple[Array, Array]:
         """`chords` of lines at z [m], each through the hole of this number among those at some places."""
@@ -218,18 +196,24 @@ class LatticePattern(Pattern):
         return float(min(between, to_rim[to_rim >= 0].min(initial=np.inf)))
 
     def is_symmetric(self, along_y: int, along_z: int, *, centred: bool) -> bool:
+        period, mirror = np.array(self.period), np.array([along_y, along_z])
+        middles, marks, tree = self._marked
+        images = middles * mirror + (period / 2 if centred else 0.0)
+        apart, same = tree.query(images % period % period)
+        if apart.max() > _SAME * period.max():
+            return False
+        turned, there = marks * mirror, marks[same]
+        apart = np.linalg.norm(turned[:, :, None] - there[:, None], axis=-1).min(axis=-1)
+        return bool(apart.max() <= _SAME * period.max())
+
+    @cached_property
+    def _marked(self) -> tuple[Array, Array, Any]:
+        """Middles of the holes of a period [m], their marks from there [m], and a tree of the middles."""
         from scipy.spatial import KDTree
 
-        period, mirror = np.array(self.period), np.array([along_y, along_z])
-        tolerance = _SAME * period.max()
-        marks = placed(self._marks, self._places)
+        period, marks = np.array(self.period), placed(self._marks, self._places)
         middles = marks.mean(axis=1)
-        images = middles * mirror + (period / 2 if centred else 0.0)
-        apart, same = KDTree(middles % period % period, boxsize=period).query(images % period % period)
-        if apart.max() > tolerance:
-            return False
-        turned, there = (marks - middles[:, None]) * mirror, (marks - middles[:, None])[same]
-        return bool(np.linalg.norm(turned[:, :, None] - there[:, None], axis=-1).min(axis=-1).max() <= tolerance)
+        return middles, marks - middles[:, None], KDTree(middles % period % period, boxsize=period)
 
     @cached_property
     def _cell_places(self) -> Array:
@@ -323,19 +307,6 @@ class LatticePattern(Pattern):
         most = max(map(len, inside))
         which = np.array([[*holes, *[-1] * (most - len(holes))] for holes in inside])
         return (int(counts[0]), int(counts[1])), [tuple(columns[hole].T) for hole in which.T]
-
-
-def _in_lots(lines: Numbers) -> list[Numbers]:
-    """Numbers of the holes with so many lines each, in lots of some _LINES lines."""
-    lot = np.cumsum(lines) // _LINES
-    return np.split(np.arange(len(lines)), np.flatnonzero(np.diff(lot)) + 1)
-
-
-def _fill(inside: Counts, at: Numbers, column: Numbers, samples: int, sign: int) -> None:
-    """Add lines of points along y, from point `at` on, to the differences between cells."""
-    cell, before = np.divmod(at, samples)
-    for row, points in ((cell, samples - before), (cell + 1, before)):
-        np.add.at(inside.reshape(-1), row * inside.shape[1] + column, (sign * points).astype(np.int16))
 
 
 def _bin(at: Array, period: Any, count: Any) -> Numbers:

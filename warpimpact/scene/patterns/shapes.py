@@ -7,7 +7,8 @@ import numpy as np
 
 from ..model import Array
 from ..units import NonNegativeLength, PositiveLength
-from .lattice import LatticePattern, Numbers
+from .lattice import LatticePattern
+from .lines import Numbers
 
 _ELLIPSE_CHORDS = 720
 
