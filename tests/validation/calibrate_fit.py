@@ -20,7 +20,7 @@ from scipy.stats import chisquare
 
 from warpimpact.identification.evaluate import benches, data_of, discrepancies, evaluate, runs
 from warpimpact.identification.fit import Fit
-from warpimpact.identification.likelihood import Data, score
+from warpimpact.identification.likelihood import Compared, Data
 from warpimpact.identification.reading import fit_from
 from warpimpact.statistics.importance import ImportanceSampler, Weights
 
@@ -91,9 +91,11 @@ def calibrate(fit: Fit, *, data_sets: int, library: int, device: str = "auto") -
             for place in bench.which:
                 shot = fit.shots[place]
                 own = run.aim.of(shot.hit, run.scene.target.layers[0], run.scene.core)
+                known = None  # between the hits, which all data sets share
                 for row, values in enumerate(measured[place]):
-                    data = _replaced(data_of(fit, shot), values)
-                    log_likelihood[row, which] += score(data, own, run.outcomes, some, rng).log_likelihood
+                    compared = Compared.of(_replaced(data_of(fit, shot), values), own, run.outcomes, known)
+                    log_likelihood[row, which] += compared.score(some, rng).log_likelihood
+                    known = compared.changes
     weights = [Weights.of(row) for row in log_likelihood]
     return Calibration(
         names=tuple(one.name for one in fit.parameters),
