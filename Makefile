@@ -13,7 +13,7 @@ gallery: $(INSTALLED)
 	$(VENV)/bin/python campaigns/gallery.py
 	$(VENV)/bin/python tests/benchmarks/design_film.py
 
-# Figures of docs/benchmarks.md; on a quiet machine, some 10 minutes on two cores.
+# Figures of docs/benchmarks.md; on a quiet machine, some 13 minutes on two cores.
 benchmark: $(INSTALLED)
 	$(VENV)/bin/pip install --quiet --editable '.[bench]'
 	$(VENV)/bin/python tests/benchmarks/page.py all

@@ -1,6 +1,6 @@
 """The table and the figure of the benchmark page (docs/benchmarks.md), from results/*.json.
 
-    make benchmark                                  # measures everything: some 10 minutes on two quiet cores
+    make benchmark                                  # measures everything: some 13 minutes on two quiet cores
     python tests/benchmarks/page.py                 # draws the figure from the results that are there
 
 The table is made from the results when the pages are built. A result that is missing leaves its rows out.
