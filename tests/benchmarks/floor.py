@@ -18,7 +18,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact import Campaign, Numerics, Shots
+from warpimpact import Numerics, Scene, Shots
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.history import History
 from warpimpact.solver.prepare import prepare
@@ -47,14 +47,15 @@ class Work:
     bytes: float
 
 
-def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
+def work_of(scene: Scene, shots: Shots, numerics: Numerics) -> Work:
     """Work of the law at one resolution, from the histories of the shots on the CPU."""
-    around = prepare(campaign.scene, shots, numerics).resolution.patches_around
+    around = prepare(scene, shots, numerics).resolution.patches_around
     steps, in_slab, in_contact = 0, 0, 0
-    for near, acting in contacts(campaign, shots, numerics):
+    for slabs in contacts(scene, shots, numerics):
         steps += 1
-        in_slab += around * int(near.any(axis=1).sum())
-        in_contact += int(acting.sum())
+        for near, acting in slabs:
+            in_slab += around * int(near.any(axis=1).sum())
+            in_contact += int(acting.sum())
     hits = len(shots)
     operations = (LOOK * in_slab + ACT * in_contact) / hits
     moved = (LOOK_BYTES * in_slab + ACT_BYTES * in_contact) / hits
@@ -62,12 +63,11 @@ def work_of(campaign: Campaign, shots: Shots, numerics: Numerics) -> Work:
 
 
 def contacts(
-    campaign: Campaign, shots: Shots, numerics: Numerics
-) -> Iterator[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
-    """For every step of the shots: the patches that reach into the slab, and those of them that advance, each of shape
-    [rings, around]."""
-    core, plate = campaign.core, campaign.plate
-    prepared = prepare(campaign.scene, shots, numerics)
+    scene: Scene, shots: Shots, numerics: Numerics
+) -> Iterator[list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]]:
+    """For every step of the shots, and every layer: the patches that reach into the slab, and those of them that
+    advance, each of shape [rings, around]."""
+    prepared = prepare(scene, shots, numerics)
     resolution, rings = prepared.resolution, prepared.surfaces[0].rings
     azimuth = (np.arange(resolution.patches_around) + 0.5) * (2.0 * np.pi / resolution.patches_around)
     circle = np.stack([np.zeros_like(azimuth), np.cos(azimuth), np.sin(azimuth)], axis=1)
@@ -78,16 +78,17 @@ def contacts(
     normal = outward[:, None, None] * circle
     normal[..., 0] += (rings.area_axial / area)[:, None]
     slack = np.hypot(rings.half_axial, rings.half_radial)[:, None]
-    for rows in trace(campaign.scene, shots, numerics=numerics):
-        history = History.from_trace(rows[:-1], core.mass_properties)  # the last row is the end
+    slabs = [(float(one.front[0]), float(one.front[0] + one.thickness[0])) for one in prepared.materials]
+    for rows in trace(scene, shots, numerics=numerics):
+        history = History.from_trace(rows[:-1], scene.core.mass_properties)  # the last row is the end
         for position, attitude, velocity, omega in zip(
             history.position, history.attitude, history.velocity, history.angular_velocity, strict=True
         ):
             turn = Rotation.from_quat(attitude).as_matrix()
             depth = position[0] + arm @ turn[0]
-            near = (depth > -slack) & (depth < plate.thickness + slack)
-            speed = (velocity @ turn + np.cross(omega @ turn, arm)) * normal
-            yield near, near & (speed.sum(axis=-1) > 0.0)
+            advances = ((velocity @ turn + np.cross(omega @ turn, arm)) * normal).sum(axis=-1) > 0.0
+            reached = [(depth > front - slack) & (depth < rear + slack) for front, rear in slabs]
+            yield [(near, near & advances) for near in reached]
 
 
 _LOOP = """

@@ -303,7 +303,7 @@ def above_floor(values: dict[str, Any], asked: Asked) -> None:
     clock = float(subprocess.run(["nvidia-smi", *query], check=True, capture_output=True, text=True).stdout)
     campaign, per_cycle = Campaign.from_toml(CAMPAIGN), 64 if device.arch in (70, 72, 75, 80) else FLOAT_LANES
     peak = 2.0 * per_cycle * device.sm_count * clock * 1e6
-    work = work_of(campaign, shots_of(campaign, FLOOR_HITS), Numerics(level=LEVEL))
+    work = work_of(campaign.scene, shots_of(campaign, FLOOR_HITS), Numerics(level=LEVEL))
     values["floor"] = {"peak_operations_per_second": peak, "clock_mhz": clock, "work": asdict(work)}
     values["floor"]["above"] = peak / work.operations / max(best)
     print(f"the floor allows {values['floor']['above']:.3g} times as many hits/s", flush=True)

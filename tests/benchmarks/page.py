@@ -156,7 +156,8 @@ def _roads(values: Mapping[str, Any]) -> Iterator[Row]:
             "standard, times the cost of the slotted plate",
             name,
             f"{one['ratio']:.1f}; level {one['level']}{_coarser(one)}, {one['microseconds_per_hit']:.3g} µs per hit, "
-            f"pilot {one['pilot_share']:.0%}" + ("" if one["kept"] else "; promise not kept"),
+            f"{one['above_floor']:.0f} times the floor, pilot {one['pilot_share']:.0%}"
+            + ("" if one["kept"] else "; promise not kept"),
             f"processor time of a run of {values['run']} hits with its pilot",
             f"least of {values['rounds']} rounds, {values['hits']} hits",
         )

@@ -139,7 +139,7 @@ def fight(name: str, file: str, hits: int, peak: float) -> Bout:
     taken = pilot_of(_scene(campaign), pilot, Numerics(), Worker("cpu")).numerics.level
     assert taken is not None
     bout = Bout(name, contenders, taken, _error(coarse, truth), {})
-    work = work_of(campaign, shots[:FLOOR_HITS], Numerics(level=STANDARD))
+    work = work_of(campaign.scene, shots[:FLOOR_HITS], Numerics(level=STANDARD))
     above = bout.ours(STANDARD).cost * peak / work.operations
     return bout._replace(floor=asdict(work) | {"above_floor": above})
 

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from bench import machine, store
+from floor import measured_peak, work_of
 from random_layers import drawn
 from random_scenes import draw
 
@@ -33,6 +34,8 @@ from warpimpact.solver.worker import NEVER, Worker
 
 RUN, SMALL = 16384, 1024
 """Hits of the run that a pilot is made for; likewise of scenes that are drawn, whose pilots may take long."""
+FLOOR_HITS = 8
+"""Hits, or bursts, over which the operations of the floor are counted."""
 ROUNDS, TIMED = 3, 0.4
 """Runs of each road, in turn with the slotted plate, and processor time of one of them [s]."""
 
@@ -116,6 +119,11 @@ class Road:
             count += len(outcomes_of(march.memory, march.march(None, NEVER)).status)
         return (time.process_time() - begin) / count
 
+    def floor(self) -> float:
+        """Time of the counted operations of a hit at the measured peak of a core [s] (floor.py)."""
+        some = self.shots[: FLOOR_HITS * self.shots.at_a_plate]
+        return work_of(self.scene, some, self.numerics).operations / measured_peak()
+
 
 def road(scene: Scene, shots: Shots, pilot: Shots, asked: Numerics, run: int) -> Road:
     """A scene and its shots with what their pilot finds for a run of so many hits."""
@@ -187,6 +195,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         values["roads"][name] = {
             "ratio": whole[0] / whole[1],
             "microseconds_per_hit": 1e6 * cost,
+            "above_floor": cost / one.floor(),
             "level": one.numerics.level,
             "coarser": str(one.numerics.coarser or ""),
             "kept": one.kept,
