@@ -45,7 +45,8 @@ def test_rows_follow_from_the_results(found: Results) -> None:
         ratios = re.findall(rf"times as fast as Numba \| {scene} \| ([\d.]+) \|", text)
         assert [float(one) for one in ratios] == [round(one["ratio"], 1) for one in bout["ratios"]]
     for name, one in found["roads"]["roads"].items():
-        assert f"| {name} | {one['ratio']:.1f}; level {one['level']}," in text
+        coarser = f" ({one['coarser']})" if one["coarser"] else ""
+        assert f"| {name} | {one['ratio']:.1f}; level {one['level']}{coarser}," in text
 
 
 def test_results_that_change_change_the_table(found: Results) -> None:
