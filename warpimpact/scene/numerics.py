@@ -147,10 +147,11 @@ class Numerics(_AsGiven):
         other = "level" if self.level is not None else "accuracy" if self.accuracy is not None else None
         if "fidelity" in self.model_fields_set and other is not None:
             raise ValueError(f"fidelity and {other} cannot be combined: each sets the resolution")
-        finer = [name for name, own in self.coarser or () if own is not None and own > (self.level or 0)]
-        if self.coarser is not None and (self.level is None or finer):
-            ill = f"{finer[0]} is finer than level {self.level}" if self.level is not None else "there is no level"
-            raise ValueError(f"coarser gives levels below level, but {ill}")
+        for name, own in self.coarser or ():
+            if own is not None and self.level is None:
+                raise ValueError(f"coarser.{name} needs level")
+            if own is not None and own > (self.level or 0):
+                raise ValueError(f"coarser.{name} must be at most level, {self.level}, but is {own}")
         if self.accuracy is not None and self.explicit is not None:
             raise ValueError(f"{self.explicit} and accuracy cannot be combined: each sets the resolution")
         if self.travel is not None and (self.time_step is not None or self.scheme == "nodal"):
