@@ -60,13 +60,16 @@ class Mixture:
 
     def log_density(self, points: Array) -> Array:
         """Logarithm of the density at points, shape [points]."""
-        size = points.shape[1]
-        constant = math.lgamma(0.5 * (FREEDOM + size)) - math.lgamma(0.5 * FREEDOM)
-        constant -= 0.5 * size * math.log(FREEDOM * math.pi)
-        squares, volumes = self._distances(points)
-        own = constant - volumes[:, None] - 0.5 * (FREEDOM + size) * np.log1p(squares / FREEDOM)
-        terms = np.log((1.0 - FROM_PRIOR) * self.shares)[:, None] + own
-        return _log_sum(np.concatenate([terms, math.log(FROM_PRIOR) + log_prior(points)[None]]))
+        from scipy.special import logsumexp
+        from scipy.stats import multivariate_t
+
+        own = [
+            multivariate_t.logpdf(points, centre, factor @ factor.T, df=FREEDOM)
+            for centre, factor in zip(self.centres, self.factors, strict=True)
+        ]
+        terms = np.stack([*own, log_prior(points)])
+        shares = np.append((1.0 - FROM_PRIOR) * self.shares, FROM_PRIOR)
+        return np.asarray(logsumexp(terms, axis=0, b=shares[:, None]))
 
     def _distances(self, points: Array) -> tuple[Array, Array]:
         """Squares of the distances from the centres in units of the scale matrices, shape [components, points], and the
@@ -110,6 +113,8 @@ def fitted(points: Array, weights: Array, worth: float, rng: np.random.Generator
         weights: normalised, shape [draws].
         worth: their effective number.
     """
+    from scipy.special import softmax
+
     middle = weights @ points
     whole = _covariance(points - middle, weights) + 1e-6 * np.eye(len(middle))
     count = int(np.clip(worth / DRAWS_EACH, 1, MOST))
@@ -121,7 +126,7 @@ def fitted(points: Array, weights: Array, worth: float, rng: np.random.Generator
     for _ in range(PASSES):
         squares, volumes = found._distances(some)
         log = np.log(found.shares)[:, None] - 0.5 * squares - volumes[:, None]
-        own = np.exp(log - _log_sum(log)) * (worth / len(some))
+        own = softmax(log, axis=0) * (worth / len(some))
         draws = own.sum(axis=1)
         centres = (own @ some + KNOWN_PLACES * middle) / (draws + KNOWN_PLACES)[:, None]
         spreads = [
@@ -140,9 +145,3 @@ def _factors(covariances: Array) -> Array:
 
 def _covariance(apart: Array, weights: Array) -> Array:
     return np.asarray((weights[:, None] * apart).T @ apart)
-
-
-def _log_sum(terms: Array) -> Array:
-    """Logarithm of the sum of exponentials along the first axis."""
-    highest = terms.max(axis=0)
-    return np.asarray(highest + np.log(np.exp(terms - highest).sum(axis=0)))
