@@ -22,6 +22,7 @@ from warpimpact.identification.evaluate import benches, data_of, discrepancies, 
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.likelihood import Compared, Data
 from warpimpact.identification.reading import fit_from
+from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import ImportanceSampler, Weights
 
 Array = NDArray[np.float64]
@@ -85,7 +86,7 @@ def calibrate(fit: Fit, *, data_sets: int, library: int, device: str = "auto") -
     log_likelihood = np.zeros((data_sets, library))
     scales = discrepancies(fit, points)
     for bench in benches(fit):
-        for run in runs(fit, bench, points, device=device):
+        for run in runs(fit, bench, points, Worker(device)):
             (which,) = run.which.T
             some = {kind: scale[which] for kind, scale in scales.items()}
             for place in bench.which:
@@ -119,7 +120,7 @@ def _measured(fit: Fit, truth: Array, device: str) -> list[Array]:
     The shots hit at other points than those of the library.
     """
     elsewhere = replace(fit, sampling=fit.sampling.model_copy(update={"seed": fit.sampling.seed + 1}))
-    return [one.predicted[:, 0] for one in evaluate(elsewhere, truth, seed=0, device=device)]
+    return [one.predicted[:, 0] for one in evaluate(elsewhere, truth, Worker(device), seed=0)]
 
 
 def told(found: Calibration) -> dict[str, object]:

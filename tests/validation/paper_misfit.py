@@ -18,6 +18,7 @@ from warpimpact.identification.fit import Fit
 from warpimpact.identification.reading import fit_from
 from warpimpact.results import posterior_file
 from warpimpact.scene.distributions import Continuous
+from warpimpact.solver.worker import Worker
 
 ROUNDS, SETS, HITS, KEPT = 10, 24, 2048, 6
 
@@ -33,19 +34,19 @@ def refined(fit: Fit, points: np.ndarray, misfit: np.ndarray, seed: int = 0) -> 
     finer = replace(fit, sampling=fit.sampling.model_copy(update={"hits": HITS}))
     chosen = np.argsort(misfit)[:KEPT]
     best = points[chosen]
-    scores = evaluate(finer, best, seed=0)
+    scores = evaluate(finer, best, Worker(), seed=0)
     values = np.sum([one.misfit for one in scores], axis=0)
     for place in range(ROUNDS):
         step = 0.5 * 0.75**place
         new = best[rng.integers(len(best), size=SETS)] + step * rng.standard_normal((SETS, best.shape[1]))
-        found = np.sum([one.misfit for one in evaluate(finer, new, seed=0)], axis=0)
+        found = np.sum([one.misfit for one in evaluate(finer, new, Worker(), seed=0)], axis=0)
         every, all_values = np.concatenate([best, new]), np.concatenate([values, found])
         chosen = np.argsort(all_values)[:KEPT]
         best, values = every[chosen], all_values[chosen]
         print(f"round {place + 1}: {values.round(2)}", flush=True)
     for level in (0, 2, 6):
         settings = replace(finer, numerics=fit.numerics.model_copy(update={"level": level}))
-        scores = evaluate(settings, best[:1], seed=0)
+        scores = evaluate(settings, best[:1], Worker(), seed=0)
         print(f"level {level}: misfit {sum(float(one.misfit[0]) for one in scores):.2f}")
         for shot, one in zip(fit.shots, scores, strict=True):
             told = [f"{o.label} {o.shown(x):.1f}" for o, x in zip(shot.observations, one.best[0], strict=True)]

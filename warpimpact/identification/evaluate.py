@@ -68,7 +68,7 @@ def benches(fit: Fit) -> list[Bench]:
     return [Bench(fit.shots[places[0]], tuple(places)) for places in found.values()]
 
 
-def runs(fit: Fit, bench: Bench, points: Array, *, seed: int = 0, device: str = "auto") -> Iterator[Run]:
+def runs(fit: Fit, bench: Bench, points: Array, worker: Worker, *, seed: int = 0) -> Iterator[Run]:
     """Compute a bench at sets of parameters.
 
     Args:
@@ -86,16 +86,19 @@ def runs(fit: Fit, bench: Bench, points: Array, *, seed: int = 0, device: str = 
     per_call = max(1, AT_A_TIME // fit.sampling.hits)
     jobs = list[_Job]()
     for rows in _of_one_scene(of_scene, len(alike)):
-        scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in of_scene.items()})
+        own_scene = own if len(rows) == 1 else of_scene  # a set alone needs no columns
+        scene = fit.scene_of(bench.shot, {path: float(column[rows[0]]) for path, column in own_scene.items()})
         for first in range(0, len(rows), per_call):
             some = rows[first : first + per_call]
             targets = aim(bench.shot, scene.target.layers[0], scene.core, fit.sampling, shifts[some])
-            of_sets = columns_of({path: columns[path][some] for path in columns}, scene.target.layers[0])
+            of_sets = columns_of(
+                {path: column[some] for path, column in own.items() if path not in own_scene}, scene.target.layers[0]
+            )
             jobs.append(_Job(alike[some], scene, targets, with_own(targets.computed, of_sets)))
             if sum(len(job.shots) for job in jobs) >= AT_A_TIME:
-                yield from _run(fit, bench, jobs, device)
+                yield from _run(fit, bench, jobs, worker)
                 jobs = []
-    yield from _run(fit, bench, jobs, device)
+    yield from _run(fit, bench, jobs, worker)
 
 
 def _alike(points: Array) -> NDArray[np.int64]:
@@ -116,26 +119,26 @@ class _Job(NamedTuple):
     shots: Shots
 
 
-def _run(fit: Fit, bench: Bench, jobs: Sequence[_Job], device: str) -> Iterator[Run]:
-    for job, outcomes in zip(jobs, _outcomes(fit, bench, jobs, device), strict=True):
+def _run(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> Iterator[Run]:
+    for job, outcomes in zip(jobs, _outcomes(fit, bench, jobs, worker), strict=True):
         yield Run(job.which, job.scene, job.aim, outcomes.unfolded(job.aim.group))
 
 
-def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], device: str) -> list[Outcomes]:
+def _outcomes(fit: Fit, bench: Bench, jobs: Sequence[_Job], worker: Worker) -> list[Outcomes]:
     """What the observations of a bench need: outcomes at impact velocity, limit velocities, or both."""
     measured = [fit.shots[place] for place in bench.which]
     observations = [one for shot in measured for one in shot.observations]
     limited = any(one.is_limit for one in observations)
     other = fit.selection or any(shot.status for shot in measured) or not all(one.is_limit for one in observations)
     scenes = [(job.scene, job.shots) for job in jobs]
-    outcomes = simulate_many(scenes, fit.numerics, Worker(device)) if other or not limited else []
+    outcomes = simulate_many(scenes, fit.numerics, worker) if other or not limited else []
     if not limited:
         return outcomes
 
-    def limit(number: int, worker: Worker, _: Any) -> Limits:
-        return limit_velocity(*scenes[number], numerics=fit.numerics, device=worker.device, threads=worker.threads)
+    def limit(number: int, own: Worker, _: Any) -> Limits:
+        return limit_velocity(*scenes[number], numerics=fit.numerics, device=own.device, threads=own.threads)
 
-    limits = side_by_side(limit, len(scenes), Worker(device))
+    limits = side_by_side(limit, len(scenes), worker)
     return [
         one.assign(limit_velocity=found.value)
         for one, found in zip(outcomes or [found.outcomes for found in limits], limits, strict=True)
@@ -183,7 +186,7 @@ def discrepancies(fit: Fit, points: Array) -> dict[str, Array]:
     return found
 
 
-def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> list[Score]:
+def evaluate(fit: Fit, points: Array, worker: Worker, *, seed: int) -> list[Score]:
     """Score every shot of a fit at sets of parameters.
 
     Args:
@@ -197,7 +200,7 @@ def evaluate(fit: Fit, points: Array, *, seed: int, device: str = "auto") -> lis
     scored: dict[int, list[tuple[NDArray[np.int64], Score]]] = {place: [] for place in range(len(fit.shots))}
     rng = np.random.default_rng(np.random.SeedSequence(fit.sampling.seed, spawn_key=(1, seed)))
     for bench in benches(fit):
-        for run in runs(fit, bench, points, seed=seed, device=device):
+        for run in runs(fit, bench, points, worker, seed=seed):
             changes = dict[tuple[Any, ...], Array]()
             for place in bench.which:
                 shot = fit.shots[place]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,8 @@ from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.results import posterior_file
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.store import Store, stored
+from warpimpact.solver.many import side_by_side
+from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
@@ -116,45 +120,54 @@ class _Work:
     """Scores sets in batches, and knows what was computed before."""
 
     def __init__(self, fit: Fit, device: str, store: Store | None, follow: Follow) -> None:
-        self._fit, self._device, self._store, self._follow = fit, device, store, follow
+        self._fit, self._worker, self._store, self._follow = fit, Worker(device), store, follow
         self._total = sum(rounds(fit.sampling)) // DISCREPANCIES
-        self._parts: list[list[Score]] = []
-        self._batch, self._resumed, self.done = 0, 0, 0
+        self._batches: list[list[Score]] = []
+        self._lock = threading.Lock()
+        self._resumed, self.done = 0, 0
         self._effective, self._pareto_k, self._misfit = np.nan, np.nan, np.inf
 
     def round(self, points: Array) -> Array:
         """Score the sets of one round; ln of their likelihood, shape [sets]."""
-        found: list[Array] = []
-        for first in range(0, len(points), BATCH * DISCREPANCIES):
-            some = points[first : first + BATCH * DISCREPANCIES]
-            scores = self._scores_of(some)
-            self._parts.append(scores)
-            self.done += len(some) // DISCREPANCIES
-            self._misfit = min(self._misfit, float(np.sum([one.misfit for one in scores], axis=0).min()))
-            found.append(np.sum([one.log_likelihood for one in scores], axis=0))
-            self._say()
-        return np.concatenate(found)
+        before, size = len(self._batches), BATCH * DISCREPANCIES
 
-    def _scores_of(self, points: Array) -> list[Score]:
-        batch, self._batch = self._batch, self._batch + 1
+        def batch(number: int, own: Worker, _: Any) -> list[Score]:
+            return self._scores_of(points[number * size : (number + 1) * size], before + number, own)
+
+        found = side_by_side(batch, -(-len(points) // size), self._worker)
+        self._batches += found
+        return np.concatenate([np.sum([one.log_likelihood for one in scores], axis=0) for scores in found])
+
+    def _scores_of(self, points: Array, batch: int, worker: Worker) -> list[Score]:
+        """Score a batch; by any thread."""
         stored = None if self._store is None else self._store.load(batch)
-        if stored is not None and np.array_equal(stored["points"], points):
-            self._resumed += len(points) // DISCREPANCIES
-            return [
+        known = stored is not None and np.array_equal(stored["points"], points)
+        if stored is not None and known:
+            scores = [
                 Score(**{f.name: stored[f"{f.name}_{place}"] for f in fields(Score)})
                 for place in range(len(self._fit.shots))
             ]
-        scores = evaluate(self._fit, points, seed=batch, device=self._device)
+        else:
+            scores = evaluate(self._fit, points, worker, seed=batch)
+            self._keep(batch, points, scores)
+        with self._lock:
+            self.done += len(points) // DISCREPANCIES
+            self._resumed += len(points) // DISCREPANCIES if known else 0
+            self._misfit = min(self._misfit, float(np.sum([one.misfit for one in scores], axis=0).min()))
+            self._say()
+        return scores
+
+    def _keep(self, batch: int, points: Array, scores: list[Score]) -> None:
+        """Put a batch on the disk."""
         if self._store is not None:
             arrays = {
                 f"{f.name}_{place}": getattr(one, f.name) for place, one in enumerate(scores) for f in fields(Score)
             }
             self._store.save(batch, {"points": points, **arrays})
-        return scores
 
     def scores(self) -> list[Score]:
         """One score per shot over all sets so far."""
-        return [Score.joined([part[place] for part in self._parts]) for place in range(len(self._fit.shots))]
+        return [Score.joined([batch[place] for batch in self._batches]) for place in range(len(self._fit.shots))]
 
     def tell(self, effective: float, pareto_k: float) -> None:
         self._effective, self._pareto_k = effective, pareto_k

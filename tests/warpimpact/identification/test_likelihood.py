@@ -18,9 +18,11 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results.measures import Measure
 from warpimpact.scene import IDENTITY, Shots
 from warpimpact.solver.simulate import simulate
+from warpimpact.solver.worker import Worker
 
 FitMaker = Callable[..., Fit]
 POINTS = 16
+CPU = Worker("cpu")
 
 
 def outcomes_of(velocity: np.ndarray, angle: np.ndarray, status: Any = Status.PERFORATED) -> Outcomes:
@@ -173,7 +175,7 @@ def test_an_interval_of_degradation_is_a_degradation_of_the_shot(make_fit: FitMa
     column = [one.name for one in fit.parameters].index("degradation_interval")
     points = np.zeros((2, len(fit.parameters)))
     points[1, column] = 1.0
-    (run,) = runs(fit, bench, points, device="cpu")
+    (run,) = runs(fit, bench, points, CPU)
     values = {one.path: float(one.at(points[1:, i])[0]) for i, one in enumerate(fit.parameters)}
     scene = fit.scene_of(fit.shots[0], values)
     assert scene.target.layers[0].degradation_interval == values["plate", "degradation_interval"]
@@ -188,10 +190,10 @@ def test_sets_that_differ_in_discrepancy_alone_share_their_runs(make_fit: FitMak
     points = np.random.default_rng(0).standard_normal((4, len(fit.parameters)))
     points[[1, 3], :2] = points[[0, 2], :2]
     (bench,) = benches(fit)
-    assert sum(len(run.which) for run in runs(fit, bench, points, device="cpu")) == 2
-    together = evaluate(fit, points[:2], seed=0, device="cpu")  # each set has hits of its own
+    assert sum(len(run.which) for run in runs(fit, bench, points, CPU)) == 2
+    together = evaluate(fit, points[:2], CPU, seed=0)  # each set has hits of its own
     for row in range(2):
-        alone = evaluate(fit, points[[row]], seed=0, device="cpu")
+        alone = evaluate(fit, points[[row]], CPU, seed=0)
         for one, other in zip(together, alone, strict=True):
             assert one.log_likelihood[row] == pytest.approx(other.log_likelihood[0])
     assert data_of(fit, fit.shots[0]).standoffs == (0.05,)
