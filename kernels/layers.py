@@ -52,9 +52,10 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
 
         `rearmost` and `foremost` are the ends of the core along x, and `deepest` is the largest x that it has reached
         so far [m]. `clearance` is a lower bound of its distance from the material of layers that it passes through a
-        hole or beside [m]. `behind` says whether it has left the plate through its rear face. `flight` is the unit
-        vector along the line of fire; a core that gets farther away from the hit across the line than `farthest` [m]
-        never ends.
+        hole or beside [m]. `behind` says whether it has left the plate through its rear face. `barrier` is the work
+        that a core takes straight through the layers before it, if they were solid [J]. `flight` is the unit vector
+        along the line of fire; a core that gets farther away from the hit across the line than `farthest` [m] never
+        ends.
         """
 
         found: Footprint
@@ -65,6 +66,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         deepest: real
         clearance: real
         behind: wp.bool
+        barrier: real
         flight: vec3
         farthest: real
 
@@ -239,6 +241,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         reached.foremost = foremost
         reached.deepest = wp.max(before.deepest, foremost)
         reached.clearance = real(far)
+        reached.barrier = zero
         reached.first = target.count
         reached.last = -1
         margin = half * dt * pose.speed
@@ -252,6 +255,9 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
             front, rear = faces_of(target, k, shot)
             found.through = low > rear  # in the end, that of the last layer
             near = high > front and low < rear
+            if low > rear:
+                section = real(wp.pi) * surface.max_radius * surface.max_radius
+                reached.barrier += own_of(target.a0, k, shot) * (rear - front) * section
             if near:
                 touch, clearance = touch_of(
                     surface, target, fields, stack, earlier, shots, slot, k, shot, state, pose, dt

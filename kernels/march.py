@@ -39,6 +39,8 @@ def build(variant: Variant) -> SimpleNamespace:
     steadied = real(8.0)  # onsets: as far as a step carries a core beyond the ramp
     still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
     spent = real(2.5e-3)  # likewise: at 5 % it does not come back through a layer that it has left
+    weak = real(2.25e-2)  # likewise: nor does one that flies back at 15 %, however fast it goes along the layers,
+    tenth = real(0.1)  # if that is no more than this share of what solid layers would take
     most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
     use = variant.use(
         bending,
@@ -89,13 +91,15 @@ def build(variant: Variant) -> SimpleNamespace:
         found: Footprint,
         touched: wp.bool,
         behind: wp.bool,
+        barrier: real,
         initial_energy: real,
         depth: real,
     ):
         """The final status of a core, or RUNNING.
 
         A core outside the target, which is `depth` [m] deep, cannot come back if it moves away faster than its rotation
-        moves any part of it. A core that turns back `behind` a layer, and is spent, rests there.
+        moves any part of it. A core that turns back `behind` a layer, and is spent, rests there; between
+        layers, what it has along them does not count, and they are a `barrier` to it [J].
         """
         status = RUNNING
         energy = use.rigid_body.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
@@ -104,7 +108,11 @@ def build(variant: Variant) -> SimpleNamespace:
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, pose.axis))
         leaving = wp.abs(state.velocity[0])
         beyond = wp.max(state.position[0] - depth, -state.position[0])
-        rest = wp.where(behind and state.velocity[0] < zero, spent, still)
+        back = behind and state.velocity[0] < zero
+        rests = energy - about_axis < wp.where(back, spent, still) * initial_energy
+        along_layers = half * body.mass * wp.length_sq(vec3(zero, state.velocity[1], state.velocity[2]))
+        crossing = energy - about_axis - along_layers
+        stays = back and found.last_ring < 0 and crossing < wp.min(weak * initial_energy, tenth * barrier)
         gone = leaving > turning or beyond > surface.bounding_radius
         if not wp.isfinite(energy):
             status = Status.NOT_FINITE
@@ -114,7 +122,7 @@ def build(variant: Variant) -> SimpleNamespace:
             status = wp.where(touched, Status.PERFORATED, Status.MISSED)
         elif found.back and state.velocity[0] < zero and gone:
             status = wp.where(touched, Status.RICOCHETED, Status.MISSED)
-        elif touched and energy - about_axis < rest * initial_energy:
+        elif touched and (rests or stays):
             status = Status.ARRESTED
         elif not found.inside:
             status = Status.LEFT_WINDOW
@@ -197,7 +205,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 now, dt,
             )  # fmt: skip
             found = reached.found
-            status = ended(surface, body, state, pose, found, touched, reached.behind, initial_energy, depth)
+            status = ended(
+                surface, body, state, pose, found, touched, reached.behind, reached.barrier, initial_energy, depth
+            )
             if status == RUNNING:
                 law = reaches.law_at(target, law, stack, slot, shot, reached)
                 law.onset = use.interaction.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
@@ -252,7 +262,9 @@ def build(variant: Variant) -> SimpleNamespace:
         outcomes.steps[shot] = step
         outcomes.contact_duration[shot] = real(contact_steps) * shortest + longer
         energy_loss = zero
-        if touched:
+        if status == Status.ARRESTED:
+            energy_loss = initial_energy
+        elif touched:
             energy_loss = initial_energy - use.rigid_body.kinetic_energy(
                 body, axis, state.velocity, state.angular_momentum
             )

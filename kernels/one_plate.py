@@ -31,11 +31,13 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
 
     @wp.struct
     class Reached:
-        """What a step can touch, and the window of the plate. A core is never `behind` a plate of its target."""
+        """What a step can touch, and the window of the plate. A core is never `behind` a plate of its target,
+        and nothing is a `barrier` to it."""
 
         found: Footprint
         window: Window
         behind: wp.bool
+        barrier: real
 
     @wp.func
     def reach_of(surface: Surface, thickness: real, state: State):

@@ -217,6 +217,27 @@ def test_a_base_that_stays_as_it_is_has_longer_steps_that_take_a_share_of_the_sp
     assert max(longest) > 2.0
 
 
+def test_a_core_that_a_base_throws_aside_stays_between_the_layers(device: str) -> None:
+    base = layer(solid_plate(degradation=1.0, resistance=4e9), gap=60e-3, thickness=12e-3)
+    target, shots = Target(layers=(paper_plate(), base)), shots_at(Y, Z, obliquity=45.0)
+    outcomes = simulate(target, shots=shots, device=device, level=2)
+    impact = 0.5 * CORE.mass * 825.0**2
+    assert (outcomes.status == Status.ARRESTED).all()
+    assert outcomes.energy_loss == pytest.approx(impact)  # what is left will be lost, too
+    aside = np.flatnonzero(outcomes.stopped_in < 0)
+    assert len(aside) > 12
+    assert (outcomes.layer_status[aside, 1] == Status.RICOCHETED).all()
+    largest = 0.0
+    for history in histories(target, shots[aside]):
+        back, *along = history.velocity[-1]
+        assert back < 0.0
+        assert not history.force[-1].any()
+        crossing = history.energy - 0.5 * CORE.mass * (history.velocity[:, 1:] ** 2).sum(axis=1)
+        assert crossing[-1] < 0.15**2 * impact  # less its spin, of which it has none
+        largest = max(largest, float(np.linalg.norm(along)))
+    assert largest > 0.15 * 825.0
+
+
 def mirrored(target: Target) -> Target:
     """A target of patterns that are their own mirror images, mirrored in y."""
     layers = tuple(one.model_copy(update={"offset": (-one.offset[0], one.offset[1])}) for one in target.layers[1:])
