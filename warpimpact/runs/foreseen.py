@@ -10,8 +10,6 @@ from warpimpact.solver.prepare import prepare
 
 SLOW = 1.0
 """Seconds of a core that a hit takes, from which on that is told."""
-PER_BYTE, PER_PATCH = 4e-10, 5e-9
-"""Seconds that a core takes to open a window, per byte, and for a step, per patch (tests/benchmarks/NOTES.md)."""
 
 
 class Costly(UserWarning):
@@ -48,17 +46,15 @@ def cost_of(campaign: Campaign, numerics: Numerics) -> str | None:
     sampler, images = campaign.sampler(), len(campaign.symmetries)
     shots = sampler.shots(0, images * campaign.at_a_plate)[::images]
     prepared = prepare(campaign.scene, shots, numerics)
-    nodes = sum(prepared.nodes((prepared.cells,) * 2)) if prepared.variant.degrades else 0
-    size = 2 * (8 if prepared.variant.double else 4) * nodes
-    patches = len(prepared.surfaces[0].rings.station) * prepared.resolution.patches_around
-    seconds, hits = PER_BYTE * size + PER_PATCH * patches * prepared.steps, len(sampler) // images
+    seconds, hits = prepared.seconds, len(sampler) // images
     if seconds < SLOW:
         return None
     level = "" if numerics.level is None else f"at level {numerics.level} "
     return (
-        f"{level}a hit takes about {seconds:.2g} s of a core or more, and {hits} hits {_long(seconds * hits)}: at "
-        f"least {prepared.steps} steps, and windows of {nodes:.2g} nodes, {size / 2**30:.2g} GiB; a lower level, and a "
-        "longer degradation_length or degradation_depth, take less"
+        f"{level}a hit takes about {seconds:.2g} s of a core, and {hits} hits {_long(seconds * hits)}: at "
+        f"least {prepared.steps} steps, and windows of {prepared.window_nodes:.2g} nodes, "
+        f"{prepared.window_bytes / 2**30:.2g} GiB; a lower level, and a longer degradation_length or "
+        "degradation_depth, take less"
     )
 
 

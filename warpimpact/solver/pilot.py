@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeAlias, TypeVar
 
@@ -38,6 +38,8 @@ MORE, PART = 256, 16
 """Shots of a pilot where SHOTS leave the choice between two levels open, and one of so many shots of a run at most."""
 OPEN = (0.7, 1.5)
 """Upper estimates over what is allowed, between which more shots may choose another level."""
+FEW = 2
+"""Shots that end otherwise, as few as which say little of their share; likewise."""
 FAR = 4.0
 """Estimates over what is allowed, above which the next level is not tried: errors about halve from level to level."""
 STALLED = 0.7
@@ -53,6 +55,10 @@ FURTHER = 5
 for draft and standard, but one. Who asks for a draft waits for no level that costs fifty times as much."""
 FURTHER_LAYERED = 3
 """Likewise behind several layers, where a shot costs more: eight to ten times the first level's cost."""
+PATIENCE, WORTH = 20.0, 3200
+"""What a pilot may take: so many seconds of a core, or as long as so many hits take at the level that it has looked at
+last, whichever is more. As long as it takes no more than these seconds, it looks at finer levels than FURTHER, too.
+Times are those that are foreseen (`Prepared.seconds`), so that a level does not depend on the machine."""
 FINEST_LIMIT = 6
 """The last level that is taken for limits. A finer one is only compared with."""
 BEYOND, BEYOND_LIMITS = 1, 2
@@ -86,12 +92,33 @@ Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
 """What outcomes of some shots at a level are off by over what is allowed, from those at a finer level."""
 
 
+class Purse:
+    """What a pilot may still take, by the price of a shot at a level [s]."""
+
+    def __init__(self, price: Callable[[int], float]) -> None:
+        self._price, self._spent = price, 0.0
+
+    def pay(self, level: int, shots: int) -> None:
+        """Some shots are computed."""
+        self._spent += shots * self._price(level)
+
+    def allows(self, levels: Iterable[int], shots: int, last: int, patient: bool) -> bool:
+        """Whether some shots at some levels are worth their time, after a level that was looked at. Who is not
+        `patient` goes on only as long as it takes no time to speak of."""
+        try:
+            spent = self._spent + shots * sum(self._price(level) for level in levels)
+        except MemoryError:  # the plate's period does not fit at that spacing
+            return False
+        return spent <= PATIENCE or (patient and spent <= WORTH * self._price(last))
+
+
 def pilot_hits(
     outcomes_at: Callable[[int, Shots], Outcomes],
     pilot: Shots,
     numerics: Numerics,
     free: Sequence[bool] = (True,),
     excess_of: Excess | None = None,
+    purse: Purse | None = None,
 ) -> HitErrors:
     """Find the coarsest level whose outcomes have the accuracy that is asked for.
 
@@ -103,6 +130,7 @@ def pilot_hits(
         free: of each layer of the target, whether a core flies free behind it (`Scene.free_behind`). Residual
             velocities behind others count in no error.
         excess_of: in place of the accuracy, from the coarsest level on.
+        purse: what it may take; None if that does not matter.
 
     Returns:
         The level that keeps the promise. If none does: the coarsest one that keeps it with errors weighed by the energy
@@ -123,12 +151,23 @@ def pilot_hits(
 
     def computed(index: int, whole: bool) -> Outcomes:
         if (index, whole) not in known:
-            others = [computed(index, False), outcomes_at(index, rest)] if whole else []
-            known[index, whole] = Outcomes.joined(others) if whole else outcomes_at(index, some)
+            others = [computed(index, False)] if whole else []
+            known[index, whole] = Outcomes.joined([*others, outcomes_at(index, rest if whole else some)])
+            if purse is not None:
+                purse.pay(index, len(rest if whole else some))
         return known[index, whole]
+
+    def allowed(index: int, finer: int, whole: bool = False) -> bool:
+        usual = index <= level + (FURTHER if len(free) == 1 else FURTHER_LAYERED)
+        if purse is None or not tried:
+            return usual
+        new = [one for one in (index, finer) if (one, whole) not in known]
+        return purse.allows(new, len(rest if whole else some), max(tried), usual)
 
     def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
         for whole in (False, True) if len(rest) else (False,):
+            if whole and not allowed(index, finer, whole):
+                break
             shots = pilot if whole else some
             pair = computed(index, whole), computed(finer, whole)
             found, excess, weighed = judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
@@ -140,14 +179,13 @@ def pilot_hits(
                 "pilot of %d hits at level %d: errors of %s, the promise is %skept",
                 len(shots), index, found.errors, "" if found.kept else "not ",
             )  # fmt: skip
-            if not OPEN[0] < excess < OPEN[1]:
+            few = accuracy.status_share < found.status_error <= FEW / len(shots)
+            if not (OPEN[0] < excess < OPEN[1] or (few and excess <= OPEN[0])):
                 break
         tried[index] = found, *pair
         return found, excess, nearly
 
-    further = FURTHER if len(free) == 1 else FURTHER_LAYERED
-    levels = range(level, min(level + further, len(LADDER) - 2) + 1)
-    found = _coarsest(judge, levels, len(LADDER) - 1, BEYOND)
+    found = _coarsest(judge, range(level, len(LADDER) - 1), len(LADDER) - 1, BEYOND, allowed)
     if found is None:
         return HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
     return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
@@ -252,7 +290,11 @@ Finding = TypeVar("Finding", bound=Found)
 
 
 def _coarsest(
-    judge: Callable[[int, int, float], tuple[Finding, float, bool]], levels: range, finest: int, beyond: int
+    judge: Callable[[int, int, float], tuple[Finding, float, bool]],
+    levels: range,
+    finest: int,
+    beyond: int,
+    allowed: Callable[[int, int], bool] = lambda index, finer: True,
 ) -> Finding | None:
     """What is found at the coarsest of some levels that keeps the promise; if none does, at the coarsest one that
     nearly does, else at the coarsest one whose errors are about the smallest. None if not even the first level fits the
@@ -263,12 +305,15 @@ def _coarsest(
             whether it nearly keeps the promise.
         finest: the last level to compare with.
         beyond: levels that are tried behind one that nearly keeps the promise.
+        allowed: whether a level, compared with a finer one, is worth its cost.
     """
     tried: dict[int, tuple[Finding, float]] = {}
     enough = None
     index, last = levels[0], levels[-1]
     while index <= last:
         finer = min(index + 2, finest)  # neighbours err alike
+        if not allowed(index, finer):
+            break
         try:
             found, excess, nearly = judge(index, finer, MARGIN[finer - index])
         except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
@@ -280,6 +325,7 @@ def _coarsest(
         if any(excess > STALLED * before for at, (_, before) in tried.items() if at <= index - 2):
             last = index
         tried[index] = found, excess
-        index += 2 if excess > FAR and enough is None and index + 2 <= last else 1
+        far = excess > FAR and enough is None and index + 2 <= last and allowed(index + 2, min(index + 4, finest))
+        index += 2 if far else 1
     smallest = min((excess for _, excess in tried.values()), default=math.inf)
     return enough or next((found for found, excess in tried.values() if excess <= ALIKE * smallest), None)

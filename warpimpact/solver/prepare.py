@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+PER_BYTE, PER_PATCH, PER_NODE = 4e-10, 5e-9, 2e-9
+"""Seconds that a core takes to open a window, per byte; for a step, per patch; and per node under the core
+(tests/benchmarks/NOTES.md)."""
+
 
 class Surface(NamedTuple):
     """A core in patches: its rings, the azimuths of the patches of even rings, then of odd rings [rad], shape
@@ -100,6 +104,33 @@ class Prepared:
             max(grids[k].planes.number for grids in self.plates) * math.prod(own) if material.laminate == k else 0
             for k, (material, own) in enumerate(zip(self.materials, self.windows(cells), strict=True))
         ]
+
+    @property
+    def window_nodes(self) -> int:
+        """Nodes of all first windows of a shot together; 0 where nothing weakens."""
+        return sum(self.nodes((self.cells,) * 2)) if self.variant.degrades else 0
+
+    @property
+    def window_bytes(self) -> int:
+        """Memory of their exposure and of what a step adds to it [bytes]."""
+        return 2 * (8 if self.variant.double else 4) * self.window_nodes
+
+    @property
+    def seconds(self) -> float:
+        """What a shot that nothing hinders takes a core, roughly: the same on every machine."""
+        patches = len(self.surfaces[0].rings.station) * self.resolution.patches_around
+        a_step = PER_PATCH * patches + PER_NODE * self._nodes_below
+        return PER_BYTE * self.window_bytes + a_step * self.steps
+
+    @property
+    def _nodes_below(self) -> float:
+        """Nodes of the layers that weaken below the core's largest section, mean over the thickness."""
+        width, layers = 2.0 * self.scene.core.max_radius, self.scene.target.layers
+        below = [
+            own.weakens * layer.thickness * grid.planes.number * (width / grid.spacing) ** 2
+            for layer, own, grid in zip(layers, self.materials, self.grids, strict=True)
+        ]
+        return float(sum(below) / sum(layer.thickness for layer in layers))
 
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:

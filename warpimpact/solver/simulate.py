@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from warpimpact.solver.easing import eased, worth_easing
 from warpimpact.solver.findings import Cost, HitErrors
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import Excess, pilot_hits, pilot_size
+from warpimpact.solver.pilot import Excess, Purse, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
@@ -90,7 +91,7 @@ def pilot_of(
         pilot: some of the shots.
         trying: called with every level that is computed.
         excess_of: as in `pilot_hits`.
-        hits: of the run that the resolution is for.
+        hits: of the run that the resolution is for; 0 if that is not known.
     """
 
     seconds: dict[Numerics, float] = {}
@@ -108,7 +109,10 @@ def pilot_of(
     def at_one(level: int, some: Shots) -> Outcomes:
         return outcomes_at(at_level(level, numerics), some)
 
-    found = pilot_hits(at_one, pilot, numerics, scene.free_behind, excess_of)
+    def price(level: int) -> float:
+        return prepare(scene, pilot[: pilot.at_a_plate], at_level(level, numerics)).seconds
+
+    found = pilot_hits(at_one, pilot, numerics, scene.free_behind, excess_of, Purse(cache(price)))
     if not found.tried:
         return found
     first = found.tried[0][0]

@@ -1,6 +1,7 @@
 """The promise of a named fidelity: the level that a pilot chooses keeps it on hits that were not in the pilot."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +33,7 @@ from warpimpact.solver.changes import RISK, SLOW, changes, ended_otherwise, uppe
 from warpimpact.solver.pilot import (
     MARGIN,
     HitErrors,
+    Purse,
     pilot_hits,
     pilot_size,
 )
@@ -133,6 +135,7 @@ def test_what_cannot_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_promise_ends_at_its_finest_level(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pilot, "FURTHER", 1)
+    monkeypatch.setattr(pilot, "PATIENCE", 0.0)
     monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
     found = found_for(NOTHING, PILOT[:4])
     assert not found.kept
@@ -261,6 +264,56 @@ def test_levels_that_a_pilot_tries(excess: list[float], tried: list[int], taken:
     found = pilot._coarsest(judge, range(5), 9, 1)
     assert found is not None
     assert (seen, found.numerics.level) == (tried, taken)
+
+
+@pytest.mark.parametrize(
+    ("price", "tried"),
+    [
+        (lambda level: 1e-6, [0, 1, 2, 3, 4]),  # takes no time: beyond the usual levels, as long as one is to be found
+        (lambda level: 1.0, [0, 1, 2]),  # the last of the usual levels
+        (
+            lambda level: 1.0 if level < 4 else 300.0,
+            [0, 1],
+        ),  # 16 hits at the fifth take longer than WORTH at the second
+    ],
+)
+def test_a_pilot_looks_at_levels_that_are_worth_their_time(
+    price: Callable[[int], float], tried: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = simulate(SCENE, PILOT[:16], numerics=Numerics(level=0), device="cpu")
+    seen = []
+
+    def outcomes_at(level: int, some: Shots) -> Outcomes:
+        seen.append(level)  # errors fall to half from level to level, and the fifth keeps the promise
+        return known.assign(residual_velocity=known.residual_velocity + 40.0 * 0.5**level)
+
+    monkeypatch.setattr(pilot, "SHOTS", 16)
+    monkeypatch.setattr(pilot, "FURTHER", 2)
+    monkeypatch.setattr(pilot, "FAR", math.inf)
+    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+    asked = Numerics(accuracy={"residual_velocity": 3.0})
+    found = pilot_hits(outcomes_at, PILOT[:16], asked, purse=Purse(price))
+    assert sorted(level for level in set(seen) if level + 2 in seen) == tried
+    assert found.kept == (tried[-1] == 4)
+
+
+@pytest.mark.parametrize(("otherwise", "parts"), [(0, [32, 32]), (1, [32, 32, 32, 32]), (3, [32, 32])])
+def test_more_hits_tell_the_share_that_ends_otherwise(
+    otherwise: int, parts: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = simulate(STOPPING, PILOT, numerics=Numerics(level=0), device="cpu")
+    ends, counts = one.status.copy(), []
+    ends[:otherwise] = np.where(ends[:otherwise] == Status.ARRESTED, Status.PERFORATED, Status.ARRESTED)
+
+    def outcomes_at(level: int, some: Shots) -> Outcomes:
+        counts.append(len(some))
+        return one.assign(status=ends if level == 2 and len(counts) < 3 else one.status)
+
+    monkeypatch.setattr(pilot, "SHOTS", 32)
+    monkeypatch.setattr(pilot, "FURTHER_LAYERED", 0)
+    found = pilot_hits(outcomes_at, Shots.joined([PILOT, PILOT]), Numerics(), (True, True))
+    assert counts == parts
+    assert found.kept == (otherwise == 0)
 
 
 @pytest.mark.parametrize("error", [math.inf, math.nan, 1e300])
