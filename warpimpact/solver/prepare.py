@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 PER_BYTE, PER_PATCH, PER_NODE = 4e-10, 5e-9, 2e-9
 """Seconds that a core takes to open a window, per byte; for a step, per patch; and per node under the core
 (tests/benchmarks/NOTES.md)."""
+AFTER_OTHERS = 3.0
+"""Times as much where earlier hits have left their marks in the plate."""
 
 
 class Surface(NamedTuple):
@@ -120,7 +122,8 @@ class Prepared:
         """What a shot that nothing hinders takes a core, roughly: the same on every machine."""
         patches = len(self.surfaces[0].rings.station) * self.resolution.patches_around
         a_step = PER_PATCH * patches + PER_NODE * self._nodes_below
-        return PER_BYTE * self.window_bytes + a_step * self.steps
+        alone = PER_BYTE * self.window_bytes + a_step * self.steps
+        return AFTER_OTHERS * alone if self.variant.burst else alone
 
     @property
     def _nodes_below(self) -> float:
