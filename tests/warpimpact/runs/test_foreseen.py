@@ -24,7 +24,7 @@ def slow() -> Campaign:
 
 def test_hits_that_take_long_are_told_once_at_each_level() -> None:
     cost = Cost(slow(), "cpu")
-    with pytest.warns(Costly, match=r"^at level 2 a hit takes about \d.* s of a core .* 4096 hits .* h: .* GiB"):
+    with pytest.warns(Costly, match=r"^at level 2 a hit takes about \d.* s of a core, and 4096 hits .* h: .* GiB"):
         cost.tell(LEVEL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
