@@ -6,19 +6,7 @@ import numpy as np
 import pytest
 
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import (
-    Accuracy,
-    Hits,
-    Impact,
-    Numerics,
-    Plate,
-    PolynomialCore,
-    Record,
-    Scene,
-    Shots,
-    SlotPattern,
-    make_shots,
-)
+from warpimpact.scene import Accuracy, Hits, Impact, Numerics, Record, Scene, Shots, make_shots
 from warpimpact.solver import easing
 from warpimpact.solver.changes import changes
 from warpimpact.solver.easing import FEW, PART, ROOM, WIDE, eased
@@ -26,15 +14,10 @@ from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
-PLATE = Plate(
-    thickness=4e-3,
-    resistance=2.6e9,
-    shear_coefficient=0.05,
-    degradation=0.8,
-    pattern=SlotPattern(length=12e-3, width=4e-3, spacing=(8e-3, 16e-3), staggered=True),
-)
-CORE = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, mass=4e-3)
-SCENE = Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.13,)))
+from ...verification.scenes import PAPER_CORE, paper_plate
+
+PLATE = paper_plate()
+SCENE = Scene(core=PAPER_CORE, target=PLATE, record=Record(standoffs=(0.13,)))
 PILOT, OTHERS = (make_shots(Impact(velocity=825.0), Hits(count=64, seed=seed), PLATE) for seed in (1, 2))
 
 
