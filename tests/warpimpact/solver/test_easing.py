@@ -1,6 +1,8 @@
 """Coarser levels of single settings, where a level keeps its promise with room to spare."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ from warpimpact.solver import easing
 from warpimpact.solver.changes import changes
 from warpimpact.solver.easing import FEW, PART, ROOM, WIDE, eased
 from warpimpact.solver.findings import HitErrors
+from warpimpact.solver.pilot import MARGIN
+from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
@@ -39,42 +43,79 @@ def test_a_long_run_has_coarser_settings_that_keep_the_promise_on_other_hits(all
     assert tilt <= long.tilt_error <= accuracy.tilt
 
 
-def trials(excess: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> tuple[list[str], HitErrors]:
-    """What is tried from level 4 on, by the excess of each trial; and what is taken."""
-    nothing = simulate(SCENE, PILOT[:1], numerics=Numerics(level=0), device="cpu")
-    found, tried = HitErrors(Numerics(level=4), True, 0.9, 0.0, 0.0), list[str]()
-    found = HitErrors(Numerics(level=4), True, 0.9, 0.0, 0.0, tried=((found, nothing, nothing),))
+def trials(
+    excess: dict[str, float], monkeypatch: pytest.MonkeyPatch, level: int = 4, status: dict[str, float] | None = None
+) -> tuple[list[str], HitErrors]:
+    """What is tried from a level on, by the excess of each trial, and the share of the hits that end otherwise; and
+    what is taken. The pilot tried the next finer level, too, with outcomes of its own."""
+    between, fine = (simulate(SCENE, PILOT[:2], numerics=Numerics(level=k), device="cpu") for k in (0, 1))
+    ended = {"status_error": (status or {}).get("", 0.0)}
+    other, found = (HitErrors(Numerics(level=at), True, 0.9, 0.0, 0.0, **ended) for at in (level + 1, level))
+    found = replace(found, tried=((other, fine, between), (found, between, fine)))
+    outcomes, tried = dict[str, Outcomes](), list[str]()
 
     def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        assert (at.level, len(some)) == (level, len(fine))
         tried.append(str(at.coarser))
-        return nothing
+        return outcomes.setdefault(tried[-1], Outcomes.joined([between]))
 
-    def judged(coarse: object, fine: object, shots: object, at: Numerics, *_: object) -> tuple[HitErrors, float, float]:
-        over = excess[str(at.coarser or "")]
-        return HitErrors(at, over <= 1.0, 0.9, over, 0.0), over, math.inf
+    def judged(coarse: Outcomes, against: Outcomes, shots: Shots, at: Numerics, *given: Any) -> tuple[Any, ...]:
+        name = str(at.coarser or "")
+        assert coarse is outcomes.get(name, between)
+        assert (against, len(shots)) == (fine, len(fine))
+        assert given == (Numerics().asked, MARGIN[1 if level == len(LADDER) - 2 else 2], (True,), between)
+        over = excess.get(name, 2.0)
+        return HitErrors(at, over <= 1.0, 0.9, over, 0.0, status_error=(status or {}).get(name, 0.0)), over, math.inf
 
     monkeypatch.setattr(easing, "judged", judged)
-    return tried, eased(found, outcomes_at, PILOT, Numerics(), (True,))
+    best = eased(found, outcomes_at, PILOT, Numerics(), (True,))
+    assert best.tried[0] == found.tried[0]
+    assert best.tried[1][0].numerics == best.numerics
+    assert best.tried[1][1] is outcomes.get(str(best.numerics.coarser or ""), between)
+    assert best.tried[1][2] is fine
+    return tried, best
 
 
 @pytest.mark.parametrize(
-    ("excess", "coarser"),
+    ("level", "excess", "coarser"),
     [
-        ({"": 0.5 * FEW}, ""),
-        ({"": ROOM + 0.01}, ""),
-        ({"": WIDE + 0.01, "step 3": 1.1, "grid 3": 0.99}, "grid 3"),
-        ({"": WIDE - 0.01, "step 2": 1.1, "step 3": 0.8, "grid 3, step 3": 0.95}, "grid 3, step 3"),
-        ({"": 0.6, "step 3": 0.7, "grid 3, step 3": 1.1, "around 3, step 3": 1.2, "along 3, step 3": 1.3}, "step 3"),
+        (4, {"": 0.9 * FEW}, ""),
+        (4, {"": 1.1 * FEW, "step 2": 0.9 * FEW}, "step 2"),
+        (4, {"": ROOM + 0.01}, ""),
+        (4, {"": WIDE + 0.01, "step 3": 1.1, "grid 3": 0.99}, "grid 3"),
+        (4, {"": WIDE - 0.01, "step 2": 1.1, "step 3": 0.8, "grid 3, step 3": 0.95}, "grid 3, step 3"),
+        (4, {"": WIDE - 0.01, "step 2": 0.8, "grid 3, step 2": 0.95}, "grid 3, step 2"),
+        (4, {"": 0.6, "step 3": 0.7, "grid 3, step 3": 1.1, "around 3, step 3": 1.2, "along 3, step 3": 1.3}, "step 3"),
+        (0, {"": 0.3}, ""),
+        (1, {"": 0.3, "step 0": 0.95}, "step 0"),
+        (2, {"": 0.3, "step 0": 0.95}, "step 0"),
+        (8, {"": 0.3, "step 6": 0.95}, "step 6"),
     ],
 )
 def test_what_is_tried_goes_by_the_room_that_is_left(
-    excess: dict[str, float], coarser: str, monkeypatch: pytest.MonkeyPatch
+    level: int, excess: dict[str, float], coarser: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    tried, found = trials(excess, monkeypatch)
+    tried, found = trials(excess, monkeypatch, level)
     assert tried == [name for name in excess if name]
     assert str(found.numerics.coarser or "") == coarser
     assert found.residual_velocity_error == excess[coarser]
-    assert found.tried[0][0].numerics == found.numerics
+
+
+@pytest.mark.parametrize(
+    ("status", "coarser"),
+    [
+        ({"step 3": 0.01}, "grid 3, step 3"),  # as many as standard allows
+        ({"step 3": 0.011}, ""),
+        ({"": 0.02, "step 3": 0.02}, "grid 3, step 3"),  # no more than at the level itself
+        ({"": 0.02, "grid 3, step 3": 0.02}, "step 3"),  # more than with that step
+        ({"": math.nan, "step 3": math.nan, "grid 3, step 3": math.nan}, "grid 3, step 3"),  # a single plate
+    ],
+)
+def test_no_more_hits_end_otherwise_than_may(
+    status: dict[str, float], coarser: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _, found = trials({"": 0.6, "step 3": 0.7, "grid 3, step 3": 0.8}, monkeypatch, status=status)
+    assert str(found.numerics.coarser or "") == coarser
 
 
 def test_a_level_that_does_not_keep_its_promise_stays_as_it_is() -> None:
