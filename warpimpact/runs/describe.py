@@ -178,4 +178,5 @@ def _asked(campaign: Campaign) -> str:
         return "accuracy in numbers" if numerics.accuracy is not None else f"{numerics.fidelity} fidelity"
     if numerics.level is None:
         return "given resolution"
-    return f"level {numerics.level}" + (f" ({numerics.coarser})" if numerics.coarser else "")
+    coarser = str(numerics.coarser or "")
+    return f"level {numerics.level}" + (f" ({coarser})" if coarser else "")

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from warpimpact.analysis.summary import summary, summary_text
+from warpimpact.analysis.summary import promise_text, summary, summary_text
 from warpimpact.kernels.status import Status
+from warpimpact.results import attributes as attr
 from warpimpact.results.dataset import passed
+from warpimpact.scene import Numerics
 
 MIXED = [Status.PERFORATED, Status.ARRESTED, Status.RICOCHETED, Status.MISSED, Status.UNFINISHED]
 
@@ -73,3 +75,20 @@ def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result):
     assert np.isnan(velocity.mean)
     assert "no core behind the plate" in summary_text(dataset)
     assert "nan" not in summary_text(dataset)
+
+
+@pytest.mark.parametrize(
+    ("coarser", "level"),
+    [(None, "level 4 found"), ({"step": 2, "along": 3}, "level 4 (along 3, step 2) found")],
+)
+def test_the_level_of_a_stop_rule_has_its_coarser_settings(make_result, coarser, level):
+    told = {
+        attr.NUMERICS_GIVEN: "{}",
+        attr.RESOLUTION: Numerics(level=4, coarser=coarser).model_dump_json(),
+        attr.PROMISE_KEPT: 1,
+        attr.LEVEL_FOR: "mean(deflection)",
+        attr.RESIDUAL_VELOCITY_ERROR: 0.5,
+        attr.TILT_ERROR: 0.25,
+    }
+    text = promise_text(make_result(1).assign_attrs(told))
+    assert text.startswith(f"{level} for mean(deflection); single hits may err by ")

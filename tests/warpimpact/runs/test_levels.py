@@ -18,6 +18,7 @@ from warpimpact.results.dataset import finer_pair
 from warpimpact.results.measures import Measure
 from warpimpact.runs.run import run, run_to_file
 from warpimpact.solver.pilot import SHOTS
+from warpimpact.solver.resolution import LADDER, SLENDER
 
 SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
 STOP = '[stop]\nquantity = "mean(tilt@130mm)"\nhalf_width = "{}"\nmax_count = 4096\n\n[output]'
@@ -55,6 +56,19 @@ def test_the_finer_hits_are_those_that_this_level_computes(changes: dict[str, st
         np.testing.assert_array_equal(fine[name].values, again[name].values[at])
         assert name == v.STATUS or (coarse[name].values != fine[name].values).any()
     assert v.FINER_HIT not in again
+
+
+@pytest.mark.parametrize(
+    ("coarser", "said"), [({}, "level 3, "), ({"step": 0, "along": 2}, "level 3 (along 2, step 0), ")]
+)
+def test_a_result_says_which_settings_were_coarser(coarser: dict[str, int], said: str) -> None:
+    numerics = Numerics(level=3, coarser=coarser)
+    told = run(campaign({"count = 256": "count = 8"}).model_copy(update={"numerics": numerics}), device="cpu").attrs
+    assert told[attr.NUMERICS].startswith(f"{said}consistent scheme, time_step ")
+    assert json.loads(told[attr.NUMERICS_GIVEN])["coarser"] == coarser
+    travel = LADDER[coarser.get("step", 3)].travel
+    assert told[attr.TIME_STEP] == pytest.approx(travel * SLENDER * 27.86e-3 / 825.0)
+    assert told[attr.PATCHES_AXIAL] == LADDER[coarser.get("along", 3)].patches_axial
 
 
 @pytest.mark.usefixtures("small_shards")
