@@ -12,10 +12,11 @@ from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import CirclePattern, Layer, Numerics, OgiveCore, Plate, Scene, Shots, Target
 from warpimpact.solver import limit
-from warpimpact.solver.limit import Sought, limit_thickness, limit_velocity
+from warpimpact.solver.limit import STEPS, Sought, limit_thickness, limit_velocity, short_steps
 from warpimpact.solver.limit_near import Neighbours
 from warpimpact.solver.limit_search import MOST_RUNS, Guess, Search
 from warpimpact.solver.prepare import Prepared
+from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import simulate
 from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
@@ -30,6 +31,16 @@ STANDARD = Numerics(level=2)
 def shots(count: int, velocity: float = 800.0, **own: object) -> Shots:
     zero = np.zeros(count)
     return Shots(zero, zero, zero + velocity, zero, zero, zero, zero, zero, **own)
+
+
+@pytest.mark.parametrize(("coarser", "level"), [({}, 4), ({"grid": 1}, 4), ({"step": 2, "along": 3}, 2)])
+def test_short_steps_follow_from_the_level_of_the_step(coarser: dict[str, int], level: int) -> None:
+    numerics = Numerics(level=4, coarser=coarser)
+    short = short_steps(numerics)
+    assert short.travel == LADDER[level].travel / STEPS
+    assert short == numerics.model_copy(update={"travel": short.travel})  # patches and grid stay
+    given = numerics.model_copy(update={"travel": 0.3})
+    assert short_steps(given) == given
 
 
 def test_parameters_of_a_shot_count() -> None:
