@@ -17,7 +17,6 @@ from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, shift_of
-from warpimpact.scene import Coarser
 from warpimpact.scene.display import STORED
 from warpimpact.solver.pilot_text import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
@@ -109,13 +108,8 @@ def _level_for(told: Mapping[str, Any]) -> str:
     depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
     errors = f"single hits may err by {errors_text(velocity, tilt, depth, status)}"
     which = "found" if told[attr.PROMISE_KEPT] else "not exact enough"
-    return f"{_level(told)} {which} for {told[attr.LEVEL_FOR]}; {errors}"
-
-
-def _level(told: Mapping[str, Any]) -> str:
-    found = json.loads(told[attr.RESOLUTION])
-    coarser = Coarser(**found.get("coarser") or {})
-    return f"level {found['level']}" + (f" ({coarser})" if str(coarser) else "")
+    level = json.loads(told[attr.RESOLUTION])["level"]
+    return f"level {level} {which} for {told[attr.LEVEL_FOR]}; {errors}"
 
 
 def breaks_promise(dataset: Result) -> bool:

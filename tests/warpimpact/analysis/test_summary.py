@@ -77,18 +77,15 @@ def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result):
     assert "nan" not in summary_text(dataset)
 
 
-@pytest.mark.parametrize(
-    ("coarser", "level"),
-    [(None, "level 4 found"), ({"step": 2, "along": 3}, "level 4 (along 3, step 2) found")],
-)
-def test_the_level_of_a_stop_rule_has_its_coarser_settings(make_result, coarser, level):
+@pytest.mark.parametrize(("kept", "found"), [(1, "found"), (0, "not exact enough")])
+def test_the_level_of_a_stop_rule_is_told(make_result, kept, found):
     told = {
         attr.NUMERICS_GIVEN: "{}",
-        attr.RESOLUTION: Numerics(level=4, coarser=coarser).model_dump_json(),
-        attr.PROMISE_KEPT: 1,
+        attr.RESOLUTION: Numerics(level=4).model_dump_json(),
+        attr.PROMISE_KEPT: kept,
         attr.LEVEL_FOR: "mean(deflection)",
         attr.RESIDUAL_VELOCITY_ERROR: 0.5,
         attr.TILT_ERROR: 0.25,
     }
     text = promise_text(make_result(1).assign_attrs(told))
-    assert text.startswith(f"{level} for mean(deflection); single hits may err by ")
+    assert text.startswith(f"level 4 {found} for mean(deflection); single hits may err by ")
