@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.scene.patterns import WHOLE_CELL
 from warpimpact.solver.device import SMALL, free_memory
 from warpimpact.solver.keys import Key
 from warpimpact.solver.materials import ROUNDING
@@ -37,8 +38,6 @@ BLUR = 3
 Odd."""
 BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
-SUBSAMPLES = 6
-"""Points per cell and direction from which a material fraction is computed."""
 EDGE = 2**16
 """Cells beside an edge that are summed together, about."""
 
@@ -213,18 +212,25 @@ def _tile(key: Key[Pattern], spacing: float, sharp: bool, real: Real) -> Tile:
             f"plate, {period_y:g} m x {period_z:g} m, needs {needed / 2**30:.3g} GiB in cells of {spacing:.3g} m, and "
             f"{free / 2**30:.3g} GiB are free"
         )
-    samples = 1 if sharp else SUBSAMPLES
-    inside = pattern.points_in_holes((count_y, count_z), (dy, dz), samples)
-    shares = 1.0 - np.arange(samples**2 + 1) / samples**2
-    return Tile(shares[inside].astype(real) if sharp else _blurred(inside, shares, real), dy, dz)
+    if sharp:
+        return Tile(_sharp(pattern, count_y, count_z).astype(real), dy, dz)
+    return Tile(_blurred(pattern.shares_in_holes((count_y, count_z), (dy, dz)), real), dy, dz)
 
 
-def _blurred(inside: Counts, shares: Array, real: Real) -> Floats:
+def _sharp(pattern: Pattern, count_y: int, count_z: int) -> NDArray[np.bool_]:
+    """Whether the centres of so many cells of a period are material."""
+    y, z = (
+        np.float64(side / count) * (np.arange(count) + 0.5)
+        for side, count in zip(pattern.period, (count_y, count_z), strict=True)
+    )
+    return ~np.stack([pattern.is_hole(y[k : k + 1], z) for k in range(count_y)])
+
+
+def _blurred(inside: Counts, real: Real) -> Floats:
     """Means of material over BLUR × BLUR cells of a period. Only cells beside an edge are summed.
 
     Args:
-        inside: points of each cell in holes.
-        shares: of material, by the number of such points.
+        inside: share of each cell in holes, in parts of WHOLE_CELL.
     """
     rows, columns = inside.shape
     wide = np.pad(inside, BLUR // 2, mode="wrap")
@@ -234,10 +240,10 @@ def _blurred(inside: Counts, shares: Array, real: Real) -> Floats:
         for along in [functools.reduce(extreme, (wide[k : k + rows] for k in range(BLUR)))]
     )
     material: Floats = (most == 0).astype(real)
-    edge = np.flatnonzero((most > 0) & (least < len(shares) - 1))
+    edge = np.flatnonzero((most > 0) & (least < WHOLE_CELL))
     for lot in np.array_split(edge, 1 + len(edge) // EDGE):
         row, column = np.divmod(lot, columns)
-        along = [_mean([shares[wide[row + k, column + m]] for k in range(BLUR)]) for m in range(BLUR)]
+        along = [_mean([1.0 - wide[row + k, column + m] / WHOLE_CELL for k in range(BLUR)]) for m in range(BLUR)]
         material[row, column] = _mean(along)
     return material
 

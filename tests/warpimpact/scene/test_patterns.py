@@ -18,12 +18,13 @@ from warpimpact.scene import (
     LatticePattern,
     LevelSetPattern,
     NoPattern,
-    Pattern,
     SlotPattern,
     SquarePattern,
     TrianglePattern,
     Wave,
 )
+from warpimpact.scene.patterns import WHOLE_CELL
+from warpimpact.scene.patterns.lines import LINES
 
 MM = 1e-3
 SLOT = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
@@ -317,7 +318,6 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
     assert clear.mean() > 0.99
 
 
-@pytest.mark.parametrize("samples", [1, 6])
 @pytest.mark.parametrize(
     "pattern",
     [
@@ -329,26 +329,49 @@ def test_a_turned_hole_is_the_hole_turned(shape: LatticePattern, turn: float) ->
     ],
     ids=lambda pattern: getattr(pattern, "shape", pattern),
 )
-def test_points_in_holes_are_those_that_lie_in_a_hole(
-    pattern: Any, samples: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("warpimpact.scene.patterns.lines._LINES", 100)  # several lots
-    counts = (57, 46)
-    sides = (pattern.period[0] / counts[0], pattern.period[1] / counts[1])
-    exact = Pattern.points_in_holes(pattern, counts, sides, samples)  # looks at every point
-    assert np.array_equal(pattern.points_in_holes(counts, sides, samples), exact)
-    assert exact.mean() / samples**2 == pytest.approx(pattern.open_area, abs=0.02)
+def test_shares_of_cells_in_holes_are_those_of_many_points(pattern: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("warpimpact.scene.patterns.lines._AT_ONCE", 100)  # several lots
+    counts, points = (57, 46), 24
+    sides = pattern.period[0] / counts[0], pattern.period[1] / counts[1]
+    y, z = ((np.arange(points * n) + 0.5) * side / points for n, side in zip(counts, sides, strict=True))
+    by_points = pattern.is_hole(y[:, None], z).reshape(counts[0], points, counts[1], points).mean(axis=(1, 3))
+    shares = pattern.shares_in_holes(counts, sides) / WHOLE_CELL
+    assert shares.mean() == pytest.approx(pattern.open_area, abs=5e-4)  # ten cells across a hole
+    np.testing.assert_allclose(shares, by_points, rtol=0, atol=1.5 / points)  # an edge misses a row of points
+    assert np.abs(shares - by_points).mean() < 0.1 / points
+    assert set(np.unique(shares[(by_points == 0) | (by_points == 1)]).round(1)) <= {0.0, 1.0}
+
+
+def test_straight_sides_of_holes_are_exact_wherever_they_lie_in_a_cell() -> None:
+    pattern, counts = SquarePattern(side=4.53 * MM, spacing=(8.1 * MM, 16.7 * MM)), (61, 113)
+    sides = pattern.period[0] / counts[0], pattern.period[1] / counts[1]
+
+    def along(side: float, count: int, period: float) -> Any:
+        edges = side * np.arange(count + 1)
+        half = 0.5 * pattern.side
+        return sum(np.diff(np.clip(edges, at - half, at + half)) for at in (0.0, period)) / side
+
+    exact = np.outer(*map(along, sides, counts, pattern.period))
+    shares = pattern.shares_in_holes(counts, sides) / WHOLE_CELL
+    # Integers: each of the lines is rounded, at either end, and so is the width of its strip.
+    np.testing.assert_allclose(shares, exact, rtol=0, atol=2.01 * LINES / WHOLE_CELL)
+    assert ((exact > 0.0) & (exact < 1.0)).sum() > 40
 
 
 @pytest.mark.parametrize(
     "shape", [{"shape": "slot", "length": 12 * MM, "width": 4.05 * MM}, {"shape": "square", "side": 4.5 * MM}]
 )
-def test_a_point_on_an_edge_lies_in_the_hole_on_either_side(shape: dict[str, Any]) -> None:
+@pytest.mark.parametrize("cells", [320, 318, 46])
+def test_mirrored_holes_have_mirrored_shares_to_the_bit(shape: dict[str, Any], cells: int) -> None:
     kind = SlotPattern if shape["shape"] == "slot" else SquarePattern
     pattern = kind.model_validate(shape | {"spacing": (8 * MM, 16 * MM), "staggered": True})
-    inside = pattern.points_in_holes((320, 320), (0.05 * MM, 0.05 * MM), 1)
+    inside = pattern.shares_in_holes((cells, cells), (16 * MM / cells, 16 * MM / cells))
     assert np.array_equal(inside, inside[::-1])
     assert np.array_equal(inside, inside[:, ::-1])
+    y = (np.arange(320) + 0.5) * 0.05 * MM  # an edge lies in the hole on either side
+    points = pattern.is_hole(y[:, None], y)
+    assert np.array_equal(points, points[::-1])
+    assert np.array_equal(points, points[:, ::-1])
 
 
 @settings(deadline=None, max_examples=25)

@@ -7,6 +7,7 @@ from pydantic import Field
 from .free_form import LevelSetPattern, Supershape, SupershapePattern, Wave
 from .lattice import LatticePattern, Place
 from .mask import MaskPattern
+from .pattern import WHOLE_CELL as WHOLE_CELL
 from .pattern import BoolArray, NoPattern, Pattern
 from .shapes import CirclePattern, EllipsePattern, HexagonPattern, SlotPattern, SquarePattern, TrianglePattern
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..exclusions import CELLS, MARGIN, check_together
 from ..model import Array
-from .pattern import BoolArray, Counts, Pattern, Range, half_sides, middles
+from .pattern import WHOLE_CELL, BoolArray, Counts, Pattern, Range, half_sides, rounded
 from .roundings import smallest_gap
 
 Numbers = NDArray[np.int64]
@@ -51,15 +51,9 @@ class CellsPattern(Pattern):
         )
         return i, j
 
-    def points_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Counts:
-        i, j = self._indices(*middles(counts, sides, samples))
-        along = np.zeros((len(self.material), counts[1]), dtype=np.int16)
-        for k in range(samples):
-            along += ~self.material[:, j[k::samples]]
-        inside = np.zeros(counts, dtype=np.int16)
-        for k in range(samples):
-            inside += along[i[k::samples]]
-        return inside
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+        along_y = _means(~self.material, counts[0], sides[0] / self.side)
+        return rounded(_means(along_y.T, counts[1], sides[1] / self.side).T, WHOLE_CELL)
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """Closed outlines, each of shape [points, 2] [m], of holes; the rectangle cuts them."""
@@ -124,3 +118,13 @@ class CellsPattern(Pattern):
         """Centres [m] of the cells that cover a range, and of one more at each end."""
         low, high = np.floor(np.array(ends) / self.side + cells / 2)
         return (np.arange(low - 1, high + 2) + 0.5 - cells / 2) * self.side
+
+
+def _means(values: NDArray[Any], count: int, width: float) -> Array:
+    """Means of a period of values, shape [values, others], over so many ranges of this width [values] that begin in its
+    middle; shape [count, others]."""
+    until = np.concatenate([np.zeros_like(values[:1], dtype=np.float64), np.cumsum(values, axis=0, dtype=np.float64)])
+    periods, at = np.divmod(np.arange(count + 1) * width + 0.5 * len(values), len(values))
+    index = np.minimum(at.astype(np.int64), len(values) - 1)
+    ends = until[index] + (at - index)[:, None] * values[index] + periods[:, None] * until[-1]
+    return np.asarray(np.diff(ends, axis=0) / width)

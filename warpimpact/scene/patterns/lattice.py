@@ -13,7 +13,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_
 from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array
 from ..units import Angle, Length, PositiveLength, quantity
-from .lines import Numbers, points_in
+from .lines import Chords, Numbers, half_shares
 from .pattern import BoolArray, Counts, Pattern, Range, half_sides
 from .roundings import area, chords, distance, geometries, neighbours, outline, placed
 
@@ -152,21 +152,25 @@ class LatticePattern(Pattern):
         return pattern
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
-        inside: BoolArray = self._deepest(y, z) >= 0
+        inside: BoolArray = self._deepest(y, z) >= -_SAME * max(self.spacing)  # an edge lies in its hole on any side
         return inside
 
     def has_edge(self, y: Array, z: Array, reach: float) -> BoolArray:
         deepest = self._deepest(y, z)
         return np.asarray(~(np.abs(deepest) > reach) if reach <= self._sight else np.ones(deepest.shape, dtype=bool))
 
-    def points_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
         ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
         places = self._repeated(self._places, self.period, ranges[0], ranges[1])
-        return points_in(partial(self._chords, places), self._boxes(places)[:, :, 1], counts, sides, samples)
+        extents = self._boxes(places)
+        along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides)
+        along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1])
+        return along_y + along_z.T
 
-    def _chords(self, places: Array, hole: Numbers, z: Array, slack: float) -> tuple[Array, Array]:
-        """`chords` of lines at z [m], each through the hole of this number among those at some places."""
-        return chords(placed(self.spine, places), self.rounding, hole, z, slack)
+    def _chords(self, places: Array, *, exchanged: bool) -> Chords:
+        """Those of the holes at some places; `exchanged`, with y and z in each other's place."""
+        spines = placed(self.spine, places)
+        return partial(chords, spines[:, ::-1, ::-1] if exchanged else spines, self.rounding)
 
     def _deepest(self, y: Array, z: Array) -> Array:
         """Depth of points inside a hole [m]; negative outside, −inf where no hole is in sight."""

@@ -1,4 +1,4 @@
-"""Points in convex holes that do not overlap, line by line: a line of points lies in a hole from one end to another."""
+"""Shares of cells in convex holes that do not overlap, line by line: a line lies in a hole from one end to another."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -7,52 +7,67 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
-from .pattern import Counts
+from .pattern import WHOLE_CELL, Counts, rounded
 
-ON_EDGE = 1e-6
-"""A point that is no more of the side of a cell outside a hole lies in it: symmetric holes have symmetric tiles."""
-_LINES = 2**16
+LINES = 3
+"""In each direction through what a cell has of a hole, evenly. Along a line its share is exact."""
+_EDGE = 1e-6
+"""A line that is no more of the side of a cell outside a hole touches it."""
+_AT_ONCE = 2**16
 """Lines that are looked at together, about."""
 
 Numbers = NDArray[np.int64]
 Chords = Callable[[Numbers, Array, float], tuple[Array, Array]]
 """(number of the hole, z [m], slack [m]) of lines along y → their ends in the hole [m]; NaN where a line misses it."""
+_PER_LINE = WHOLE_CELL // (2 * LINES)
 
 
-def points_in(
-    chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float], samples: int
-) -> Counts:
-    """How many of samples × samples points, evenly in each cell, lie in holes; shape `counts`.
+def half_shares(chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+    """Half the shares of cells that lie in holes, by lines along y, in parts of WHOLE_CELL, shape `counts`. The other
+    half has lines along z, so that a plate that is turned by a right angle has the same shares.
+
+    The sides of a hole along z end lines, and those along y end the strip of a column of cells through which lines go.
+    So both are exact, wherever they lie in a cell.
 
     Args:
         extents: lowest and highest z of every hole, shape [holes, 2] [m].
         counts, sides: of the cells along y and z, from the origin on; of a cell [m].
     """
-    fine, slack = np.array(sides) / samples, ON_EDGE * min(sides)
-    ends = np.clip(extents / fine[1] + (-1.5, 1.5), 0, samples * counts[1]).astype(np.int64)
     inside = np.zeros((counts[0] + 2, counts[1]), dtype=np.int16)
-    for some in _in_lots(ends[:, 1] - ends[:, 0]):
-        lines = ends[some, 1] - ends[some, 0]
-        line = np.arange(lines.sum()) + np.repeat(ends[some, 1] - np.cumsum(lines), lines)
-        low, high = chords(np.repeat(some, lines), (line + 0.5) * fine[1], slack)
-        first, behind = np.ceil((low - slack) / fine[0] - 0.5), np.floor((high + slack) / fine[0] + 0.5)
-        met = first < behind
-        for end, sign in ((first, 1), (behind, -1)):
-            at = np.clip(end[met], 0, samples * counts[0]).astype(np.int64)
-            _add(inside, at, line[met] // samples, samples, sign)
+    ends = extents / sides[1]
+    columns = np.clip(np.stack([np.floor(ends[:, 0]), np.ceil(ends[:, 1])], axis=1), 0, counts[1]).astype(np.int64)
+    for some in _in_lots(LINES * (columns[:, 1] - columns[:, 0])):
+        each = columns[some, 1] - columns[some, 0]
+        hole = np.repeat(some, each)
+        column = np.arange(each.sum()) + np.repeat(columns[some, 1] - np.cumsum(each), each)
+        from_z = np.maximum(column, ends[hole, 0])
+        strip = np.minimum(column + 1, ends[hole, 1]) - from_z
+        weight = rounded(strip, _PER_LINE)
+        for k in range(LINES):
+            z = (from_z + (k + 0.5) / LINES * strip) * sides[1]
+            low, high = chords(hole, z, _EDGE * min(sides))
+            met = low < high
+            for end, sign in ((low, 1), (high, -1)):
+                _add(inside, np.clip(end[met] / sides[0], 0, counts[0]), column[met], weight[met], sign)
     for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
         row += before
     return inside[: counts[0]]
 
 
 def _in_lots(lines: Numbers) -> list[Numbers]:
-    """Numbers of the holes with so many lines each, in lots of some _LINES lines."""
-    lot = np.cumsum(lines) // _LINES
+    """Numbers of the holes with so many lines each, in lots of some _AT_ONCE lines."""
+    lot = np.cumsum(lines) // _AT_ONCE
     return np.split(np.arange(len(lines)), np.flatnonzero(np.diff(lot)) + 1)
 
 
-def _add(inside: Counts, at: Numbers, column: Numbers, samples: int, sign: int) -> None:
-    """Add lines of points, from point `at` on, to the differences between cells along y."""
-    cell, before = np.divmod(at, samples)
-    for row, points in ((cell, samples - before), (cell + 1, before)):
-        np.add.at(inside.reshape(-1), row * inside.shape[1] + column, (sign * points).astype(np.int16))
+def _add(inside: Counts, at: Array, column: Numbers, weight: Counts, sign: int) -> None:
+    """Add lines with a sign, from their ends `at` on [cells], to the differences between cells along y.
+
+    Mirrored holes have mirrored shares: of the cell of either end, what lies in the hole is rounded.
+    """
+    cell = np.floor(at)
+    part = at - cell if sign < 0 else 1.0 - (at - cell)
+    own = rounded(part, weight)
+    own = own if sign > 0 else weight - own
+    for row, share in ((cell, own), (cell + 1, weight - own)):
+        np.add.at(inside.reshape(-1), row.astype(np.int64) * inside.shape[1] + column, sign * share)

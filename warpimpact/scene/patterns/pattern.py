@@ -16,10 +16,14 @@ Counts = NDArray[np.int16]
 Range = tuple[float, float]
 
 
-def middles(counts: tuple[int, int], sides: tuple[float, float], samples: int) -> tuple[Array, Array]:
-    """Coordinates y and z [m] of so many points per cell and direction, for so many cells from the origin on."""
-    y, z = ((np.arange(samples * n) + 0.5) * (side / samples) for n, side in zip(counts, sides, strict=True))
-    return np.asarray(y, dtype=np.float64), np.asarray(z, dtype=np.float64)
+WHOLE_CELL = 24576
+"""Parts of a cell in which its share in holes is counted: integers, of which a cell inside a hole has exactly all."""
+
+
+def rounded(share: Array, whole: Any) -> Counts:
+    """Shares of `whole` as integers. A half is rounded up, also where rounding errors take a little from it: mirrored
+    holes have mirrored shares."""
+    return np.asarray(np.floor(share * whole + (0.5 + 1e-6)), dtype=np.int16)
 
 
 def half_sides(size: tuple[float, float], cell: tuple[float, float], reach: Array) -> Array:
@@ -63,18 +67,14 @@ class Pattern(Model, ABC):
         """
         return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
-    def points_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], samples: int) -> Counts:
-        """How many of samples × samples points, evenly in each cell, lie in a hole; shape `counts`.
+    @abstractmethod
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+        """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`.
 
         Args:
             counts: cells of a period along y and z, from the origin on.
             sides: of a cell [m].
         """
-        y, z = middles(counts, sides, samples)
-        inside = np.empty(counts, dtype=np.int16)
-        for row, of_row in enumerate(y.reshape(-1, samples, 1)):
-            inside[row] = self.is_hole(of_row, z).reshape(samples, -1, samples).sum(axis=(0, 2))
-        return inside
 
     def edge_distance(self, y: Array, z: Array) -> Array:
         """Distance of points y, z [m] from the nearest outline of a hole, of their broadcast shape: negative in a hole,
@@ -147,6 +147,9 @@ class NoPattern(Pattern):
 
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         return np.zeros(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
+
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+        return np.zeros(counts, dtype=np.int16)
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         return []

@@ -8,7 +8,7 @@ import numpy as np
 from ..model import Array
 from ..units import NonNegativeLength, PositiveLength
 from .lattice import LatticePattern
-from .lines import Numbers
+from .lines import Chords, Numbers
 
 _ELLIPSE_CHORDS = 720
 
@@ -102,15 +102,21 @@ class EllipsePattern(_OblongPattern):
     def _depth(self, y: Array, z: Array) -> Array:
         return self.width * (0.5 - np.hypot(y / self.width, z / self.length))
 
-    def _chords(self, places: Array, hole: Numbers, z: Array, slack: float) -> tuple[Array, Array]:
-        middle_y, middle_z, turn = places[hole].T
-        cosine, sine, above = np.cos(turn), np.sin(turn), z - middle_z
-        # Factors of y² and of y times z in a quadratic form, which is 1/4 on the edge.
-        square = (cosine / self.width) ** 2 + (sine / self.length) ** 2
-        mixed = cosine * sine * (self.width**-2 - self.length**-2)
-        left = 0.25 * square - (above / (self.width * self.length)) ** 2
-        half = np.where(left >= 0.0, np.sqrt(np.maximum(0.0, left)), np.nan)
-        return middle_y - (mixed * above + half) / square, middle_y - (mixed * above - half) / square
+    def _chords(self, places: Array, *, exchanged: bool) -> Chords:
+        width, length = (self.length, self.width) if exchanged else (self.width, self.length)
+        own = places[:, [1, 0, 2]] * (1.0, 1.0, -1.0) if exchanged else places
+
+        def ends(hole: Numbers, z: Array, _: float) -> tuple[Array, Array]:
+            middle_y, middle_z, turn = own[hole].T
+            cosine, sine, above = np.cos(turn), np.sin(turn), z - middle_z
+            # Factors of y² and of y times z in a quadratic form, which is 1/4 on the edge.
+            square = (cosine / width) ** 2 + (sine / length) ** 2
+            mixed = cosine * sine * (width**-2 - length**-2)
+            left = 0.25 * square - (above / (width * length)) ** 2
+            half = np.where(left >= 0.0, np.sqrt(np.maximum(0.0, left)), np.nan)
+            return middle_y - (mixed * above + half) / square, middle_y - (mixed * above - half) / square
+
+        return ends
 
 
 class _PolygonPattern(LatticePattern):
