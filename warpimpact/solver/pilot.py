@@ -55,10 +55,11 @@ FURTHER = 5
 for draft and standard, but one. Who asks for a draft waits for no level that costs fifty times as much."""
 FURTHER_LAYERED = 3
 """Likewise behind several layers, where a shot costs more: eight to ten times the first level's cost."""
-PATIENCE, WORTH = 20.0, 3200
-"""What a pilot may take: so many seconds of a core, or as long as so many hits take at the level that it has looked at
-last, whichever is more. As long as it takes no more than these seconds, it looks at finer levels than FURTHER, too.
-Times are those that are foreseen (`Prepared.seconds`), so that a level does not depend on the machine."""
+PATIENCE, WORTH = 10.0, 1600
+"""What a pilot may take: so many seconds of a core, or as long as so many hits take at the level that it looks at,
+whichever is more: a tenth of a run of 16,384 hits. As long as it takes no more than these seconds, it looks at finer
+levels than FURTHER, too. Times are those that are foreseen (`Prepared.seconds`), so that a level does not depend on the
+machine."""
 FINEST_LIMIT = 6
 """The last level that is taken for limits. A finer one is only compared with."""
 BEYOND, BEYOND_LIMITS = 1, 2
@@ -102,14 +103,14 @@ class Purse:
         """Some shots are computed."""
         self._spent += shots * self._price(level)
 
-    def allows(self, levels: Iterable[int], shots: int, last: int, patient: bool) -> bool:
-        """Whether some shots at some levels are worth their time, after a level that was looked at. Who is not
-        `patient` goes on only as long as it takes no time to speak of."""
+    def allows(self, level: int, new: Iterable[int], shots: int, patient: bool) -> bool:
+        """Whether a level is worth some shots at some new levels. Who is not `patient` goes on only as long as it takes
+        no time to speak of."""
         try:
-            spent = self._spent + shots * sum(self._price(level) for level in levels)
+            spent = self._spent + shots * sum(self._price(one) for one in new)
         except MemoryError:  # the plate's period does not fit at that spacing
             return False
-        return spent <= PATIENCE or (patient and spent <= WORTH * self._price(last))
+        return spent <= PATIENCE or (patient and spent <= WORTH * self._price(level))
 
 
 def pilot_hits(
@@ -162,7 +163,7 @@ def pilot_hits(
         if purse is None or not tried:
             return usual
         new = [one for one in (index, finer) if (one, whole) not in known]
-        return purse.allows(new, len(rest if whole else some), max(tried), usual)
+        return purse.allows(index, new, len(rest if whole else some), usual)
 
     def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
         for whole in (False, True) if len(rest) else (False,):

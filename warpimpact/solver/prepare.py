@@ -4,7 +4,7 @@ made, for those who build, march or describe."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-PER_BYTE, PER_PATCH, PER_NODE = 4e-10, 5e-9, 2e-9
+PER_BYTE, PER_PATCH, PER_NODE = 1.7e-10, 2.8e-9, 1.5e-9
 """Seconds that a core takes to open a window, per byte; for a step, per patch; and per node under the core
 (tests/benchmarks/NOTES.md)."""
 AFTER_OTHERS = 3.0
@@ -119,21 +119,22 @@ class Prepared:
 
     @property
     def seconds(self) -> float:
-        """What a shot that nothing hinders takes a core, roughly: the same on every machine."""
+        """What a shot that passes all layers takes a core, roughly: the same on every machine."""
         patches = len(self.surfaces[0].rings.station) * self.resolution.patches_around
-        a_step = PER_PATCH * patches + PER_NODE * self._nodes_below
-        alone = PER_BYTE * self.window_bytes + a_step * self.steps
+        steps = sum(steps * (PER_PATCH * patches + PER_NODE * nodes) for steps, nodes in self._passages())
+        alone = PER_BYTE * self.window_bytes + steps
         return AFTER_OTHERS * alone if self.variant.burst else alone
 
-    @property
-    def _nodes_below(self) -> float:
-        """Nodes of the layers that weaken below the core's largest section, mean over the thickness."""
-        width, layers = 2.0 * self.scene.core.max_radius, self.scene.target.layers
-        below = [
-            own.weakens * layer.thickness * grid.planes.number * (width / grid.spacing) ** 2
-            for layer, own, grid in zip(layers, self.materials, self.grids, strict=True)
-        ]
-        return float(sum(below) / sum(layer.thickness for layer in layers))
+    def _passages(self) -> Iterator[tuple[float, float]]:
+        """Of each layer, the steps of a passage and the nodes below the core's largest section."""
+        core, shots = self.scene.core, self.shots
+        for own, grid, stretch in zip(self.materials, self.grids, self.stretch, strict=True):
+            way = stretch * self.conditions["time_step"] * shots.velocity * np.cos(shots.obliquity)
+            across = (2.0 * core.max_radius / grid.spacing) ** 2
+            yield (
+                float(np.mean((own.thickness + core.length) / way)),
+                grid.planes.number * across if own.weakens else 0.0,
+            )
 
 
 def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:

@@ -271,10 +271,9 @@ def test_levels_that_a_pilot_tries(excess: list[float], tried: list[int], taken:
     [
         (lambda level: 1e-6, [0, 1, 2, 3, 4]),  # takes no time: beyond the usual levels, as long as one is to be found
         (lambda level: 1.0, [0, 1, 2]),  # the last of the usual levels
-        (
-            lambda level: 1.0 if level < 4 else 300.0,
-            [0, 1],
-        ),  # 16 hits at the fifth take longer than WORTH at the second
+        # To look at the third level takes 16 hits at the fifth: as long as WORTH at the third, or longer.
+        (lambda level: {2: 3.0, 4: 290.0}.get(level, 1.0), [0, 1, 2]),
+        (lambda level: {2: 3.0, 4: 300.0}.get(level, 1.0), [0, 1]),
     ],
 )
 def test_a_pilot_looks_at_levels_that_are_worth_their_time(
