@@ -18,7 +18,8 @@ _AT_ONCE = 2**16
 
 Numbers = NDArray[np.int64]
 Chords = Callable[[Numbers, Array, float], tuple[Array, Array]]
-"""(number of the hole, z [m], slack [m]) of lines along y → their ends in the hole [m]; NaN where a line misses it."""
+"""(number of the hole, z [m], slack [m]) of lines along y → their ends in the hole [m]; NaN where a line misses it. The
+ends are of the shape of z, whose last axis is that of the holes."""
 _PER_LINE = WHOLE_CELL // (2 * LINES)
 
 
@@ -42,13 +43,12 @@ def half_shares(chords: Chords, extents: Array, counts: tuple[int, int], sides: 
         column = np.arange(each.sum()) + np.repeat(columns[some, 1] - np.cumsum(each), each)
         from_z = np.maximum(column, ends[hole, 0])
         strip = np.minimum(column + 1, ends[hole, 1]) - from_z
-        weight = rounded(strip, _PER_LINE)
-        for k in range(LINES):
-            z = (from_z + (k + 0.5) / LINES * strip) * sides[1]
-            low, high = chords(hole, z, _EDGE * min(sides))
-            met = low < high
-            for end, sign in ((low, 1), (high, -1)):
-                _add(inside, np.clip(end[met] / sides[0], 0, counts[0]), column[met], weight[met], sign)
+        z = from_z + (np.arange(LINES)[:, None] + 0.5) / LINES * strip
+        low, high = chords(hole, z * sides[1], _EDGE * min(sides))
+        met = low < high
+        column, weight = (np.broadcast_to(own, met.shape)[met] for own in (column, rounded(strip, _PER_LINE)))
+        for end, sign in ((low, 1), (high, -1)):
+            _add(inside, np.clip(end[met] / sides[0], 0, counts[0]), column, weight, sign)
     for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
         row += before
     return inside[: counts[0]]

@@ -46,17 +46,17 @@ def distance(spine: Array, y: Array, z: Array) -> Array:
 
 
 def chords(spines: Array, rounding: float, which: Any, z: Array, slack: float) -> tuple[Array, Array]:
-    """Ends along y [m] of what lines at z [m] have of shapes, each of shape [lines]; NaN where a line misses its shape
+    """Ends along y [m] of what lines at z [m] have of shapes, each of the shape of z; NaN where a line misses its shape
     by more than `slack` [m].
 
     Args:
         spines: of the shapes, shape [shapes, corners, 2] [m].
-        which: shape that each line may cross, shape [lines].
+        which: shape that each line may cross; of the last axis of z.
 
     An end of a line within a convex shape lies on the arc about a corner or on a straight part of the outline, and both
     are in the shape: the outermost counts.
     """
-    low, high = np.full(len(z), np.nan), np.full(len(z), np.nan)
+    low, high = np.full(z.shape, np.nan), np.full(z.shape, np.nan)
     for own, following in zip(*(np.moveaxis(of, 1, 0) for of in (spines, np.roll(spines, -1, axis=1))), strict=True):
         from_y, from_z = own.T
         left = rounding**2 - np.square(z - from_z[which])
