@@ -171,7 +171,7 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def box_about(window: Window, y: real, z: real, reach: real):
         """The nodes of a window about a place, as far as some reach [m]."""
-        home_y, home_z = window.cells_y // 2, window.cells_z // 2
+        home_y, home_z = window.home_y, window.home_z
         box = Box()
         box.y_low = wp.max(0, home_y - 1 + wp.int32(wp.floor((y - reach) * window.per_cell)))
         box.z_low = wp.max(0, home_z - 1 + wp.int32(wp.floor((z - reach) * window.per_cell)))
@@ -206,8 +206,8 @@ def build(variant: Variant) -> SimpleNamespace:
             box.z_high - box.z_low + 1,
             window.cells_z,
             cell,
-            real(box.y_low - window.cells_y // 2) * cell - core.y,
-            real(box.z_low - window.cells_z // 2) * cell - core.z,
+            real(box.y_low - window.home_y) * cell - core.y,
+            real(box.z_low - window.home_z) * cell - core.z,
             core.radius,
             core.axis[1],
             core.axis[2],
@@ -222,7 +222,7 @@ def build(variant: Variant) -> SimpleNamespace:
         widen(channels, mine, box)
         for i in range(box.y_low, box.y_high + 1):
             for j in range(box.z_low, box.z_high + 1):
-                y, z = real(i - window.cells_y // 2), real(j - window.cells_z // 2)
+                y, z = real(i - window.home_y), real(j - window.home_z)
                 arm = vec3(x, y / window.per_cell, z / window.per_cell) - pose.position
                 station = wp.dot(arm, pose.axis)
                 radius, node = radius_at(surface, station), start + i * window.cells_z + j

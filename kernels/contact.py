@@ -445,4 +445,5 @@ def build(variant: Variant) -> SimpleNamespace:
 
     own_fields = use.exposure.own_fields
     open_window = use.exposure.open_window
+    slide_nodes = use.exposure.slide_nodes
     return SimpleNamespace(**locals())

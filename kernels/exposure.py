@@ -243,6 +243,36 @@ def build(variant: Variant) -> SimpleNamespace:
             clear(fields.gain, window.first, window.planes * window.nodes)
         return window
 
+    # Native, because a CPU copies whole rows.
+    @wp.func_native("""
+    assert(start >= 0 && start + planes * cells_y * cells_z <= field.shape[0]);
+    for (int plane = 0; plane < planes; ++plane) {
+        auto* const first = field.data + start + plane * cells_y * cells_z;
+        for (int n = 0; n < cells_y; ++n) {
+            const int row = rows >= 0 ? n : cells_y - 1 - n;  // in an order that overwrites nothing that is still read
+            auto* const into = first + row * cells_z;
+            const auto* const from = into + rows * cells_z + columns;
+            const bool known = row + rows >= 0 && row + rows < cells_y;
+            for (int m = 0; m < cells_z; ++m) {
+                const int column = columns >= 0 ? m : cells_z - 1 - m;
+                const bool kept = known && column + columns >= 0 && column + columns < cells_z;
+                into[column] = kept ? from[column] : 0;
+            }
+        }
+    }
+    """)
+    def slide_nodes(
+        field: wp.array(dtype=real),
+        start: wp.int32,
+        planes: wp.int32,
+        cells_y: wp.int32,
+        cells_z: wp.int32,
+        rows: wp.int32,
+        columns: wp.int32,
+    ):
+        """The nodes of a window that has slid over its plate by some rows and columns; new ones are 0."""
+        ...
+
     @wp.struct
     class Strip:
         """Nodes of one plane of a window: `rows` rows of `count` nodes, `stride` apart, from node `start` on."""

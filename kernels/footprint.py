@@ -41,6 +41,18 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.int32(wp.floor(place * window.per_cell))
 
     @wp.func
+    def holds(plate: Plate, window: Window, box: Box):
+        """Whether a window has all nodes that contact in a box acts on."""
+        # The filter's first pass covers rows up to twice its reach away and reads slightly beyond them.
+        rows = 2 * plate.reach + 1
+        return (
+            box.y_low >= rows
+            and box.z_low >= plate.reach
+            and box.y_high < window.cells_y - rows
+            and box.z_high < window.cells_z - plate.reach
+        )
+
+    @wp.func
     def footprint_of(surface: Surface, plate: Plate, window: Window, pose: Pose, dt: real):
         """The footprint at mid-step. Patches act at their centres, so a ring covers centre ± radius."""
         broadside = use.core_surface.broadside(pose)
@@ -99,21 +111,13 @@ def build(variant: Variant) -> SimpleNamespace:
         found.inside = True
         if last_ring >= 0:
             # One node of slack, because rounding may move a patch at the ring's outermost point.
-            home_y, home_z = window.cells_y // 2, window.cells_z // 2
-            found.box.y_low = home_y + y_low - 1
-            found.box.y_high = home_y + y_high + 2
-            found.box.z_low = home_z + z_low - 1
-            found.box.z_high = home_z + z_high + 2
+            found.box.y_low = window.home_y + y_low - 1
+            found.box.y_high = window.home_y + y_high + 2
+            found.box.z_low = window.home_z + z_low - 1
+            found.box.z_high = window.home_z + z_high + 2
             found.box.plane_low = plane_low
             found.box.plane_high = plane_high
-            # The filter's first pass covers rows up to twice its reach away and reads slightly beyond them.
-            rows = 2 * plate.reach + 1
-            found.inside = (
-                found.box.y_low >= rows
-                and found.box.z_low >= plate.reach
-                and found.box.y_high < window.cells_y - rows
-                and found.box.z_high < window.cells_z - plate.reach
-            )
+            found.inside = holds(plate, window, found.box)
         return found
 
     @wp.func
@@ -125,8 +129,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.func
     def is_clear(plate: Plate, window: Window, found: Footprint):
         """Whether there is no material at the nodes around the rings in the slab, with a node to spare."""
-        y = half * real(found.box.y_low + found.box.y_high - 2 * (window.cells_y // 2)) * plate.spacing
-        z = half * real(found.box.z_low + found.box.z_high - 2 * (window.cells_z // 2)) * plate.spacing
+        y = half * real(found.box.y_low + found.box.y_high - 2 * window.home_y) * plate.spacing
+        z = half * real(found.box.z_low + found.box.z_high - 2 * window.home_z) * plate.spacing
         wide = half * real(found.box.y_high - found.box.y_low) + one
         long = half * real(found.box.z_high - found.box.z_low) + one
         reach = wp.sqrt(wide * wide + long * long) * plate.spacing
@@ -136,7 +140,7 @@ def build(variant: Variant) -> SimpleNamespace:
     def is_beside(window: Window, found: Footprint, cells: wp.int32):
         """Whether a window would hold none of the nodes around the rings in the slab, if it had so many in each
         direction: a core that comes back elsewhere."""
-        first_y, first_z = window.cells_y // 2 - cells // 2, window.cells_z // 2 - cells // 2
+        first_y, first_z = window.home_y - cells // 2, window.home_z - cells // 2
         return (
             found.box.y_high < first_y
             or found.box.z_high < first_z

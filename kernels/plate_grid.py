@@ -52,18 +52,21 @@ def build(variant: Variant) -> SimpleNamespace:
     class Window:
         """The part of a slot's fields that a layer has, and its place on the tile.
 
-        `first` is the index of the first node. `home` is that of the node at the hit, so a shot computes the same bits
-        in a window of any size. `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds
-        the hit, `tile_y` and `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the
-        tile per metre. `thickness` is that of the plate; its front face is `behind` [m] the first of
-        `planes` planes of `nodes` nodes each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit
-        [m]. (y0, z0) is the place of the node `home` in the literal scheme [m]. `weakens` says whether the
-        fields hold this window. `channel` is the first node of its `channel_planes` planes with the channels of earlier
-        hits (kernels/channel.py), `pierced` says whether there are any.
+        `first` is the index of the first node. `home` is that of the node at the hit, which is in row `home_y` and
+        column `home_z`, within the window or not: so a shot computes the same bits in a window of any size and place.
+        `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds the hit, `tile_y` and
+        `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the tile per metre.
+        `thickness` is that of the plate; its front face is `behind` [m] the first of `planes` planes of `nodes` nodes
+        each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is the place of the
+        node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window. `channel` is the
+        first node of its `channel_planes` planes with the channels of earlier hits (kernels/channel.py), `pierced` says
+        whether there are any.
         """
 
         first: wp.int32
         home: wp.int32
+        home_y: wp.int32
+        home_z: wp.int32
         cells_y: wp.int32
         cells_z: wp.int32
         nodes: wp.int32
@@ -128,7 +131,9 @@ def build(variant: Variant) -> SimpleNamespace:
         window.first = first
         window.nodes = cells_y * cells_z
         window.planes = plate.planes
-        window.home = window.first + (cells_y // 2) * cells_z + cells_z // 2
+        window.home_y = cells_y // 2
+        window.home_z = cells_z // 2
+        window.home = window.first + window.home_y * cells_z + window.home_z
         window.cells_y = cells_y
         window.cells_z = cells_z
         window.thickness = thickness
@@ -215,8 +220,8 @@ def build(variant: Variant) -> SimpleNamespace:
         row, column = wp.floor(across), wp.floor(along)
         cell = Cell()
         cell.index = window.home + wp.int32(row) * window.cells_z + wp.int32(column)
-        cell.row = wp.int32(row) + window.cells_y // 2
-        cell.column = wp.int32(column) + window.cells_z // 2
+        cell.row = wp.int32(row) + window.home_y
+        cell.column = wp.int32(column) + window.home_z
         cell.y = across - row
         cell.z = along - column
         return cell

@@ -38,7 +38,8 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         share a field. `laminate` is the number of the first of them. `deep` is 1 where the laminate is thicker than the
         depth over which it weakens together, else 0.
         `stretch` is how many times longer a step may be than the shortest, where a core touches nothing but the layer,
-        and `slowing` is the share of its speed that a longer step may take.
+        and `slowing` is the share of its speed that a longer step may take. Windows that `slide` follow a core that
+        leaves them, where there are several layers.
         `standoffs` are distances behind the rear face of every layer [m], which the point `ahead` of the centre of mass
         passes [m].
         """
@@ -52,6 +53,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         standoffs: wp.array(dtype=real)
         ahead: real
         slowing: real
+        slide: wp.bool
         front: wp.array2d(dtype=wp.float64)
         thickness: wp.array2d(dtype=wp.float64)
         deep: wp.array2d(dtype=wp.float64)

@@ -87,7 +87,8 @@ class Memory:
         target.weakens = self.put(np.array([one.weakens for one in materials]), wp.bool)
         target.laminate = self.put(np.array([one.laminate for one in materials]), wp.int32)
         target.by_path = self.put(np.array([one.by_path for one in materials]), wp.bool)
-        target.slowing, record = prepared.resolution.slowing, prepared.scene.record
+        target.slowing, target.slide = prepared.resolution.slowing, prepared.slide
+        record = prepared.scene.record
         target.standoffs, target.ahead = self.put(np.array(record.layer_standoffs)), record.ahead(prepared.scene.core)
         for name, variable in self.stage.Target.vars.items():
             if getattr(variable.type, "ndim", 1) == 2:

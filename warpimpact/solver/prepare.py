@@ -57,6 +57,8 @@ class Prepared:
         first_cells: nodes of a first window of the plate in each direction, as each shot by itself would have it, shape
             [shots].
         rows: of the trace of each shot; 0 for none.
+        slide: whether windows behind several layers follow a core that leaves them. Snapshots need all that it has
+            passed.
     """
 
     scene: Scene
@@ -71,6 +73,7 @@ class Prepared:
     steps: int
     first_cells: NDArray[np.int64]
     rows: int = 0
+    slide: bool = True
 
     @property
     def grids(self) -> list[Grid]:

@@ -148,7 +148,7 @@ def traced(scene: Scene, shots: Shots, numerics: Numerics, snapshots: int = 0) -
     Raises:
         MemoryError: the histories, and so many snapshots, do not fit.
     """
-    prepared = prepare(scene, shots, numerics)
+    prepared = replace(prepare(scene, shots, numerics), slide=False)
     device = find_device("cpu")
     first = March(Memory(prepared, device))
     steps = int(first.march().steps.numpy().max())

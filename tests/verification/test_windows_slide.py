@@ -1,0 +1,126 @@
+"""Windows that follow a core: the bits are those of windows that are wide enough from the start (kernels/layers.py)."""
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import warp as wp
+
+from warpimpact.kernels import contact, exposure, layers
+from warpimpact.kernels.variant import Variant
+from warpimpact.scene import Hits, Impact, Layer, Numerics, Plate, Scene, Target, make_shots
+from warpimpact.solver import windows
+from warpimpact.solver.device import find_device
+from warpimpact.solver.marching import March
+from warpimpact.solver.memory import Memory
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.windows import Cells
+
+from .scenes import PAPER_CORE, paper_plate
+
+HITS = 32
+PLATE = paper_plate(degradation_interval=None, degradation_distance=0.8e-3)
+SOFT = Plate(thickness=25e-3, resistance=0.4e9, degradation=0.9, degradation_distance=0.8e-3, degradation_depth=4e-3)
+
+
+def behind(plate: Plate, gap: float) -> Layer:
+    return Layer(gap=gap, **{name: getattr(plate, name) for name in plate.model_fields_set})
+
+
+PART = SOFT.model_copy(update={"thickness": 8e-3})
+LAMINATE = behind(PART, 0.08), behind(PART, 0.0), behind(PART, 0.0), behind(PART, 0.0)
+
+
+class Marched(NamedTuple):
+    outcomes: dict[str, Any]
+    first: Cells
+    last: Cells
+
+
+def marched(target: tuple[Plate, ...], impact: dict[str, float], device: str, *, slide: bool) -> Marched:
+    scene = Scene(core=PAPER_CORE, target=Target(layers=target))
+    shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), target[0])
+    prepared = replace(prepare(scene, shots, Numerics(level=0)), slide=slide)
+    march = March(Memory(prepared, find_device(device)))
+    first, found = march.cells, march.march()
+    names = ("status", "steps", "velocity", "position", "axis", "angular_momentum", "energy_loss")
+    return Marched({name: getattr(found, name).numpy() for name in names}, first, march.cells)
+
+
+@pytest.mark.parametrize(
+    ("target", "impact"),
+    [
+        ((PLATE, behind(SOFT, 0.05)), {"obliquity": 45.0, "azimuth": 250.0}),  # cores turn in the layer behind
+        ((PLATE, behind(SOFT, 0.02)), {"obliquity": 60.0, "azimuth": 250.0}),  # and go far aside
+        ((PLATE, *LAMINATE), {"obliquity": 10.0}),
+    ],
+)
+def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
+    target: tuple[Plate, ...], impact: dict[str, float], device: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(windows, "SLACK", 0.2)  # narrow, so that they have to slide often
+    monkeypatch.setattr(windows, "DEEP", 0.1)
+    wide, follows = (marched(target, impact, device, slide=slide) for slide in (False, True))
+    for name, values in wide.outcomes.items():
+        np.testing.assert_array_equal(follows.outcomes[name], values, err_msg=name)
+    assert follows.first == wide.first
+    assert follows.last < wide.last
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns"), [(0, 2), (0, -3), (1, 0), (2, 3), (2, -3), (-1, 4), (-4, -1), (9, 0), (0, 9)]
+)
+def test_nodes_slide_and_new_ones_are_untouched(rows: int, columns: int, device: str) -> None:
+    planes, cells_y, cells_z, start = 2, 5, 7, 3
+    use = Variant(degrades=True).use(exposure)
+
+    @wp.kernel(module="unique")
+    def slide(field: wp.array(dtype=wp.float32)):
+        use.exposure.slide_nodes(field, start, planes, cells_y, cells_z, rows, columns)
+
+    before = np.random.default_rng(1).random(start + planes * cells_y * cells_z + 2).astype(np.float32)
+    field = wp.array(before, dtype=wp.float32, device=device)
+    wp.launch(slide, 1, inputs=[field], device=device)
+    inner = slice(start, start + planes * cells_y * cells_z)
+    wide = np.zeros((planes, cells_y + 20, cells_z + 20), dtype=np.float32)
+    wide[:, 10 : 10 + cells_y, 10 : 10 + cells_z] = before[inner].reshape(planes, cells_y, cells_z)
+    expected = before.copy()
+    expected[inner] = wide[:, 10 + rows : 10 + rows + cells_y, 10 + columns : 10 + columns + cells_z].ravel()
+    np.testing.assert_array_equal(field.numpy(), expected)
+
+
+WINDOW = (0, 9, 0, 9)  # rows, columns
+
+
+@pytest.mark.parametrize(
+    ("after", "known", "ahead"),
+    [
+        ((6, 15, 0, 9), WINDOW, True),
+        ((6, 15, -4, 5), WINDOW, True),
+        ((20, 29, 0, 9), WINDOW, True),  # far away
+        ((6, 15, 0, 9), (-5, 9, 0, 9), True),  # it came along y, and goes on
+        ((-6, 3, 0, 9), (-5, 9, 0, 9), False),  # it came along y, and returns
+        ((6, 15, 0, 9), (0, 14, 0, 9), False),
+        ((0, 9, 6, 15), (0, 9, -5, 9), True),
+        ((0, 9, -6, 3), (0, 9, -5, 9), False),
+        ((0, 9, 6, 15), (0, 9, 0, 14), False),
+        ((4, 13, 4, 13), (-4, 9, -4, 9), True),  # aslant
+    ],
+)
+def test_a_window_returns_to_no_nodes_that_it_has_left(
+    after: tuple[int, ...], known: tuple[int, ...], ahead: bool, device: str
+) -> None:
+    variant = Variant(layered=True, degrades=True)
+    Box, is_ahead = (getattr(layers.build(variant, contact), name) for name in ("Box", "is_ahead"))
+
+    @wp.kernel(module="unique")
+    def look(boxes: wp.array(dtype=Box), found: wp.array(dtype=wp.bool)):
+        found[0] = is_ahead(boxes[0], boxes[1], boxes[2])
+
+    boxes = [Box() for _ in range(3)]
+    for box, ends in zip(boxes, (WINDOW, after, known), strict=True):
+        box.y_low, box.y_high, box.z_low, box.z_high = ends
+    found = wp.zeros(1, dtype=wp.bool, device=device)
+    wp.launch(look, 1, inputs=[wp.array(boxes, dtype=Box, device=device), found], device=device)
+    assert bool(found.numpy()[0]) == ahead
