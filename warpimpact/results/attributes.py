@@ -102,6 +102,8 @@ EVIDENCE = _declared("evidence")
 nothing is to be said."""
 NOT_TESTED = "not tested: "
 """Begins a line of the evidence that is a doubt."""
+EFFECTIVE = "effective_sample_size"
+"""Of a posterior, which has no map of hits."""
 DISCREPANCY = _declared("discrepancy", "table")
 """JSON of the standard deviation that a posterior's model misses by, by units of the Dataset."""
 DISCREPANCY_COUNTS = _declared("discrepancy_counts", "number")

@@ -160,6 +160,8 @@ def opened_either(path: Path) -> Iterator[xarray.Dataset]:
     with _netcdf(path) as dataset:
         if v.SETTING in dataset.variables:
             raise ResultError(f"{path}: is a study of the numerics, as warpimpact study writes, not a map of hits")
+        if attr.EFFECTIVE in dataset.attrs:
+            raise ResultError(f"{path}: is a posterior, as warpimpact identify writes, not a map of hits")
         inputs = list(parsed_json(dataset.attrs.get(attr.SWEEP)) or ())
         if inputs and dataset.get(v.STATUS, dataset).dims != (v.HIT,):
             raise ResultError(

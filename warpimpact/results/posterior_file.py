@@ -49,7 +49,7 @@ PATH = "path"
 FIT = "fit"
 MATERIAL = "material"
 """What the material had in the fit, the parameters at their medians: JSON of the tables plate and interaction."""
-EFFECTIVE = "effective_sample_size"
+EFFECTIVE = attr.EFFECTIVE
 PARETO_K = "pareto_k"
 CONVERGED = "converged"
 HIT_NOISE = "hit_noise"

@@ -11,7 +11,7 @@ import xarray
 from warpimpact import Campaign, open_result
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.cli import main
-from warpimpact.results import files
+from warpimpact.results import files, posterior_file
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import is_choice, solid_reference
 from warpimpact.results.measures import dealing
@@ -135,6 +135,13 @@ def test_a_study_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFi
     for command in ("inspect", "plot", "export"):
         assert main([command, str(tmp_path / "study.nc")]) == 2
         assert "is a study of the numerics, as warpimpact study writes, not a map of hits" in capsys.readouterr().err
+
+
+def test_a_posterior_is_named_as_what_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    xarray.Dataset(attrs={posterior_file.EFFECTIVE: 1000.0}).to_netcdf(tmp_path / "fit.nc")
+    for command in ("inspect", "plot", "export"):
+        assert main([command, str(tmp_path / "fit.nc")]) == 2
+        assert "is a posterior, as warpimpact identify writes, not a map of hits" in capsys.readouterr().err
 
 
 def test_results_of_different_plates_are_joined(result: xarray.Dataset, tmp_path: Path) -> None:
