@@ -17,7 +17,7 @@ from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.windows import Cells
 
-from .scenes import PAPER_CORE, paper_plate
+from ..verification.scenes import PAPER_CORE, paper_plate
 
 HITS = 32
 PLATE = paper_plate(degradation_interval=None, degradation_distance=0.8e-3)
