@@ -11,7 +11,19 @@ from types import ModuleType, SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots, target
+from . import (
+    core_surface,
+    earlier,
+    footprint,
+    interaction,
+    lanes,
+    passage,
+    plate_grid,
+    rigid_body,
+    shots,
+    sliding,
+    target,
+)
 from .status import RUNNING, Status
 from .variant import Variant
 
@@ -22,14 +34,15 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
     real, vec3 = variant.real, variant.vec3
     zero, half, one, tiny = real(0.0), real(0.5), real(1.0), real(1.0e-9)
     far = 1.0e9  # [m]
-    use = variant.use(core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots)
+    use = variant.use(
+        core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots, sliding
+    )
     plates, loads = target.build(variant, scheme), scheme.build(variant)
     Surface, Pose, Window = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Window
     Body, State = use.rigid_body.Body, use.rigid_body.State
     Load, Change = use.rigid_body.Load, use.rigid_body.Change
     Law, Footprint, Shots = use.interaction.Law, use.footprint.Footprint, use.shots.Shots
     Target, Fields, Touches = plates.Target, loads.Fields, loads.Touches
-    Box = use.plate_grid.Box
     slides = variant.degrades and not variant.burst and variant.window == 0
     Earlier, Passage, faces_of, own_of = use.earlier.Earlier, use.passage.Passage, plates.faces_of, plates.own_of
 
@@ -46,7 +59,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         home: wp.array(dtype=vec3)
         open: wp.array(dtype=wp.bool)
         near: wp.array(dtype=wp.bool)
-        known: wp.array(dtype=Box)
+        known: wp.array(dtype=use.plate_grid.Box)
         own_cells: wp.array2d(dtype=wp.int32)
 
     @wp.struct
@@ -144,56 +157,6 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         return seen
 
     @wp.func
-    def extent_of(window: Window):
-        """The nodes of a window, from its home."""
-        extent = Box()
-        extent.y_low = -window.home_y
-        extent.z_low = -window.home_z
-        extent.y_high = extent.y_low + window.cells_y - 1
-        extent.z_high = extent.z_low + window.cells_z - 1
-        return extent
-
-    @wp.func
-    def around(one: Box, other: Box):
-        """The nodes about those of two boxes."""
-        found = one
-        found.y_low = wp.min(one.y_low, other.y_low)
-        found.z_low = wp.min(one.z_low, other.z_low)
-        found.y_high = wp.max(one.y_high, other.y_high)
-        found.z_high = wp.max(one.z_high, other.z_high)
-        return found
-
-    @wp.func
-    def moved(box: Box, rows: wp.int32, columns: wp.int32):
-        """The nodes of a box as a window has them that has slid by some rows and columns."""
-        found = box
-        found.y_low -= rows
-        found.y_high -= rows
-        found.z_low -= columns
-        found.z_high -= columns
-        return found
-
-    @wp.func
-    def slid(window: Window, rows: wp.int32, columns: wp.int32):
-        """A window that has slid over its plate by some rows and columns."""
-        found = window
-        found.home -= rows * window.cells_z + columns
-        found.home_y -= rows
-        found.home_z -= columns
-        return found
-
-    @wp.func
-    def is_ahead(before: Box, after: Box, known: Box):
-        """Whether a window that slides from one place to another takes in none of the nodes that it has left earlier,
-        of all that are `known`."""
-        return (
-            wp.max(after.y_low, known.y_low) >= before.y_low
-            and wp.min(after.y_high, known.y_high) <= before.y_high
-            and wp.max(after.z_low, known.z_low) >= before.z_low
-            and wp.min(after.z_high, known.z_high) <= before.z_high
-        )
-
-    @wp.func
     def slide(
         target: Target,
         stack: Stack,
@@ -209,18 +172,20 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         old, known, box = stack.window[base + layer], stack.known[base + layer], touch.box
         rows = (box.y_low + box.y_high) // 2 - old.cells_y // 2
         columns = (box.z_low + box.z_high) // 2 - old.cells_z // 2
-        new = slid(old, rows, columns)
-        before, after = extent_of(old), extent_of(new)
-        possible = is_ahead(before, after, known)
-        possible = possible and use.footprint.holds(plates.plate_of(target, layer), new, moved(box, rows, columns))
+        new = use.sliding.slid(old, rows, columns)
+        before, after = use.sliding.extent_of(old), use.sliding.extent_of(new)
+        possible = use.sliding.is_ahead(before, after, known)
+        possible = possible and use.footprint.holds(
+            plates.plate_of(target, layer), new, use.sliding.moved(box, rows, columns)
+        )
         for k in range(first, layer):
             possible = possible and not (stack.near[base + k] and stack.found[base + k].last_ring >= 0)
         if possible:
             loads.slide_nodes(fields.exposure, old.first, old.planes, old.cells_y, old.cells_z, rows, columns)
             for k in range(first, target.count):
                 if target.laminate[k] == first:
-                    stack.window[base + k] = slid(stack.window[base + k], rows, columns)
-                    stack.known[base + k] = around(known, after)
+                    stack.window[base + k] = use.sliding.slid(stack.window[base + k], rows, columns)
+                    stack.known[base + k] = use.sliding.around(known, after)
         return possible
 
     @wp.func
@@ -248,7 +213,7 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
                 stack.window[here] = plates.open_window(target, fields, earlier, shots, slot, k, shot, home)
                 stack.home[here] = home
                 stack.open[here] = True
-                stack.known[here] = extent_of(stack.window[here])
+                stack.known[here] = use.sliding.extent_of(stack.window[here])
 
     @wp.func
     def was_near(target: Target, stack: Stack, slot: wp.int32, layer: wp.int32):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.kernels import contact, exposure, layers
+from warpimpact.kernels import exposure, plate_grid, sliding
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Hits, Impact, Layer, Numerics, Plate, Scene, Target, make_shots
 from warpimpact.solver import windows
@@ -111,8 +111,8 @@ WINDOW = (0, 9, 0, 9)  # rows, columns
 def test_a_window_returns_to_no_nodes_that_it_has_left(
     after: tuple[int, ...], known: tuple[int, ...], ahead: bool, device: str
 ) -> None:
-    variant = Variant(layered=True, degrades=True)
-    Box, is_ahead = (getattr(layers.build(variant, contact), name) for name in ("Box", "is_ahead"))
+    use = Variant().use(plate_grid, sliding)
+    Box, is_ahead = use.plate_grid.Box, use.sliding.is_ahead
 
     @wp.kernel(module="unique")
     def look(boxes: wp.array(dtype=Box), found: wp.array(dtype=wp.bool)):

@@ -23,7 +23,8 @@ _logger = logging.getLogger(__name__)
 SETTINGS = ("step", "grid", "around", "along")
 """In the order in which they are tried: first what saves most, and what often changes little."""
 ROOM = 0.9
-"""Errors over what is allowed, above which nothing coarser is tried."""
+"""Errors over what is allowed, above which nothing coarser is tried or taken. What is left makes up for the choice: of
+several trials those pass whose errors on the pilot's shots happen to be small."""
 WIDE = 0.5
 """Likewise, below which two levels are tried before one."""
 FEW = 0.1
@@ -69,7 +70,7 @@ def eased(
             _logger.info(
                 "level %d with %s: errors of %s, %.2f of what is allowed", level, at.coarser, errors.errors, now
             )
-            if now <= 1.0 and not errors.status_error > max(best.status_error, asked.asked.status_share):
+            if now <= ROOM and not errors.status_error > max(best.status_error, asked.asked.status_share):
                 coarser[name] = level - down
                 best, excess, outcomes = errors, now, trial
                 break

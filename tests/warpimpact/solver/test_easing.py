@@ -82,14 +82,14 @@ def trials(
         (4, {"": 0.9 * FEW}, ""),
         (4, {"": 1.1 * FEW, "step 2": 0.9 * FEW}, "step 2"),
         (4, {"": ROOM + 0.01}, ""),
-        (4, {"": WIDE + 0.01, "step 3": 1.1, "grid 3": 0.99}, "grid 3"),
-        (4, {"": WIDE - 0.01, "step 2": 1.1, "step 3": 0.8, "grid 3, step 3": 0.95}, "grid 3, step 3"),
-        (4, {"": WIDE - 0.01, "step 2": 0.8, "grid 3, step 2": 0.95}, "grid 3, step 2"),
+        (4, {"": WIDE + 0.01, "step 3": ROOM + 0.01, "grid 3": ROOM}, "grid 3"),
+        (4, {"": WIDE - 0.01, "step 2": 1.1, "step 3": 0.8, "grid 3, step 3": ROOM}, "grid 3, step 3"),
+        (4, {"": WIDE - 0.01, "step 2": 0.8, "grid 3, step 2": ROOM}, "grid 3, step 2"),
         (4, {"": 0.6, "step 3": 0.7, "grid 3, step 3": 1.1, "around 3, step 3": 1.2, "along 3, step 3": 1.3}, "step 3"),
         (0, {"": 0.3}, ""),
-        (1, {"": 0.3, "step 0": 0.95}, "step 0"),
-        (2, {"": 0.3, "step 0": 0.95}, "step 0"),
-        (8, {"": 0.3, "step 6": 0.95}, "step 6"),
+        (1, {"": 0.3, "step 0": ROOM}, "step 0"),
+        (2, {"": 0.3, "step 0": ROOM}, "step 0"),
+        (8, {"": 0.3, "step 6": ROOM}, "step 6"),
     ],
 )
 def test_what_is_tried_goes_by_the_room_that_is_left(
@@ -135,7 +135,7 @@ def test_a_level_that_keeps_it_with_weighed_errors_is_judged_by_them(
         at = given[3]
         assert isinstance(at, Numerics)
         other = 0.02 if at.coarser is None else status
-        weighed = {"": 0.6, "step 3": 0.95}.get(str(at.coarser or ""), 2.0)
+        weighed = {"": 0.6, "step 3": ROOM}.get(str(at.coarser or ""), 2.0)
         return HitErrors(at, False, 0.9, 9.0, 0.0, status_error=other), 9.0, weighed
 
     monkeypatch.setattr(easing, "judged", judged)
