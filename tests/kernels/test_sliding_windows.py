@@ -15,6 +15,7 @@ from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import March
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.prepare import prepare
+from warpimpact.solver.replay import traced
 from warpimpact.solver.windows import Cells
 
 from ..verification.scenes import PAPER_CORE, paper_plate
@@ -66,6 +67,18 @@ def test_a_window_that_follows_the_core_has_the_bits_of_a_wide_one(
         np.testing.assert_array_equal(follows.outcomes[name], values, err_msg=name)
     assert follows.first == wide.first
     assert follows.last < wide.last
+
+
+def test_a_replay_keeps_all_that_the_core_has_passed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(windows, "SLACK", 0.2)
+    monkeypatch.setattr(windows, "DEEP", 0.1)
+    target, impact = (PLATE, behind(SOFT, 0.05)), {"obliquity": 45.0, "azimuth": 250.0}
+    wide = marched(target, impact, "cpu", slide=False)
+    scene = Scene(core=PAPER_CORE, target=Target(layers=target))
+    shots = make_shots(Impact(velocity=825.0, **impact), Hits(count=HITS, seed=2), PLATE)
+    march, contact = traced(scene, shots, Numerics(level=0))
+    assert march.cells == wide.last
+    np.testing.assert_array_equal(contact.steps.numpy(), wide.outcomes["steps"])
 
 
 @pytest.mark.parametrize(
