@@ -25,6 +25,7 @@ from warpimpact.scene import (
 )
 from warpimpact.scene.patterns import WHOLE_CELL
 from warpimpact.scene.patterns.lines import LINES
+from warpimpact.scene.patterns.pattern import rounded
 
 MM = 1e-3
 SLOT = SlotPattern(length="12 mm", width="4 mm", spacing=["8 mm", "16 mm"], staggered=True)
@@ -356,6 +357,10 @@ def test_straight_sides_of_holes_are_exact_wherever_they_lie_in_a_cell() -> None
     # Integers: each of the lines is rounded, at either end, and so is the width of its strip.
     np.testing.assert_allclose(shares, exact, rtol=0, atol=2.01 * LINES / WHOLE_CELL)
     assert ((exact > 0.0) & (exact < 1.0)).sum() > 40
+
+
+def test_half_a_part_of_a_cell_is_rounded_up_whatever_rounding_errors_take() -> None:
+    np.testing.assert_array_equal(rounded(np.array([2.5, 2.5 - 1e-9, 2.49, 3.0, 0.0]) / 4096, 4096), [3, 3, 2, 3, 0])
 
 
 @pytest.mark.parametrize(
