@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,8 +37,6 @@ BLUR = 3
 Odd."""
 BLOCKS = 96
 """Largest number of blocks of a period, in each direction, in the search for the clearance."""
-EDGE = 2**16
-"""Cells beside an edge that are summed together, about."""
 
 FEWEST_PLANES, PLANES = 3, 1.6
 """Per degradation depth: at least, and times the square root of its steps, as planes err by the fourth order of their
@@ -227,32 +224,25 @@ def _sharp(pattern: Pattern, count_y: int, count_z: int) -> NDArray[np.bool_]:
 
 
 def _blurred(inside: Counts, real: Real) -> Floats:
-    """Means of material over BLUR × BLUR cells of a period. Only cells beside an edge are summed.
+    """Means of material over BLUR × BLUR cells of a period: sums of whole numbers, which floats of 32 bits hold
+    exactly, and one division.
 
     Args:
         inside: share of each cell in holes, in parts of WHOLE_CELL.
     """
     rows, columns = inside.shape
-    wide = np.pad(inside, BLUR // 2, mode="wrap")
-    least, most = (
-        functools.reduce(extreme, (along[:, k : k + columns] for k in range(BLUR)))
-        for extreme in (np.minimum, np.maximum)
-        for along in [functools.reduce(extreme, (wide[k : k + rows] for k in range(BLUR)))]
-    )
-    material: Floats = (most == 0).astype(real)
-    edge = np.flatnonzero((most > 0) & (least < WHOLE_CELL))
-    for lot in np.array_split(edge, 1 + len(edge) // EDGE):
-        row, column = np.divmod(lot, columns)
-        along = [_mean([1.0 - wide[row + k, column + m] / WHOLE_CELL for k in range(BLUR)]) for m in range(BLUR)]
-        material[row, column] = _mean(along)
+    wide = (WHOLE_CELL - np.pad(inside, BLUR // 2, mode="wrap")).astype(real)
+    material = _sums(_sums(wide, rows).T, columns).T
+    material /= BLUR**2 * WHOLE_CELL
     return material
 
 
-def _mean(values: Sequence[Array]) -> Array:
-    """Mean of so many values, their middle one on its own."""
-    middle = BLUR // 2
-    beside = sum(values[middle - k] + values[middle + k] for k in range(1, middle + 1))
-    return np.asarray(values[middle] * (1.0 / BLUR) + (1.0 / BLUR) * beside)
+def _sums(values: Floats, count: int) -> Floats:
+    """Sums over BLUR neighbours along the first axis."""
+    sums: Floats = np.array(values[:count])
+    for k in range(1, BLUR):
+        sums += values[k : k + count]
+    return sums
 
 
 def _any_of(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
