@@ -107,7 +107,8 @@ def _level_for(told: Mapping[str, Any]) -> str:
     velocity, tilt = told[attr.RESIDUAL_VELOCITY_ERROR], told[attr.TILT_ERROR]
     depth, status = (told.get(name, math.nan) for name in (attr.DEPTH_ERROR, attr.STATUS_ERROR))
     errors = f"single hits may err by {errors_text(velocity, tilt, depth, status)}"
-    which = "found" if told[attr.PROMISE_KEPT] else "not exact enough"
+    exact = told[attr.PROMISE_KEPT] or told.get(attr.STOP_REASON) == "half_width"
+    which = "found" if exact else "not exact enough"
     level = json.loads(told[attr.RESOLUTION])["level"]
     return f"level {level} {which} for {told[attr.LEVEL_FOR]}; {errors}"
 
@@ -288,7 +289,7 @@ def _shifts_text(shifts: Sequence[float]) -> str:
 
 _STOPPED = {
     "half_width": "its half width is met",
-    "numerics": "more hits are of no use, as the numerics may shift it by more than half of that half width",
+    "numerics": "more hits are of no use: by what the numerics may shift it, max_count would not meet that half width",
     "max_count": "max_count ended it",
 }
 

@@ -284,7 +284,10 @@ class _Watch:
         self._look = next(self._looks, self._shards)
         estimate, asked, shift = self._stop.estimate(), rule.measure.shown(rule.half_width), self._shift or 0.0
         met = estimate.half_width + shift <= asked
-        no_use = not met and shift > OF_THE_NUMERICS * asked and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
+        left = max(asked - shift, 0.0)
+        # Half widths go with the root of the hits, about.
+        in_reach = self._hits * estimate.half_width**2 <= left**2 * self._total
+        no_use = not met and not in_reach and estimate.half_width <= (1.0 - OF_THE_NUMERICS) * asked
         if not met and not no_use and self._next != self._shards:
             return {}
         return {

@@ -38,6 +38,8 @@ MORE, PART = 256, 16
 """Shots of a pilot where SHOTS leave the choice between two levels open, and one of so many shots of a run at most."""
 OPEN = (0.7, 1.5)
 """Upper estimates over what is allowed, between which more shots may choose another level."""
+OPEN_MEASURE = (0.7, 3.0)
+"""Likewise of what a measure shifts by: mostly the noise of few shots, of which four times as many leave half."""
 FEW = 2
 """Shots that end otherwise, as few as which say little of their share; likewise."""
 FAR = 4.0
@@ -144,7 +146,8 @@ def pilot_hits(
     accuracy, at_a_plate = numerics.asked, pilot.at_a_plate
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
-    level = coarsest_level(accuracy.strictness) if excess_of is None else 0
+    usual_first = coarsest_level(accuracy.strictness)
+    level, unsure = (usual_first, OPEN) if excess_of is None else (0, OPEN_MEASURE)
     count = min(len(pilot), -(-_first(accuracy) // at_a_plate) * at_a_plate)
     some, rest = pilot[:count], pilot[count:]
     known: dict[tuple[int, bool], Outcomes] = {}
@@ -159,7 +162,7 @@ def pilot_hits(
         return known[index, whole]
 
     def allowed(index: int, finer: int, whole: bool = False) -> bool:
-        usual = index <= level + (FURTHER if len(free) == 1 else FURTHER_LAYERED)
+        usual = index <= usual_first + (FURTHER if len(free) == 1 else FURTHER_LAYERED)
         if purse is None or not tried:
             return usual
         new = [one for one in (index, finer) if (one, whole) not in known]
@@ -181,7 +184,7 @@ def pilot_hits(
                 len(shots), index, found.errors, "" if found.kept else "not ",
             )  # fmt: skip
             few = accuracy.status_share < found.status_error <= FEW / len(shots)
-            if not (OPEN[0] < excess < OPEN[1] or (few and excess <= OPEN[0])):
+            if not (unsure[0] < excess < unsure[1] or (few and excess <= unsure[0])):
                 break
         tried[index] = found, *pair
         return found, excess, nearly

@@ -77,9 +77,13 @@ def test_a_plate_that_stops_everything_has_no_residual_velocity(make_result):
     assert "nan" not in summary_text(dataset)
 
 
-@pytest.mark.parametrize(("kept", "found"), [(1, "found"), (0, "not exact enough")])
-def test_the_level_of_a_stop_rule_is_told(make_result, kept, found):
+@pytest.mark.parametrize(
+    ("kept", "reason", "found"),
+    [(1, "max_count", "found"), (0, "half_width", "found"), (0, "numerics", "not exact enough")],
+)
+def test_the_level_of_a_stop_rule_is_told(make_result, kept, reason, found):
     told = {
+        attr.STOP_REASON: reason,
         attr.NUMERICS_GIVEN: "{}",
         attr.RESOLUTION: Numerics(level=4).model_dump_json(),
         attr.PROMISE_KEPT: kept,

@@ -1,6 +1,7 @@
 """The stop rule of a campaign: intervals of Sobol replicates that contain the answer as often as they claim, and runs
 that it ends."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -100,6 +101,25 @@ def test_the_stop_rule_keeps_its_promise(sampling: str, tmp_path: Path) -> None:
         ends.append(watch.end.shards)
     assert held >= LEAST_STOPPED
     assert np.median(ends) > 2
+
+
+@pytest.mark.parametrize(
+    ("shift", "reason"),
+    [(0.0, "half_width"), (0.03, "half_width"), (0.045, "numerics"), (0.05, "numerics"), (0.06, "numerics")],
+)
+def test_a_run_goes_on_as_long_as_hits_may_make_up_for_the_numerics(
+    shift: float, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = campaign(tmp_path, "mean(residual_velocity)", "0.05 m/s", sampling='"random"')
+    monkeypatch.setattr(sys.modules[_Watch.__module__], "shift_of", lambda *_: shift)
+    watch = _Watch(scene, 2**14, Shards(256))  # which leave ± 0.006 m/s
+    values = surface(scene, 0, 2**14)
+    while watch.end is None:
+        watch.add(watch._next, shard_of(values[watch._next * 256 : (watch._next + 1) * 256]))
+    low, high = watch.end.stop["estimate_interval"]
+    assert watch.end.stop["stop_reason"] == reason
+    assert 0.5 * (high - low) <= (0.05 - shift if reason == "half_width" else 0.025)
+    assert watch.end.hits < 2**13  # where more are of no use the half that is left to hits is met
 
 
 @pytest.mark.parametrize(

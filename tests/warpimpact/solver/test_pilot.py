@@ -345,6 +345,33 @@ def test_more_hits_are_computed_where_the_first_leave_the_level_open(
     assert counts == parts
 
 
+@pytest.mark.parametrize(
+    ("excess", "computed", "kept"),
+    [
+        ([0.5, 0.5], 2, True),
+        ([2.0, 0.9], 4, True),
+        ([2.0, 1.1], 8, False),  # neither the first level does it nor the one that single hits begin with
+        ([4.0, 0.9], 4, False),  # so far off that more hits do not help
+    ],
+)
+def test_more_hits_tell_more_of_what_a_measure_shifts_by(
+    excess: list[float], computed: int, kept: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, counts = simulate(SCENE, PILOT[:32], numerics=Numerics(level=0), device="cpu"), []
+
+    def outcomes_at(at: int, some: Shots) -> Outcomes:
+        counts.append(len(some))
+        return one[: len(some)]
+
+    monkeypatch.setattr(pilot, "SHOTS", 16)
+    monkeypatch.setattr(pilot, "FURTHER", 0)
+    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 1)
+    found = pilot_hits(
+        outcomes_at, PILOT[:32], Numerics(), excess_of=lambda coarse, fine, shots: excess[len(shots) // 32]
+    )
+    assert (counts, found.numerics.level, found.kept) == ([16] * computed, 0, kept)
+
+
 def test_errors_of_slow_cores_are_those_of_their_energy(limit: Outcomes) -> None:
     one, impact = limit[np.arange(3)], np.full(3, 800.0)
     speeds, back = np.array([600.0, 20.0, 20.0]), [Status.PERFORATED, Status.PERFORATED, Status.ARRESTED]
