@@ -138,7 +138,7 @@ def pilot_hits(
     Returns:
         The level that keeps the promise. If none does: the coarsest one that keeps it with errors weighed by the energy
         of slow cores, where finer ones would be of little use. Else the coarsest one whose errors are about the
-        smallest of all that were tried.
+        smallest of all that were tried. Its errors are then those to the finest level that was computed.
 
     Raises:
         ValueError: the accuracy says nothing of outcomes.
@@ -192,7 +192,29 @@ def pilot_hits(
     found = _coarsest(judge, range(level, len(LADDER) - 1), len(LADDER) - 1, BEYOND, allowed)
     if found is None:
         return HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
+    if not found.kept:
+        index, (finest, whole) = found.numerics.level, max(known)
+        assert index is not None
+        coarse, fine = tried[index][1], known[finest, whole]
+        tried[index] = found, *_ = _told_by_finest(found, coarse, fine, finest - index, pilot, accuracy, free)
     return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
+
+
+def _told_by_finest(
+    found: HitErrors,
+    coarse: Outcomes,
+    fine: Outcomes,
+    apart: int,
+    pilot: Shots,
+    accuracy: Accuracy,
+    free: Sequence[bool],
+) -> Tried:
+    """A level that does not keep the promise, with its errors to the finest that was computed, so many levels on: where
+    errors do not fall from level to level, two levels on tell too little."""
+    count = min(len(coarse), len(fine))
+    coarse, fine = coarse[:count], fine[:count]
+    told, *_ = judged(coarse, fine, pilot[:count], found.numerics, accuracy, MARGIN[min(2, apart)], free)
+    return replace(told, kept=False), coarse, fine
 
 
 def judged(

@@ -296,6 +296,26 @@ def test_a_pilot_looks_at_levels_that_are_worth_their_time(
     assert found.kept == (tried[-1] == 4)
 
 
+def test_errors_of_a_promise_that_is_not_kept_are_those_to_the_finest_level(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = simulate(SCENE, PILOT[:16], numerics=Numerics(level=0), device="cpu")
+
+    def outcomes_at(level: int, some: Shots) -> Outcomes:  # which creep to no end
+        return known.assign(residual_velocity=known.residual_velocity + 10.0 * level)
+
+    monkeypatch.setattr(pilot, "SHOTS", 16)
+    monkeypatch.setattr(pilot, "FURTHER", 3)
+    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+    found = pilot_hits(outcomes_at, PILOT[:16], Numerics(accuracy={"residual_velocity": 1.0}))
+    assert (found.kept, found.numerics.level) == (False, 0)
+    (_, coarse, fine), (_, other, finest) = found.tried
+    assert fine is not None
+    np.testing.assert_array_equal(fine.residual_velocity, finest.residual_velocity)
+    assert found.residual_velocity_error == pytest.approx(MARGIN[2] * 40.0)
+    assert found.tried[0][0] == found
+    assert found.tried[1][0].residual_velocity_error == pytest.approx(MARGIN[2] * 20.0)
+    assert len(coarse) == len(other) == 16
+
+
 @pytest.mark.parametrize(("otherwise", "parts"), [(0, [32, 32]), (1, [32, 32, 32, 32]), (3, [32, 32])])
 def test_more_hits_tell_the_share_that_ends_otherwise(
     otherwise: int, parts: list[int], monkeypatch: pytest.MonkeyPatch
