@@ -289,9 +289,9 @@ def build(variant: Variant) -> SimpleNamespace:
                 axial += force * f_axial
                 right += force * p_right
                 up += force * p_up
-                roll += force * ring.radius * f_around
-                pitch += force * (ring.radius * f_axial * sine - ring.station * p_up)
-                yaw += force * (ring.station * p_right - ring.radius * f_axial * cosine)
+                roll += force * face.radius * f_around
+                pitch += force * (face.radius * f_axial * sine - face.station * p_up)
+                yaw += force * (face.station * p_right - face.radius * f_axial * cosine)
                 # Normals are n = (a, r cos, r sin), and arm × n = l (0, −sin, cos).
                 lever = ring.station * ring.normal_radial - ring.radius * ring.normal_axial
                 a, turn = slope * ring.normal_axial, slope * lever

@@ -105,8 +105,8 @@ def build(variant: Variant) -> SimpleNamespace:
     @wp.struct
     class Patch:
         """The centre of one patch: position in the plate frame [m], components along x of the directions outwards and
-        around, velocity along the axis, outwards and around [m/s]. `closing` is the velocity along the outward normal
-        [m/s]."""
+        around, velocity along the axis, outwards and around [m/s]. `swing` is the rate at which the axis turns towards
+        the direction outwards [rad/s]. `closing` is the velocity along the outward normal [m/s]."""
 
         x: real
         y: real
@@ -116,6 +116,7 @@ def build(variant: Variant) -> SimpleNamespace:
         velocity_axial: real
         velocity_outward: real
         velocity_around: real
+        swing: real
         closing: real
 
     @wp.func
@@ -213,15 +214,20 @@ def build(variant: Variant) -> SimpleNamespace:
         patch.y = ring.centre[1] + ring.radius * (cosine * pose.right[1] + sine * pose.up[1])
         patch.z = ring.centre[2] + ring.radius * (cosine * pose.right[2] + sine * pose.up[2])
         # v + ω × arm, arm = station along the axis + radius outwards.
-        swing = cosine * pose.omega[2] - sine * pose.omega[1]
+        patch.swing = cosine * pose.omega[2] - sine * pose.omega[1]
         lift = cosine * pose.omega[1] + sine * pose.omega[2]
-        patch.velocity_axial = pose.velocity[0] - ring.radius * swing
-        patch.velocity_outward = cosine * pose.velocity[1] + sine * pose.velocity[2] + ring.station * swing
+        patch.velocity_axial = pose.velocity[0] - ring.radius * patch.swing
+        patch.velocity_outward = cosine * pose.velocity[1] + sine * pose.velocity[2] + ring.station * patch.swing
         patch.velocity_around = (
             cosine * pose.velocity[2] - sine * pose.velocity[1] + ring.radius * pose.omega[0] - ring.station * lift
         )
         patch.closing = ring.normal_axial * patch.velocity_axial + ring.normal_radial * patch.velocity_outward
         return patch
+
+    @wp.func
+    def half_lever(ring: Ring):
+        """Half of the change over a ring, along the meridian, of how much faster it closes in per swing [m]."""
+        return ring.normal_radial * ring.half_axial - ring.normal_axial * ring.half_radial
 
     @wp.func
     def closes(pose: Pose, ring: Ring):
@@ -239,6 +245,7 @@ def build(variant: Variant) -> SimpleNamespace:
             + ring.normal_radial * (outwards + ring.sector * around)
             + wp.abs(ring.turn_axial) * (wp.abs(along) + swing)
             + wp.abs(ring.turn_radial) * outwards
+            + wp.abs(half_lever(ring)) * rate
         ) > zero
 
     @wp.func

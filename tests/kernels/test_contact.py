@@ -187,8 +187,8 @@ def test_load_sees_half_of_the_step_s_own_exposure(device: str) -> None:
     "law", [{"onset": 1e5}, {"onset": 1e-7, "a1": 4e6, "a2": 7850.0}], ids=["ramp of the contact", "rate"]
 )
 def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float], device: str) -> None:
-    # The trapezoid rule: (M + ½ dt J) Δu = dt F, J = −∂F/∂u. The damping takes the normals of the rings, the load those
-    # of the parts of curved patches that touch: they differ by the angle of a patch.
+    # The trapezoid rule: (M + ½ dt J) Δu = dt F, J = −∂F/∂u. The damping takes the normals and places of the rings, the
+    # load those of the parts of curved patches that touch: they differ by a patch.
     poses, step, count = astride(30), 1e-4, 30
     poses["omega"] = poses["omega"] / 10
     speeds = np.concatenate([poses["velocity"], poses["omega"]], axis=1)
@@ -196,8 +196,8 @@ def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float],
     turn = np.zeros((count, 6, 6))
     turn[:, :3, :3] = turn[:, 3:, 3:] = Rotation.from_quat(poses["attitude"]).as_matrix()
     errors = []
-    for around in (96, 768):
-        surface = surface_of(Surface, CONE, 8, around, device)
+    for rings, around in ((8, 96), (64, 768)):
+        surface = surface_of(Surface, CONE, rings, around, device)
 
         def load_at(speeds: Array, surface: Any = surface) -> Loaded:
             moved = poses | {"velocity": speeds[:, :3].copy(), "omega": speeds[:, 3:].copy()}
@@ -218,7 +218,7 @@ def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float],
         errors.append(np.abs(damping + jacobian / 2).max() / np.abs(jacobian).max())
         assert np.abs(jacobian).max(axis=(1, 2)).astype(bool).sum() > count / 3
         np.testing.assert_array_equal(load["damped"], damping.any(axis=(1, 2)))
-    # First order in the patches around, and the angle of a patch, 2π/768 = 8e-3, at most.
+    # First order in the patches, and the angle of a patch, 2π/768 = 8e-3, at most.
     assert errors[1] < errors[0] / 4
     assert errors[1] < 2 * np.pi / 768
 

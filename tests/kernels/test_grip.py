@@ -144,6 +144,46 @@ def test_part_of_a_doubly_curved_patch_that_touches_is_that_of_a_strip(device: s
     assert off.max() < (3 - 2 * np.sqrt(2)) / 12 * angle * SLIDING + angle**2 * SLIDING / 20
 
 
+def test_part_of_a_patch_of_a_core_that_turns_is_where_that_closes_in(device: str) -> None:
+    # ω × r changes the velocity along the patch. The load acts in the middle of what touches, so its power is that of
+    # the closing speed there: a core that turns gains nothing.
+    count, bend, half = 400, 0.02, 0.8e-3
+    rng = np.random.default_rng(13)
+    slant, swing = rng.uniform(-0.5, 0.5, count), rng.uniform(2e3, 2e4, count) * rng.choice([-1, 1], count)
+    normal_axial, normal_radial = np.sin(slant), np.cos(slant)
+    half_axial, half_radial = -half * normal_radial, half * normal_axial
+    sliding = rng.uniform(-1.0, 1.0, count) * SLIDING
+    variation = bend * sliding - half * swing
+    closing = rng.uniform(-1.3, 1.3, count) * np.abs(variation)
+    velocity = np.stack([closing * normal_axial + sliding * normal_radial,
+                         closing * normal_radial - sliding * normal_axial, np.zeros(count)], axis=1)  # fmt: skip
+    members = bent(slant, bend, 0.0, velocity)
+    place = {"station": np.full(count, 0.01), "radius": np.full(count, 0.003), "swing": swing}
+    found = gripped(device, speed=1e-3, **members, **place, half_axial=half_axial, half_radial=half_radial)
+
+    along = (2 * (np.arange(20_000) + 0.5) / 20_000 - 1)[:, None]
+    angle = slant + bend * along
+    axial, outward = velocity[:, 0] - along * half_radial * swing, velocity[:, 1] + along * half_axial * swing
+    closes = np.sin(angle) * axial + np.cos(angle) * outward
+    touching = closes > 0
+    share = touching.mean(axis=0)
+    some = (share > 0.01) & (found["share"] > 0.01)
+    assert (some & (share < 0.99)).sum() > 200
+    middle, speed = (
+        np.where(touching, x, 0.0).sum(axis=0) / np.maximum(1, touching.sum(axis=0)) for x in (along, closes)
+    )
+    curved = bend * (bend * SLIDING + np.abs(half * swing))  # of second order
+    assert (np.abs(found["share"] - share) <= curved / np.abs(variation)).all()
+    assert np.median(curved / np.abs(variation)) < 0.03
+    np.testing.assert_allclose(found["closing"][some], speed[some], atol=curved.max())
+    station, radius = 0.01 + middle * half_axial, 0.003 + middle * half_radial
+    np.testing.assert_allclose(found["station"][some], station[some], atol=0.05 * half)
+    np.testing.assert_allclose(found["radius"][some], radius[some], atol=0.05 * half)
+    there = velocity[:, :2] + swing[:, None] * np.stack([0.003 - found["radius"], found["station"] - 0.01], axis=1)
+    power = found["axial"] * there[:, 0] + found["outward"] * there[:, 1]
+    np.testing.assert_allclose(power[some], found["closing"][some], atol=curved.max())
+
+
 def test_patch_that_closes_in_or_moves_away_as_a_whole_is_flat(device: str) -> None:
     # Straight flight: all of a nose's patches close in, and carry the ring's own exact normal.
     slant, velocity = grazing(500, 0.1, 0.1)
