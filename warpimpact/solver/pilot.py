@@ -195,25 +195,18 @@ def pilot_hits(
     if not found.kept:
         index, (finest, whole) = found.numerics.level, max(known)
         assert index is not None
-        coarse, fine = tried[index][1], known[finest, whole]
-        tried[index] = found, *_ = _told_by_finest(found, coarse, fine, finest - index, pilot, accuracy, free)
+        pair = tried[index][1], known[finest, whole]
+        tried[index] = found, *_ = _told_by_finest(found, pair, finest - index, pilot, accuracy, free)
     return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
 
 
 def _told_by_finest(
-    found: HitErrors,
-    coarse: Outcomes,
-    fine: Outcomes,
-    apart: int,
-    pilot: Shots,
-    accuracy: Accuracy,
-    free: Sequence[bool],
+    found: HitErrors, pair: Sequence[Outcomes], on: int, pilot: Shots, accuracy: Accuracy, free: Sequence[bool]
 ) -> Tried:
     """A level that does not keep the promise, with its errors to the finest that was computed, so many levels on: where
     errors do not fall from level to level, two levels on tell too little."""
-    count = min(len(coarse), len(fine))
-    coarse, fine = coarse[:count], fine[:count]
-    told, *_ = judged(coarse, fine, pilot[:count], found.numerics, accuracy, MARGIN[min(2, apart)], free)
+    coarse, fine = (one[: min(map(len, pair))] for one in pair)
+    told, *_ = judged(coarse, fine, pilot[: len(fine)], found.numerics, accuracy, MARGIN[min(2, on)], free)
     return replace(told, kept=False), coarse, fine
 
 

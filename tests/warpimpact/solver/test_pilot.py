@@ -81,8 +81,8 @@ def test_a_shanked_core_gets_the_accuracy_that_the_name_promises(name: str, limi
     assert velocity <= accuracy.residual_velocity
     assert tilt <= accuracy.tilt
     # The errors that are told are upper estimates of the true ones; one in six may lie below (RISK).
-    assert velocity / 1.1 <= found.residual_velocity_error <= accuracy.residual_velocity
-    assert tilt / 1.1 <= found.tilt_error <= accuracy.tilt
+    assert velocity / 1.3 <= found.residual_velocity_error <= accuracy.residual_velocity
+    assert tilt / 1.3 <= found.tilt_error <= accuracy.tilt
 
 
 def test_an_accuracy_in_numbers_is_what_its_name_is() -> None:
