@@ -226,7 +226,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def half_lever(ring: Ring):
-        """Half of the change over a ring, along the meridian, of how much faster it closes in per swing [m]."""
+        """Half of what the closing speed changes by over a ring, along the meridian, per rate of swing [m]."""
         return ring.normal_radial * ring.half_axial - ring.normal_axial * ring.half_radial
 
     @wp.func

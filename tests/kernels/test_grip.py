@@ -1,5 +1,6 @@
 """Grip of a curved patch: the part that closes in, its normal and its closing speed (docs/model.md §4)."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,30 @@ def grips(
 
 
 GRIPS = VARIANT.kernel(grips)
+
+
+def bounds(
+    law: Law,
+    velocities: wp.array(dtype=VARIANT.vec3),
+    omegas: wp.array(dtype=VARIANT.vec3),
+    rings: wp.array(dtype=Ring),
+    shares: wp.array(dtype=real),
+    closes: wp.array(dtype=wp.bool),
+) -> None:
+    i = wp.tid()
+    pose = use.core_surface.Pose()
+    pose.velocity = velocities[i]
+    pose.omega = omegas[i]
+    share = real(0.0)
+    for k in range(64):
+        azimuth = real(k) * real(2.0 * math.pi / 64.0)
+        patch = use.core_surface.patch_at(pose, rings[i], wp.cos(azimuth), wp.sin(azimuth))
+        share = wp.max(share, use.grip.grip_of(law, pose, rings[i], patch).share)
+    shares[i] = share
+    closes[i] = use.core_surface.closes(pose, rings[i])
+
+
+BOUNDS = VARIANT.kernel(bounds)
 
 
 def gripped(device: str, *, speed: float, onset: float = 1e-9, **columns: Any) -> Any:
@@ -182,6 +207,31 @@ def test_part_of_a_patch_of_a_core_that_turns_is_where_that_closes_in(device: st
     there = velocity[:, :2] + swing[:, None] * np.stack([0.003 - found["radius"], found["station"] - 0.01], axis=1)
     power = found["axial"] * there[:, 0] + found["outward"] * there[:, 1]
     np.testing.assert_allclose(power[some], found["closing"][some], atol=curved.max())
+
+
+@pytest.mark.parametrize("flank", [True, False])
+def test_no_ring_is_left_out_of_which_a_part_closes_in(flank: bool, device: str) -> None:
+    # Cores that move away from their own flank, or back, and of which the ends of a ring swing the other way.
+    count = 20_000
+    rng = np.random.default_rng(14)
+    slant, half = rng.uniform(-0.3, 0.3, count), rng.uniform(1e-4, 2e-3, count)
+    slant = slant if flank else 0.5 * np.pi - np.abs(slant)  # normals point outwards
+    members = bent(slant, rng.uniform(-0.02, 0.02, count), 0.05, np.zeros((count, 3)))
+    place = {"station": rng.uniform(-1e-3, 1e-3, count), "radius": rng.uniform(1e-4, 4e-3, count)}
+    halves = {"half_axial": -half * members["normal_radial"], "half_radial": half * members["normal_axial"]}
+    names = Ring.numpy_dtype()["names"]
+    rings = records(Ring, device, **{k: v for k, v in (members | place | halves).items() if k in names})
+    away = -np.sign(np.sin(slant))[:, None] * np.array([1.0, 0.0, 0.0])
+    velocities, omegas = away * rng.uniform(0.0, 30.0, (count, 1)), rng.normal(0.0, 1e4, (count, 3))
+    omegas[:, 0] = 0.0
+    law, found = Law(), (wp.empty(count, dtype=real, device=device), wp.empty(count, dtype=wp.bool, device=device))
+    law.onset = 1e-9
+    given = [wp.array(x, dtype=VARIANT.vec3, device=device) for x in (velocities, omegas)]
+    wp.launch(BOUNDS, count, inputs=[law, *given, rings], outputs=list(found), device=device)
+    touching, closes = (array.numpy() for array in found)
+    assert closes[touching > 0.0].all()
+    assert 100 < (touching > 0.0).sum() < count
+    assert not closes.all()
 
 
 def test_patch_that_closes_in_or_moves_away_as_a_whole_is_flat(device: str) -> None:

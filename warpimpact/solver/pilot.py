@@ -138,7 +138,7 @@ def pilot_hits(
     Returns:
         The level that keeps the promise. If none does: the coarsest one that keeps it with errors weighed by the energy
         of slow cores, where finer ones would be of little use. Else the coarsest one whose errors are about the
-        smallest of all that were tried. Its errors are then those to the finest level that was computed.
+        smallest of all. Its errors are then those to the finest level that as many shots were computed at.
 
     Raises:
         ValueError: the accuracy says nothing of outcomes.
@@ -193,21 +193,21 @@ def pilot_hits(
     if found is None:
         return HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
     if not found.kept:
-        index, (finest, whole) = found.numerics.level, max(known)
-        assert index is not None
-        pair = tried[index][1], known[finest, whole]
-        tried[index] = found, *_ = _told_by_finest(found, pair, finest - index, pilot, accuracy, free)
+        index, coarse = next((at, coarse) for at, (one, coarse, _) in tried.items() if one is found)
+        finest = max(at for at, one in known.items() if len(one) >= len(coarse))
+        tried[index] = _to_finer(found, coarse, known[finest], finest[0] - index, pilot, accuracy, free)
+        found = tried[index][0]
     return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
 
 
-def _told_by_finest(
-    found: HitErrors, pair: Sequence[Outcomes], on: int, pilot: Shots, accuracy: Accuracy, free: Sequence[bool]
+def _to_finer(
+    found: HitErrors, coarse: Outcomes, fine: Outcomes, on: int, pilot: Shots, accuracy: Accuracy, free: Sequence[bool]
 ) -> Tried:
-    """A level that does not keep the promise, with its errors to the finest that was computed, so many levels on: where
-    errors do not fall from level to level, two levels on tell too little."""
-    coarse, fine = (one[: min(map(len, pair))] for one in pair)
-    told, *_ = judged(coarse, fine, pilot[: len(fine)], found.numerics, accuracy, MARGIN[min(2, on)], free)
-    return replace(told, kept=False), coarse, fine
+    """A level that breaks the promise, with its errors to one so many levels on: where they stall, two tell too
+    little."""
+    count, margin = len(coarse), MARGIN[min(2, on)]
+    told, *_ = judged(coarse, fine[:count], pilot[:count], found.numerics, accuracy, margin, free)
+    return replace(told, kept=False), coarse, fine[:count]
 
 
 def judged(
