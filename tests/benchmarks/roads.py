@@ -24,10 +24,11 @@ from random_layers import drawn
 from random_scenes import draw
 
 from warpimpact import Campaign, Numerics, Scene, Shots
+from warpimpact.scene import PRESETS
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import March
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import PRESETS, pilot_size
+from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.simulate import outcomes_of, pilot_of
 from warpimpact.solver.worker import NEVER, Worker

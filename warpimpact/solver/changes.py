@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 RISK = 1.0 / 6.0
 """Probability at most that the estimate from the pilot's shots lies below the percentile of all shots that is promised;
 where there are enough shots for that."""
+FEWEST = 1.6
+"""At least so many shots of a pilot lie beyond the promised percentile, in the mean."""
 SLOW = 0.25
 """Share of the impact velocity below which the error of a speed is weighed as that of the energy, E = m v²/2: in
 proportion to the speed. The energy is computed to some accuracy, so the error of a speed near 0 has no bound."""
@@ -30,29 +32,65 @@ def upper_errors(
     impact: Array | None = None,
     relative: tuple[float, float] = (0.0, 0.0),
     free: Sequence[bool] | None = None,
+    risk: float = RISK,
 ) -> Array:
     """Changes of residual velocity [m/s], last tilt [rad] and depth [m] that a share of the shots stay within, but for
-    RISK; NaN of what no shot has. The arguments are those of `changes`."""
-    known = [errors[~np.isnan(errors)] for errors in changes(coarse, fine, impact, relative, free)]
-    return np.array([upper_error(errors, at_a_plate, share) if len(errors) else math.nan for errors in known])
+    a risk; NaN of what no shot has. The other arguments are those of `changes`."""
+    plates = np.arange(len(fine)) // at_a_plate
+    known = [(errors, ~np.isnan(errors)) for errors in changes(coarse, fine, impact, relative, free)]
+    return np.array([upper_error(x[has], share, plates[has], risk) if has.any() else math.nan for x, has in known])
 
 
-def upper_error(errors: Array, at_a_plate: int, share: float) -> float:
-    """Shots at one plate err alike, so they count as one in what is known of the percentile."""
-    plates = max(1, len(errors) // at_a_plate)
-    place = math.ceil(len(errors) * upper_place(plates, share) / plates)
-    return float(np.sort(errors)[place - 1])
+def upper_error(errors: Array, share: float, plates: NDArray[np.intp] | None = None, risk: float = RISK) -> float:
+    """What a share of the errors, shape [shots], stay within, but for a risk.
+
+    Args:
+        plates: numbers of the plates that the shots hit, of their shape; None if each has its own. As far as shots at
+            one plate err alike, they count as one in what is known of the percentile.
+    """
+    ordered, count = np.sort(errors), float(len(errors))
+    if plates is not None:
+        beyond = errors > ordered[math.ceil(share * len(errors)) - 1]
+        count /= design_effect(beyond.astype(np.float64), plates)
+    counted = max(1, math.floor(count + 1e-9))
+    return float(ordered[math.ceil(len(errors) * upper_place(counted, share, risk) / counted) - 1])
 
 
-def upper_place(count: int, share: float) -> int:
+def design_effect(values: Array, groups: NDArray[np.intp]) -> float:
+    """How many values tell as much of the mean as one that is independent of the others, where those of a group are
+    alike: the variance of the mean by the sums of groups over that by the values (Kish, Survey Sampling, 1965). By one
+    standard error more than it is found, as there may be few groups, and at least 1; at most the size of a group.
+
+    Args:
+        values, groups: values and the numbers of their groups, shape [values].
+    """
+    sums = np.bincount(groups, values - values.mean())
+    sizes = np.bincount(groups)
+    sums, sizes = sums[sizes > 0], sizes[sizes > 0]
+    size, number = float(sizes.mean()), len(sizes)
+    if size == 1.0 or number == 1:
+        return size
+    squares = float(np.square(values - values.mean()).sum())
+    found = float(np.square(sums).sum()) / squares * number / (number - 1) if squares > 0.0 else 1.0
+    doubt = math.sqrt(2.0 * (size - 1.0) / (size * (number - 1)))
+    return min(max(1.0, found + doubt), size)
+
+
+def upper_place(count: int, share: float, risk: float = RISK) -> int:
     """Place of the order statistic of so many shots that lies below the percentile of a share with a probability of at
-    most RISK; the last one, if none does: so many of the shots lie below it, or more, where each does by the share."""
+    most the risk; the last one, if none does: so many of the shots lie below it, or more, where each does by the
+    share."""
     below = 0.0
     for place in range(count, 0, -1):
         below += math.comb(count, place) * share**place * (1.0 - share) ** (count - place)
-        if below > RISK:
+        if below > risk:
             return min(place + 1, count)
     return 1
+
+
+def fewest(share: float) -> int:
+    """Shots that a pilot needs at least, to tell what a share of all shots stay within."""
+    return math.ceil(FEWEST / (1.0 - share) - 1e-9)
 
 
 def limit_changes(coarse: Array, fine: Array, share: float) -> tuple[float, float, float]:
@@ -63,7 +101,7 @@ def limit_changes(coarse: Array, fine: Array, share: float) -> tuple[float, floa
         change = np.where(same, 0.0, np.abs(coarse - fine))
     change[np.isnan(change)] = math.inf
     finite = np.isfinite(fine)
-    return upper_error(change, 1, share), _median(change[finite | np.isfinite(coarse)]), _median(fine[finite])
+    return upper_error(change, share), _median(change[finite | np.isfinite(coarse)]), _median(fine[finite])
 
 
 def _median(values: Array) -> float:

@@ -14,8 +14,9 @@ from dataclasses import replace
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Shots
+from warpimpact.solver.climb import MARGIN
 from warpimpact.solver.findings import HitErrors
-from warpimpact.solver.pilot import MARGIN, PART, judged
+from warpimpact.solver.pilot import PART, judged
 from warpimpact.solver.resolution import LADDER, at_level
 
 _logger = logging.getLogger(__name__)
@@ -56,8 +57,12 @@ def eased(
 
     def judge(outcomes: Outcomes, at: Numerics) -> tuple[HitErrors, float]:
         errors, excess, weighed = judged(outcomes, fine, shots, at, asked.asked, margin, free, between)
+        status = errors.status_error - known_better
+        errors = replace(errors, kept=excess <= 1.0 and not status > asked.asked.status_share, status_error=status)
         return errors, excess if found.kept else weighed
 
+    known_better = 0.0  # how much more these shots end otherwise than more of them do
+    known_better = judge(between, found.numerics)[0].status_error - found.status_error
     (best, excess), outcomes = judge(between, found.numerics), between
     coarser: dict[str, int] = {}
     for name in SETTINGS:

@@ -10,30 +10,30 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
-from typing import TypeAlias, TypeVar
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
-from warpimpact.solver.changes import ended_otherwise, limit_changes, upper_errors
-from warpimpact.solver.findings import Found, HitErrors, LimitErrors, Tried
+from warpimpact.scene import Accuracy, Numerics, Shots
+from warpimpact.solver.changes import RISK, ended_otherwise, fewest, upper_errors
+from warpimpact.solver.climb import MARGIN, Verdict, coarsest
+from warpimpact.solver.findings import HitErrors, Tried
+from warpimpact.solver.purse import Computed, Purse
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
 Array = NDArray[np.float64]
 
 _logger = logging.getLogger(__name__)
 
-MARGIN = {1: 2.0, 2: 1.4}
-"""Factor of an estimate by the number of levels to the finer one. In 40 random scenes, 83 to 98 % of the
-estimates are then at least the 90th percentile that other hits show (tests/benchmarks/random_scenes.py)."""
-SHOTS, SHOTS_OF_FINE, LIMITS = 64, 32, 16
-"""Shots of a pilot, of one that begins at FINE or beyond, where they are dear, and limits of a pilot. More shots make a
-lower estimate safe."""
+SHOTS, SHOTS_OF_FINE = 64, 32
+"""Shots of a pilot, and of one that begins at FINE or beyond, where they are dear. More shots make a lower estimate
+safe."""
 MORE, PART = 256, 16
 """Shots of a pilot where SHOTS leave the choice between two levels open, and one of so many shots of a run at most."""
 OPEN = (0.7, 1.5)
@@ -42,33 +42,15 @@ OPEN_MEASURE = (0.7, 3.0)
 """Likewise of what a measure shifts by: mostly the noise of few shots, of which four times as many leave half."""
 FEW = 2
 """Shots that end otherwise, as few as which say little of their share; likewise."""
-FAR = 4.0
-"""Estimates over what is allowed, above which the next level is not tried: errors about halve from level to level."""
-STALLED = 0.7
-"""Share of an error that is left two levels on, above which finer levels are of little use: it falls to a quarter where
-it converges, but not where cores barely pass or tumble."""
-ALIKE = 1.5
-"""Errors of levels up to so many times the smallest are no reason for a finer one, where none keeps the promise."""
 FINE = 4
-FEWEST = 1.6
-"""At least so many shots of a pilot lie beyond the promised percentile, in the mean."""
 FURTHER = 5
 """Levels behind the first one on which a promise is looked for: 105 random scenes of single plates needed no finer one
 for draft and standard, but one. Who asks for a draft waits for no level that costs fifty times as much."""
 FURTHER_LAYERED = 3
 """Likewise behind several layers, where a shot costs more: eight to ten times the first level's cost."""
-PATIENCE, WORTH = 10.0, 1600
-"""What a pilot may take: so many seconds of a core, or as long as so many hits take at the level that it looks at,
-whichever is more: a tenth of a run of 16,384 hits. As long as it takes no more than these seconds, it looks at finer
-levels than FURTHER, too. Times are those that are foreseen (`Prepared.seconds`), so that a level does not depend on the
-machine."""
-FINEST_LIMIT = 6
-"""The last level that is taken for limits. A finer one is only compared with."""
-BEYOND, BEYOND_LIMITS = 1, 2
-"""Levels behind the first one that does nearly, on which one is looked for that keeps the promise; each costs about
-twice the one before. Nearly does a level whose weighed errors are within the promise. Of limits, half are: as errors
-about halve from level to level, the others are off by more than four times as much two levels on. Some limits, such as
-those at which the outcome jumps, or that come and go, have no bounded error, and finer levels are of little use."""
+BEYOND = 1
+"""Levels behind the first one that nearly keeps the promise, on which one is looked for that does; it costs about twice
+the one before. Nearly does a level whose weighed errors are within the promise."""
 
 
 def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
@@ -79,40 +61,11 @@ def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
 def _first(accuracy: Accuracy) -> int:
     """Shots that a pilot begins with."""
     usual = SHOTS if coarsest_level(accuracy.strictness) < FINE else SHOTS_OF_FINE
-    return max(usual, _fewest(accuracy.share))
-
-
-def limits_pilot_size(accuracy: Accuracy) -> int:
-    """Limits of a pilot."""
-    return max(LIMITS, _fewest(accuracy.share))
-
-
-def _fewest(share: float) -> int:
-    return math.ceil(FEWEST / (1.0 - share) - 1e-9)
+    return max(usual, fewest(accuracy.share))
 
 
 Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
 """What outcomes of some shots at a level are off by over what is allowed, from those at a finer level."""
-
-
-class Purse:
-    """What a pilot may still take, by the price of a shot at a level [s]."""
-
-    def __init__(self, price: Callable[[int], float]) -> None:
-        self._price, self._spent = price, 0.0
-
-    def pay(self, level: int, shots: int) -> None:
-        """Some shots are computed."""
-        self._spent += shots * self._price(level)
-
-    def allows(self, level: int, new: Iterable[int], shots: int, patient: bool) -> bool:
-        """Whether a level is worth some shots at some new levels. Who is not `patient` goes on only as long as it takes
-        no time to speak of."""
-        try:
-            spent = self._spent + shots * sum(self._price(one) for one in new)
-        except MemoryError:  # the plate's period does not fit at that spacing
-            return False
-        return spent <= PATIENCE or (patient and spent <= WORTH * self._price(level))
 
 
 def pilot_hits(
@@ -143,61 +96,100 @@ def pilot_hits(
     Raises:
         ValueError: the accuracy says nothing of outcomes.
     """
-    accuracy, at_a_plate = numerics.asked, pilot.at_a_plate
+    accuracy = numerics.asked
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
-    usual_first = coarsest_level(accuracy.strictness)
-    level, unsure = (usual_first, OPEN) if excess_of is None else (0, OPEN_MEASURE)
-    count = min(len(pilot), -(-_first(accuracy) // at_a_plate) * at_a_plate)
-    some, rest = pilot[:count], pilot[count:]
-    known: dict[tuple[int, bool], Outcomes] = {}
-    tried: dict[int, Tried] = {}
-
-    def computed(index: int, whole: bool) -> Outcomes:
-        if (index, whole) not in known:
-            others = [computed(index, False)] if whole else []
-            known[index, whole] = Outcomes.joined([*others, outcomes_at(index, rest if whole else some)])
-            if purse is not None:
-                purse.pay(index, len(rest if whole else some))
-        return known[index, whole]
-
-    def allowed(index: int, finer: int, whole: bool = False) -> bool:
-        usual = index <= usual_first + (FURTHER if len(free) == 1 else FURTHER_LAYERED)
-        if purse is None or not tried:
-            return usual
-        new = [one for one in (index, finer) if (one, whole) not in known]
-        return purse.allows(index, new, len(rest if whole else some), usual)
-
-    def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
-        for whole in (False, True) if len(rest) else (False,):
-            if whole and not allowed(index, finer, whole):
-                break
-            shots = pilot if whole else some
-            pair = computed(index, whole), computed(finer, whole)
-            found, excess, weighed = judged(*pair, shots, at_level(index, numerics), accuracy, margin, free)
-            nearly = weighed <= 1.0
-            if excess_of is not None:
-                excess, nearly = excess_of(*pair, shots), False
-                found = replace(found, kept=excess <= 1.0)
-            _logger.info(
-                "pilot of %d hits at level %d: errors of %s, the promise is %skept",
-                len(shots), index, found.errors, "" if found.kept else "not ",
-            )  # fmt: skip
-            few = accuracy.status_share < found.status_error <= FEW / len(shots)
-            if not (unsure[0] < excess < unsure[1] or (few and excess <= unsure[0])):
-                break
-        tried[index] = found, *pair
-        return found, excess, nearly
-
-    found = _coarsest(judge, range(level, len(LADDER) - 1), len(LADDER) - 1, BEYOND, allowed)
+    search = _Search(Computed(outcomes_at, pilot, purse), pilot, numerics, free, excess_of)
+    found = coarsest(search.judge, range(search.first, len(LADDER) - 1), len(LADDER) - 1, BEYOND, search.allowed)
     if found is None:
-        return HitErrors(at_level(level, numerics), False, accuracy.share, math.inf, math.inf)
+        return HitErrors(at_level(search.first, numerics), False, accuracy.share, math.inf, math.inf)
+    tried = search.tried
     if not found.kept:
         index, coarse = next((at, coarse) for at, (one, coarse, _) in tried.items() if one is found)
-        finest = max(at for at, one in known.items() if len(one) >= len(coarse))
-        tried[index] = _to_finer(found, coarse, known[finest], finest[0] - index, pilot, accuracy, free)
+        finest, fine = search.computed.finest(len(coarse))
+        tried[index] = _to_finer(found, coarse, fine, finest - index, pilot, accuracy, free)
         found = tried[index][0]
     return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What a pilot asks of a level; the attributes are the arguments of `pilot_hits`.
+
+    Attributes:
+        tried: what was found at every level that was tried.
+    """
+
+    computed: Computed
+    pilot: Shots
+    numerics: Numerics
+    free: Sequence[bool]
+    excess_of: Excess | None
+    tried: dict[int, Tried] = field(default_factory=dict)
+
+    @property
+    def first(self) -> int:
+        """The level from which on it is looked for."""
+        return coarsest_level(self.numerics.asked.strictness) if self.excess_of is None else 0
+
+    @cached_property
+    def sizes(self) -> list[int]:
+        """Numbers of shots: twice as many each time, of whole plates."""
+        most, at_a_plate = len(self.pilot), self.pilot.at_a_plate
+        sizes = [min(most, -(-_first(self.numerics.asked) // at_a_plate) * at_a_plate)]
+        while sizes[-1] < most:
+            sizes.append(min(most, 2 * sizes[-1]))
+        return sizes
+
+    def allowed(self, index: int, finer: int, count: int | None = None) -> bool:
+        """Whether a level is worth so many shots there and at a finer one."""
+        further = FURTHER if len(self.free) == 1 else FURTHER_LAYERED
+        usual = index <= coarsest_level(self.numerics.asked.strictness) + further
+        return self.computed.worth(index, finer, count or self.sizes[0], usual) if self.tried else usual
+
+    def judge(self, index: int, finer: int, margin: float) -> Verdict[HitErrors]:
+        """A level by its change to a finer one, from as many shots as tell whether it keeps the promise."""
+        verdict = self._by(self.sizes[0], index, finer, margin)
+        typical = self._typical(index, finer, margin) if self.excess_of is None else verdict.excess
+        for count in self.sizes[1:]:
+            if self._decided(verdict, len(self.tried[index][1])) or not self.allowed(index, finer, count):
+                break
+            verdict = self._by(count, index, finer, margin)
+        return verdict._replace(typical=typical)
+
+    def _by(self, count: int, index: int, finer: int, margin: float) -> Verdict[HitErrors]:
+        """A level by so many shots."""
+        shots, accuracy = self.pilot[:count], self.numerics.asked
+        pair = self.computed.at(index, count), self.computed.at(finer, count)
+        found, excess, weighed = judged(*pair, shots, at_level(index, self.numerics), accuracy, margin, self.free)
+        # What more shots told of a coarser level holds, as finer ones err no more.
+        status = [one.status_error for at, (one, coarse, _) in self.tried.items() if at < index and len(coarse) > count]
+        if found.status_error > min(status, default=1.0):
+            kept = excess <= 1.0 and min(status) <= accuracy.status_share
+            found = replace(found, kept=kept, status_error=min(status))
+        if self.excess_of is not None:
+            excess, weighed = self.excess_of(*pair, shots), math.inf
+            found = replace(found, kept=excess <= 1.0)
+        _logger.info(
+            "pilot of %d hits at level %d: errors of %s, the promise is %skept",
+            count, index, found.errors, "" if found.kept else "not ",
+        )  # fmt: skip
+        self.tried[index] = found, *pair
+        return Verdict(found, excess, math.nan, weighed <= 1.0)
+
+    def _typical(self, index: int, finer: int, margin: float) -> float:
+        """Errors over what is allowed that are as likely to be too small as too large, of the first shots."""
+        found, coarse, fine = self.tried[index]
+        if found.status_error > 1.0 - self.numerics.asked.share:
+            return math.inf  # the shots that end otherwise are those that err most
+        shots = self.pilot[: len(fine)]
+        return judged(coarse, fine, shots, found.numerics, self.numerics.asked, margin, self.free, risk=0.5)[1]
+
+    def _decided(self, verdict: Verdict[HitErrors], count: int) -> bool:
+        """Whether more shots would hardly tell otherwise."""
+        low, high = OPEN if self.excess_of is None else OPEN_MEASURE
+        few = self.numerics.asked.status_share < verdict.found.status_error <= FEW / count
+        return not low < verdict.excess < high and not (few and verdict.excess <= low)
 
 
 def _to_finer(
@@ -205,9 +197,8 @@ def _to_finer(
 ) -> Tried:
     """A level that breaks the promise, with its errors to one so many levels on: where they stall, two tell too
     little."""
-    count, margin = len(coarse), MARGIN[min(2, on)]
-    told, *_ = judged(coarse, fine[:count], pilot[:count], found.numerics, accuracy, margin, free)
-    return replace(told, kept=False), coarse, fine[:count]
+    told, *_ = judged(coarse, fine, pilot[: len(fine)], found.numerics, accuracy, MARGIN[min(2, on)], free)
+    return replace(told, kept=False), coarse, fine
 
 
 def judged(
@@ -219,6 +210,7 @@ def judged(
     margin: float,
     free: Sequence[bool],
     between: Outcomes | None = None,
+    risk: float = RISK,
 ) -> tuple[HitErrors, float, float]:
     """What is known of a resolution from some shots: the finding, its errors over what is allowed, and the same with
     errors weighed by the energy of slow cores.
@@ -227,10 +219,11 @@ def judged(
         margin: how many times the change to the fine outcomes the error is at most.
         between: outcomes at a level between, if the margin is that level's. What it has beyond 1 is then the error of
             the fine outcomes, over the change from there.
+        risk: that the errors of the promised share of all shots are larger.
     """
 
     def upper(impact: Array | None, relative: tuple[float, float]) -> Array:
-        told = (shots.at_a_plate, accuracy.share, impact, relative, free)
+        told = (shots.at_a_plate, accuracy.share, impact, relative, free, risk)
         if between is None:
             return margin * upper_errors(coarse, fine, *told)
         return upper_errors(coarse, fine, *told) + (margin - 1.0) * upper_errors(between, fine, *told)
@@ -258,93 +251,3 @@ def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
         float(error) / bound if math.isfinite(bound) else 0.0
         for error, bound in zip((velocity, tilt, depth), allowed, strict=True)
     )
-
-
-def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:
-    """Find the coarsest level whose limits have the accuracy that is asked for.
-
-    Args:
-        limits_at: the limits of a pilot's shots on a level of LADDER.
-        numerics: as in `pilot_hits`.
-        quantity: "velocity", or "thickness", which goes with the square of the velocity.
-
-    Returns:
-        The level that keeps the promise. If none does: the coarsest one on which half of the limits are within it; if
-        there is none, FINEST_LIMIT.
-
-    Raises:
-        ValueError: the accuracy says nothing of limits.
-    """
-    asked, usual = numerics.asked, PRESETS["draft"].limit
-    if asked.limit is None or usual is None:
-        raise ValueError("accuracy: needs limit, the error of a limit as a share of the median limit")
-    share, allowed_share = asked.share, (1.0 if quantity == "velocity" else 2.0) * asked.limit
-    first = min(coarsest_level(usual / asked.limit), FINEST_LIMIT)
-
-    def found_at(index: int, error: float, allowed: float, finer: int | None = None) -> LimitErrors:
-        return LimitErrors(at_level(index, numerics), error <= allowed, share, error, quantity, finer)
-
-    known: dict[int, Array] = {}
-
-    def limits(index: int) -> Array:
-        if index not in known:
-            known[index] = limits_at(index)
-        return known[index]
-
-    def judge(index: int, finer: int, margin: float) -> tuple[LimitErrors, float, bool]:
-        change, half, typical = limit_changes(limits(index), limits(finer), share)
-        allowed = allowed_share * typical
-        return (
-            found_at(index, margin * change, allowed, finer),
-            margin * half / max(allowed, 1e-30),
-            margin * half <= allowed,
-        )
-
-    levels = range(first, FINEST_LIMIT + 1)
-    found = _coarsest(judge, levels, FINEST_LIMIT + 1, BEYOND_LIMITS)
-    return found or found_at(first, math.inf, 0.0)
-
-
-Finding = TypeVar("Finding", bound=Found)
-
-
-def _coarsest(
-    judge: Callable[[int, int, float], tuple[Finding, float, bool]],
-    levels: range,
-    finest: int,
-    beyond: int,
-    allowed: Callable[[int, int], bool] = lambda index, finer: True,
-) -> Finding | None:
-    """What is found at the coarsest of some levels that keeps the promise; if none does, at the coarsest one that
-    nearly does, else at the coarsest one whose errors are about the smallest. None if not even the first level fits the
-    memory.
-
-    Args:
-        judge: the finding at a level by comparing with a finer one, with a margin; its errors over what is allowed; and
-            whether it nearly keeps the promise.
-        finest: the last level to compare with.
-        beyond: levels that are tried behind one that nearly keeps the promise.
-        allowed: whether a level, compared with a finer one, is worth its cost.
-    """
-    tried: dict[int, tuple[Finding, float]] = {}
-    enough = None
-    index, last = levels[0], levels[-1]
-    while index <= last:
-        finer = min(index + 2, finest)  # neighbours err alike
-        if not allowed(index, finer):
-            break
-        try:
-            found, excess, nearly = judge(index, finer, MARGIN[finer - index])
-        except MemoryError:  # the plate's period does not fit at that spacing: what was found so far has to do
-            break
-        if found.kept:
-            return found
-        if enough is None and nearly:
-            enough, last = found, min(last, index + beyond)
-        if any(excess > STALLED * before for at, (_, before) in tried.items() if at <= index - 2):
-            last = index
-        tried[index] = found, excess
-        far = excess > FAR and enough is None and index + 2 <= last and allowed(index + 2, min(index + 4, finest))
-        index += 2 if far else 1
-    smallest = min((excess for _, excess in tried.values()), default=math.inf)
-    return enough or next((found for found, excess in tried.values() if excess <= ALIKE * smallest), None)

@@ -18,8 +18,9 @@ from warpimpact.solver.easing import eased, worth_easing
 from warpimpact.solver.findings import Cost, HitErrors
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
-from warpimpact.solver.pilot import Excess, Purse, pilot_hits, pilot_size
+from warpimpact.solver.pilot import Excess, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
+from warpimpact.solver.purse import Purse
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
 

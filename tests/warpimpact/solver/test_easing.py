@@ -11,9 +11,9 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Accuracy, Hits, Impact, Numerics, Record, Scene, Shots, make_shots
 from warpimpact.solver import easing
 from warpimpact.solver.changes import changes
+from warpimpact.solver.climb import MARGIN
 from warpimpact.solver.easing import FEW, PART, ROOM, WIDE, eased
 from warpimpact.solver.findings import HitErrors
-from warpimpact.solver.pilot import MARGIN
 from warpimpact.solver.resolution import LADDER
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
@@ -139,8 +139,8 @@ def test_a_level_that_keeps_it_with_weighed_errors_is_judged_by_them(
         return HitErrors(at, False, 0.9, 9.0, 0.0, status_error=other), 9.0, weighed
 
     monkeypatch.setattr(easing, "judged", judged)
-    found = HitErrors(Numerics(level=4), False, 0.9, 9.0, 0.0)
-    found = HitErrors(Numerics(level=4), False, 0.9, 9.0, 0.0, tried=((found, nothing, nothing),))
+    found = HitErrors(Numerics(level=4), False, 0.9, 9.0, 0.0, status_error=0.02)
+    found = replace(found, tried=((found, nothing, nothing),))
     best = eased(found, lambda at, some: nothing, PILOT, Numerics(), (True,))
     assert (best.kept, str(best.numerics.coarser or "")) == (False, taken)
 

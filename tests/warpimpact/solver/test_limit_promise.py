@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from warpimpact.scene import PRESETS, Numerics
-from warpimpact.solver.pilot import FINEST_LIMIT, LIMITS, MARGIN, limits_pilot_size, pilot_limits
+from warpimpact.solver.climb import MARGIN
+from warpimpact.solver.limit_pilot import FINEST_LIMIT, LIMITS, limits_pilot_size, pilot_limits
 
 DRAFT = Numerics(fidelity="draft")
 SHARE = PRESETS["draft"].limit

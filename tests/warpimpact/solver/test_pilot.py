@@ -28,16 +28,12 @@ from warpimpact.scene import (
     Target,
     make_shots,
 )
-from warpimpact.solver import pilot
-from warpimpact.solver.changes import RISK, SLOW, changes, ended_otherwise, upper_error, upper_place
-from warpimpact.solver.pilot import (
-    MARGIN,
-    HitErrors,
-    Purse,
-    pilot_hits,
-    pilot_size,
-)
+from warpimpact.solver import climb, pilot, purse
+from warpimpact.solver.changes import RISK, SLOW, changes, design_effect, ended_otherwise, upper_error, upper_place
+from warpimpact.solver.climb import MARGIN
+from warpimpact.solver.pilot import HitErrors, pilot_hits, pilot_size
 from warpimpact.solver.pilot_text import errors_text, upper_digits
+from warpimpact.solver.purse import Purse
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
@@ -135,7 +131,7 @@ def test_what_cannot_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_promise_ends_at_its_finest_level(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pilot, "FURTHER", 1)
-    monkeypatch.setattr(pilot, "PATIENCE", 0.0)
+    monkeypatch.setattr(purse, "PATIENCE", 0.0)
     monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
     found = found_for(NOTHING, PILOT[:4])
     assert not found.kept
@@ -256,14 +252,49 @@ def test_the_velocity_within_a_laminate_counts_in_no_error(gap: float, free: boo
 def test_levels_that_a_pilot_tries(excess: list[float], tried: list[int], taken: int) -> None:
     seen = []
 
-    def judge(index: int, finer: int, margin: float) -> tuple[HitErrors, float, bool]:
+    def judge(index: int, finer: int, margin: float) -> climb.Verdict[HitErrors]:
         seen.append(index)
         found = HitErrors(Numerics(level=index), excess[index] <= 1.0, 0.9, 0.0, 0.0)
-        return found, excess[index], False
+        return climb.Verdict(found, excess[index], excess[index], False)
 
-    found = pilot._coarsest(judge, range(5), 9, 1)
+    found = climb.coarsest(judge, range(5), 9, 1)
     assert found is not None
     assert (seen, found.numerics.level) == (tried, taken)
+
+
+@pytest.mark.parametrize(("typical", "tried"), [([3.0, 2.5, 2.0, 0.5], 4), ([3.0, 2.5, 2.2, 0.5], 3)])
+def test_how_errors_fall_is_told_by_shots_that_all_levels_have(typical: list[float], tried: int) -> None:
+    seen = []
+
+    def judge(index: int, finer: int, margin: float) -> climb.Verdict[HitErrors]:
+        seen.append(index)  # the upper estimates are of other numbers of shots
+        excess = [2.0, 2.5, 3.0, 0.9][index]
+        return climb.Verdict(
+            HitErrors(Numerics(level=index), excess <= 1.0, 0.9, 0.0, 0.0), excess, typical[index], False
+        )
+
+    found = climb.coarsest(judge, range(4), 9, 1)
+    assert found is not None
+    assert (len(seen), found.kept) == (tried, tried == 4)
+
+
+@pytest.mark.parametrize(("otherwise", "levels"), [(0, [0, 1, 2]), (4, [0, 1, 2, 3])])
+def test_errors_do_not_stall_where_it_is_the_status_that_gets_better(
+    otherwise: int, levels: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, seen = simulate(STOPPING, PILOT, numerics=Numerics(level=0), device="cpu"), []
+    ends = np.where(np.arange(32) < otherwise, Status.RICOCHETED, one.status)
+
+    def outcomes_at(level: int, some: Shots) -> Outcomes:  # which err by as much at every level
+        seen.append(level)
+        speed = one.layer_residual_velocity + 100.0 * (level % 4 < 2)
+        return one.assign(layer_residual_velocity=speed, status=ends if level == 0 else one.status)
+
+    monkeypatch.setattr(pilot, "SHOTS", 32)
+    monkeypatch.setattr(climb, "FAR", math.inf)
+    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+    pilot_hits(outcomes_at, PILOT, Numerics(), (True, True))
+    assert [level for level in sorted(set(seen)) if level + 2 in seen] == levels
 
 
 @pytest.mark.parametrize(
@@ -288,7 +319,7 @@ def test_a_pilot_looks_at_levels_that_are_worth_their_time(
 
     monkeypatch.setattr(pilot, "SHOTS", 16)
     monkeypatch.setattr(pilot, "FURTHER", 2)
-    monkeypatch.setattr(pilot, "FAR", math.inf)
+    monkeypatch.setattr(climb, "FAR", math.inf)
     monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
     asked = Numerics(accuracy={"residual_velocity": 3.0})
     found = pilot_hits(outcomes_at, PILOT[:16], asked, purse=Purse(price))
@@ -311,10 +342,10 @@ def test_errors_of_a_promise_that_is_not_kept_are_those_to_the_finest_level(
     monkeypatch.setattr(pilot, "FURTHER", 3)
     monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
     monkeypatch.setattr(pilot, "OPEN", (0.0, math.inf) if whole else (2.0, 2.0))
-    price = {2: 3e2, 4: 2e4}  # so that 16 more hits at the fifth level are not worth their time
-    purse = Purse(lambda level: price.get(level, 1.0)) if whole else None
+    price = {2: 30.0, 4: 2e3}  # so that 16 more hits at the fifth level are not worth their time
+    limited = Purse(lambda level: price.get(level, 1.0)) if whole else None
     found = pilot_hits(
-        outcomes_at, PILOT[: 32 if whole else 16], Numerics(accuracy={"residual_velocity": 1.0}), purse=purse
+        outcomes_at, PILOT[: 32 if whole else 16], Numerics(accuracy={"residual_velocity": 1.0}), purse=limited
     )
     assert (found.kept, found.numerics.level) == (False, 0)
     assert found.residual_velocity_error == pytest.approx(MARGIN[2] * 10.0 * to)
@@ -339,6 +370,27 @@ def test_more_hits_tell_the_share_that_ends_otherwise(
     found = pilot_hits(outcomes_at, Shots.joined([PILOT, PILOT]), Numerics(), (True, True))
     assert counts == parts
     assert found.kept == (otherwise == 0)
+
+
+def test_more_hits_of_a_coarser_level_tell_the_share_that_ends_otherwise_at_a_finer_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    one, computed = simulate(STOPPING, PILOT, numerics=Numerics(level=0), device="cpu"), []
+    other = np.where(one.status == Status.ARRESTED, Status.PERFORATED, Status.ARRESTED)
+
+    def outcomes_at(level: int, some: Shots) -> Outcomes:
+        computed.append((level, len(some)))
+        first = (level, 32) not in computed[:-1]  # of which one ends otherwise, but at the finest two levels
+        status = np.where((np.arange(32) == 0) & first & (level < 2), other, one.status)
+        behind = one.layer_residual_velocity + (0.9 if level == 0 else 0.0)
+        return one.assign(layer_residual_velocity=behind, status=status)
+
+    monkeypatch.setattr(pilot, "SHOTS", 32)
+    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+    asked = Numerics(accuracy={"residual_velocity": 1.0, "tilt": 1.0, "depth": "1 mm", "status_share": 0.02})
+    found = pilot_hits(outcomes_at, Shots.joined([PILOT, PILOT]), asked, (True, True))
+    assert computed == [(0, 32), (2, 32), (0, 32), (2, 32), (1, 32), (3, 32)]
+    assert (found.kept, found.numerics.level, found.status_error) == (True, 1, 1.0 / 64.0)
 
 
 @pytest.mark.parametrize("error", [math.inf, math.nan, 1e300])
@@ -369,6 +421,22 @@ def test_more_hits_are_computed_where_the_first_leave_the_level_open(
     asked = Numerics(accuracy={"residual_velocity": 1e3, "tilt": math.degrees(told / share_of_allowed)})
     pilot_hits(outcomes_at, PILOT, asked)
     assert counts == parts
+
+
+def test_a_pilot_doubles_its_hits_until_they_tell_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, counts = simulate(SCENE, PILOT, numerics=Numerics(level=0), device="cpu"), []
+    excess = {16: 1.2, 32: 0.6, 64: 0.6}
+
+    def outcomes_at(at: int, some: Shots) -> Outcomes:
+        counts.append(len(some))
+        return one[: len(some)]
+
+    monkeypatch.setattr(pilot, "SHOTS", 16)
+    monkeypatch.setattr(pilot, "FURTHER", 0)
+    shots = Shots.joined([PILOT, PILOT])
+    found = pilot_hits(outcomes_at, shots, Numerics(), excess_of=lambda coarse, fine, some: excess[len(some)])
+    assert counts == [16, 16, 16, 16]
+    assert found.kept
 
 
 @pytest.mark.parametrize(
@@ -424,10 +492,41 @@ def test_fast_cores_count_as_they_are(limit: Outcomes) -> None:
     np.testing.assert_array_equal(tilt, plain[1])
 
 
-def test_shots_at_one_plate_count_as_one() -> None:
+def test_shots_at_one_plate_count_as_one_where_they_err_alike() -> None:
     errors = np.arange(60.0)
-    assert upper_error(errors, 1, 0.9) == upper_place(60, 0.9) - 1 < 59
-    assert upper_error(errors, 3, 0.9) == 59  # of 20 plates the last one
+    assert upper_error(errors, 0.9) == upper_error(errors, 0.9, np.arange(60)) == upper_place(60, 0.9) - 1 < 58
+    assert upper_error(errors, 0.9, risk=0.5) == 54  # of as many as lie beyond 90 %
+    assert upper_error(errors, 0.9, np.arange(60) // 3) == 59  # of 20 plates the last one
+    assert upper_error(errors, 0.9, np.zeros(60, dtype=int)) == 59  # one plate tells of no other
+    assert upper_error(errors, 0.9, np.arange(60) % 20) < 59  # the largest errors are those of other plates
+
+
+@pytest.mark.parametrize("alike", [0.0, 0.3, 0.7, 1.0])
+@pytest.mark.parametrize(("plates", "at_a_plate"), [(22, 3), (85, 3), (32, 2), (16, 8)])
+def test_an_estimate_is_rarely_below_the_percentile_however_alike_shots_at_a_plate_err(
+    plates: int, at_a_plate: int, alike: float
+) -> None:
+    rng, numbers = np.random.default_rng(8), np.repeat(np.arange(plates), at_a_plate)
+    below = 0
+    for _ in range(1000):
+        own, shared = rng.normal(size=plates * at_a_plate), rng.normal(size=plates)[numbers]
+        below += upper_error(math.sqrt(alike) * shared + math.sqrt(1.0 - alike) * own, 0.9, numbers) < 1.2816
+    enough = 0.9**plates < RISK  # for the largest of errors that are wholly alike
+    assert below < 1000 * (RISK + 0.04 if enough or alike < 1.0 else 0.9**plates + 0.04)
+
+
+def test_design_effect_of_groups_of_several_sizes() -> None:
+    # An analysis of variance, of groups of one size: between them over within, F, gives (m - 1) correlation + 1.
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=(400, 5)) + rng.normal(size=(400, 1))
+    within = values.var(axis=1, ddof=1).mean()
+    between = 5.0 * values.mean(axis=1).var(ddof=1)
+    correlation = (between - within) / (between + 4.0 * within)
+    groups = np.repeat(np.arange(400), 5)
+    doubt = math.sqrt(2.0 * 4.0 / (5.0 * 399.0))
+    assert design_effect(values.ravel(), groups) == pytest.approx(1.0 + 4.0 * correlation + doubt, rel=3e-3)
+    some = rng.random(2000) < 0.7  # as where some shots have no depth
+    assert design_effect(values.ravel()[some], groups[some]) == pytest.approx(1.0 + 2.5 * correlation, rel=0.15)
 
 
 def test_a_failed_computation_has_no_bound(limit: Outcomes) -> None:
