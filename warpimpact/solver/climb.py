@@ -31,8 +31,8 @@ class Verdict(NamedTuple, Generic[Finding]):
 
     Attributes:
         excess: errors over what is allowed: upper estimates.
-        typical: likewise, but of the first shots alone, which all levels have in common, and as likely to be too small
-            as too large. So they tell how errors fall.
+        typical: likewise, but of most of the first shots, which all levels have in common, and as likely to be too
+            small as too large. So they tell how errors fall.
         nearly: whether it nearly keeps the promise.
     """
 

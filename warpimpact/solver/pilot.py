@@ -40,6 +40,8 @@ OPEN = (0.7, 1.5)
 """Upper estimates over what is allowed, between which more shots may choose another level."""
 OPEN_MEASURE = (0.7, 3.0)
 """Likewise of what a measure shifts by: mostly the noise of few shots, of which four times as many leave half."""
+TYPICAL = 0.75
+"""Share of the first shots whose errors tell how those fall from level to level: the largest few fall by chance."""
 FEW = 2
 """Shots that end otherwise, as few as which say little of their share; likewise."""
 FINE = 4
@@ -178,12 +180,12 @@ class _Search:
         return Verdict(found, excess, math.nan, weighed <= 1.0)
 
     def _typical(self, index: int, finer: int, margin: float) -> float:
-        """Errors over what is allowed that are as likely to be too small as too large, of the first shots."""
+        """Errors over what is allowed of most of the first shots, as likely to be too small as too large."""
         found, coarse, fine = self.tried[index]
         if found.status_error > 1.0 - self.numerics.asked.share:
             return math.inf  # the shots that end otherwise are those that err most
-        shots = self.pilot[: len(fine)]
-        return judged(coarse, fine, shots, found.numerics, self.numerics.asked, margin, self.free, risk=0.5)[1]
+        asked = self.numerics.asked.model_copy(update={"share": TYPICAL})
+        return judged(coarse, fine, self.pilot[: len(fine)], found.numerics, asked, margin, self.free, risk=0.5)[1]
 
     def _decided(self, verdict: Verdict[HitErrors], count: int) -> bool:
         """Whether more shots would hardly tell otherwise."""
