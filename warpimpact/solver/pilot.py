@@ -2,8 +2,7 @@
 
 A pilot computes some of the shots on levels of LADDER, coarse to fine. The error of a level is estimated by its change
 to a finer one. The coarsest level whose error is within the promise is taken for all shots. The estimate is an upper
-one: a high order statistic of the pilot's shots, times a margin for the error of the finer level itself. One search
-serves two measures: what becomes of the shots, and their limits.
+one: a high order statistic of the pilot's shots, times a margin for the error of the finer level itself.
 """
 
 from __future__ import annotations
