@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Accuracy, Numerics, Shots
-from warpimpact.solver.changes import RISK, ended_otherwise, fewest, upper_errors
+from warpimpact.solver.changes import ended_otherwise, fewest, upper_errors
 from warpimpact.solver.climb import MARGIN, Verdict, coarsest
 from warpimpact.solver.findings import HitErrors, Tried
 from warpimpact.solver.purse import Computed, Purse
@@ -115,9 +115,10 @@ def pilot_hits(
 
 @dataclass(frozen=True)
 class _Search:
-    """What a pilot asks of a level; the attributes are the arguments of `pilot_hits`.
+    """What a pilot asks of a level; some attributes are arguments of `pilot_hits`.
 
     Attributes:
+        computed: its outcomes so far.
         tried: what was found at every level that was tried.
     """
 
@@ -183,8 +184,9 @@ class _Search:
         found, coarse, fine = self.tried[index]
         if found.status_error > 1.0 - self.numerics.asked.share:
             return math.inf  # the shots that end otherwise are those that err most
-        asked = self.numerics.asked.model_copy(update={"share": TYPICAL})
-        return judged(coarse, fine, self.pilot[: len(fine)], found.numerics, asked, margin, self.free, risk=0.5)[1]
+        accuracy, layered = self.numerics.asked, LAYER_RESIDUAL_VELOCITY in coarse
+        each = (self.pilot.at_a_plate, TYPICAL, None, _relative(accuracy, layered), self.free, 0.5)
+        return _excess(accuracy, margin * upper_errors(coarse, fine, *each), layered)
 
     def _decided(self, verdict: Verdict[HitErrors], count: int) -> bool:
         """Whether more shots would hardly tell otherwise."""
@@ -211,7 +213,6 @@ def judged(
     margin: float,
     free: Sequence[bool],
     between: Outcomes | None = None,
-    risk: float = RISK,
 ) -> tuple[HitErrors, float, float]:
     """What is known of a resolution from some shots: the finding, its errors over what is allowed, and the same with
     errors weighed by the energy of slow cores.
@@ -220,19 +221,16 @@ def judged(
         margin: how many times the change to the fine outcomes the error is at most.
         between: outcomes at a level between, if the margin is that level's. What it has beyond 1 is then the error of
             the fine outcomes, over the change from there.
-        risk: that the errors of the promised share of all shots are larger.
     """
 
     def upper(impact: Array | None, relative: tuple[float, float]) -> Array:
-        told = (shots.at_a_plate, accuracy.share, impact, relative, free, risk)
+        told = (shots.at_a_plate, accuracy.share, impact, relative, free)
         if between is None:
             return margin * upper_errors(coarse, fine, *told)
         return upper_errors(coarse, fine, *told) + (margin - 1.0) * upper_errors(between, fine, *told)
 
     layered = LAYER_RESIDUAL_VELOCITY in coarse
-    relative = (accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt)
-    if not layered:
-        relative = (0.0, 0.0)
+    relative = _relative(accuracy, layered)
     told, counted, weighed = upper(None, (0.0, 0.0)), upper(None, relative), upper(shots.velocity, relative)
     status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
     excess = _excess(accuracy, counted, layered)
@@ -240,6 +238,13 @@ def judged(
     velocity, tilt, depth = (float(error) for error in told)
     found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
     return found, excess, _excess(accuracy, weighed, layered)
+
+
+def _relative(accuracy: Accuracy, layered: bool) -> tuple[float, float]:
+    """The relative parts of what is allowed over the absolute ones; of single plates none."""
+    if not layered:
+        return 0.0, 0.0
+    return accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt
 
 
 def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
