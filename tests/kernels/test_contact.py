@@ -189,14 +189,14 @@ def test_load_sees_half_of_the_step_s_own_exposure(device: str) -> None:
 def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float], device: str) -> None:
     # The trapezoid rule: (M + ½ dt J) Δu = dt F, J = −∂F/∂u. The damping takes the normals and places of the rings, the
     # load those of the parts of curved patches that touch: they differ by a patch.
-    poses, step, count = astride(30), 1e-4, 30
+    poses, step, count = astride(12), 1e-4, 12
     poses["omega"] = poses["omega"] / 10
     speeds = np.concatenate([poses["velocity"], poses["omega"]], axis=1)
     scale = np.array([1.0] * 3 + [1e2] * 3)  # lever arms are some 10 mm
     turn = np.zeros((count, 6, 6))
     turn[:, :3, :3] = turn[:, 3:, 3:] = Rotation.from_quat(poses["attitude"]).as_matrix()
     errors = []
-    for rings, around in ((8, 96), (64, 768)):
+    for rings, around in ((4, 48), (32, 384)):
         surface = surface_of(Surface, CONE, rings, around, device)
 
         def load_at(speeds: Array, surface: Any = surface) -> Loaded:
@@ -218,9 +218,9 @@ def test_damping_tends_to_half_the_derivative_of_the_load(law: dict[str, float],
         errors.append(np.abs(damping + jacobian / 2).max() / np.abs(jacobian).max())
         assert np.abs(jacobian).max(axis=(1, 2)).astype(bool).sum() > count / 3
         np.testing.assert_array_equal(load["damped"], damping.any(axis=(1, 2)))
-    # First order in the patches, and the angle of a patch, 2π/768 = 8e-3, at most.
-    assert errors[1] < errors[0] / 4
-    assert errors[1] < 2 * np.pi / 768
+    # First order in the patches, and at most an eighth of the angle of a patch.
+    assert errors[1] < errors[0] / 6
+    assert errors[1] < 2 * np.pi / 384 / 8
 
 
 @pytest.mark.parametrize("length", [0.3e-3, 0.5e-3, 1.6e-3])

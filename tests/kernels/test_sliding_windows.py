@@ -20,7 +20,7 @@ from warpimpact.solver.windows import Cells
 
 from ..verification.scenes import PAPER_CORE, paper_plate
 
-HITS = 32
+HITS = 16
 PLATE = paper_plate(degradation_interval=None, degradation_distance=0.8e-3)
 SOFT = Plate(thickness=25e-3, resistance=0.4e9, degradation=0.9, degradation_distance=0.8e-3, degradation_depth=4e-3)
 
