@@ -15,6 +15,9 @@ from .progress import Step, show_progress, warn
 if TYPE_CHECKING:
     from warpimpact.identification.identify import FitProgress
 
+PROCESSES = 16
+"""Of a fit at most, each of which takes some 0.4 GB."""
+
 
 def add_identify(commands: Commands) -> None:
     parser = add_command(
@@ -45,6 +48,7 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.text import posterior_text
     from warpimpact.plotting.posterior import save_posterior
     from warpimpact.results import posterior_file
+    from warpimpact.solver.device import cores
 
     fit = read_fit(arguments.fit)
     output = arguments.output or Path(arguments.fit.stem + ".nc")
@@ -59,6 +63,7 @@ def _identify(arguments: argparse.Namespace) -> int:
             resume=arguments.resume,
             overwrite=arguments.overwrite,
             progress=lambda now: show(Step(now.done, now.total, now.resumed, _running(now))),
+            processes=min(cores(), PROCESSES),
         )
     tree = posterior_file.read(output)
     print(posterior_text(tree))

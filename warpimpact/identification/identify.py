@@ -6,12 +6,11 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.identification.evaluate import evaluate
+from warpimpact.identification.crew import Batch, Crew, crew_of
 from warpimpact.identification.fit import Fit, Sampling
 from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
@@ -19,8 +18,6 @@ from warpimpact.identification.posterior import Sampled, to_datatree
 from warpimpact.results import posterior_file
 from warpimpact.runs.describe import made_by
 from warpimpact.runs.store import Store, stored
-from warpimpact.solver.many import side_by_side
-from warpimpact.solver.worker import Worker
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
@@ -31,7 +28,7 @@ GROWTH = 0.1
 """Sets of a later round, as a share of all before it; at least half of the first round."""
 DISCREPANCIES = 8
 """Scales of discrepancy per set of parameters: they need no runs of their own."""
-BATCH = 32
+BATCH = 16
 """Sets per file on the disk."""
 FARTHEST = 5.0
 """Standard deviations, discrepancy included, by which the best set of the prior may miss a number."""
@@ -67,8 +64,12 @@ def identify_to_file(
     resume: bool = False,
     overwrite: bool = False,
     progress: Follow | None = None,
+    processes: int = 1,
 ) -> None:
     """Compute the posterior of a fit into a file; what is computed is on the disk at once, in `output`.parts.
+
+    Args:
+        processes: as in `Crew`.
 
     Raises:
         OutputError: something cannot be written, must not be overwritten or is no part of this fit.
@@ -77,15 +78,30 @@ def identify_to_file(
     """
     made = made_by(device)
     with stored(output, {"fit": fit.text, **made}, "fit", resume=resume, overwrite=overwrite) as store:
-        sampled = sample(fit, device=device, store=store, progress=progress)
+        sampled = sample(fit, device=device, store=store, progress=progress, processes=processes)
         posterior_file.write(to_datatree(fit, sampled, made), output)
 
 
-def sample(fit: Fit, *, device: str = "auto", store: Store | None = None, progress: Follow | None = None) -> Sampled:
-    """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn."""
-    plan, follow = fit.sampling, progress or (lambda now: None)
+def sample(
+    fit: Fit,
+    *,
+    device: str = "auto",
+    store: Store | None = None,
+    progress: Follow | None = None,
+    processes: int = 1,
+) -> Sampled:
+    """Draw sets of parameters in rounds until their effective size is what the fit asks for, or all are drawn.
+
+    Args:
+        processes: as in `Crew`.
+    """
+    with crew_of(fit, device, processes) as crew:
+        return _sampled(fit, _Work(fit, crew, store, progress or (lambda now: None)))
+
+
+def _sampled(fit: Fit, work: _Work) -> Sampled:
+    plan = fit.sampling
     sampler = ImportanceSampler(len(fit.parameters), shared(fit), plan.seed)
-    work = _Work(fit, device, store, follow)
     checked = False
     for count in rounds(plan):
         points = sampler.propose(count)
@@ -119,8 +135,8 @@ def rounds(plan: Sampling) -> list[int]:
 class _Work:
     """Scores sets in batches, and knows what was computed before."""
 
-    def __init__(self, fit: Fit, device: str, store: Store | None, follow: Follow) -> None:
-        self._fit, self._worker, self._store, self._follow = fit, Worker(device), store, follow
+    def __init__(self, fit: Fit, crew: Crew, store: Store | None, follow: Follow) -> None:
+        self._fit, self._crew, self._store, self._follow = fit, crew, store, follow
         self._total = sum(rounds(fit.sampling)) // DISCREPANCIES
         self._batches: list[list[Score]] = []
         self._lock = threading.Lock()
@@ -129,41 +145,49 @@ class _Work:
 
     def round(self, points: Array) -> Array:
         """Score the sets of one round; ln of their likelihood, shape [sets]."""
-        before, size = len(self._batches), BATCH * DISCREPANCIES
+        size, scores = BATCH * DISCREPANCIES, dict[int, list[Score]]()
+        first = len(self._batches)
+        batches = [Batch(first + place // size, points[place : place + size]) for place in range(0, len(points), size)]
 
-        def batch(number: int, own: Worker, _: Any) -> list[Score]:
-            return self._scores_of(points[number * size : (number + 1) * size], before + number, own)
+        def ended(batch: Batch, found: list[Score]) -> None:
+            self._keep(batch, found)
+            scores[batch.seed] = found
+            self._tell_of(batch, found)
 
-        found = side_by_side(batch, -(-len(points) // size), self._worker)
+        for batch in batches:
+            if (known := self._known(batch)) is not None:
+                scores[batch.seed] = known
+                self._tell_of(batch, known, resumed=True)
+        self._crew.score([batch for batch in batches if batch.seed not in scores], ended)
+        found = [scores[batch.seed] for batch in batches]
         self._batches += found
-        return np.concatenate([np.sum([one.log_likelihood for one in scores], axis=0) for scores in found])
+        return np.concatenate([np.sum([one.log_likelihood for one in each], axis=0) for each in found])
 
-    def _scores_of(self, points: Array, batch: int, worker: Worker) -> list[Score]:
-        """Score a batch; by any thread."""
-        stored = None if self._store is None else self._store.load(batch)
-        known = stored is not None and np.array_equal(stored["points"], points)
-        if stored is not None and known:
-            scores = [
-                Score(**{f.name: stored[f"{f.name}_{place}"] for f in fields(Score)})
-                for place in range(len(self._fit.shots))
-            ]
-        else:
-            scores = evaluate(self._fit, points, worker, seed=batch)
-            self._keep(batch, points, scores)
+    def _known(self, batch: Batch) -> list[Score] | None:
+        """The scores of a batch that are on the disk."""
+        stored = None if self._store is None else self._store.load(batch.seed)
+        if stored is None or not np.array_equal(stored["points"], batch.points):
+            return None
+        return [
+            Score(**{f.name: stored[f"{f.name}_{place}"] for f in fields(Score)})
+            for place in range(len(self._fit.shots))
+        ]
+
+    def _tell_of(self, batch: Batch, scores: list[Score], *, resumed: bool = False) -> None:
+        """Tell of a batch that is scored; by any thread."""
         with self._lock:
-            self.done += len(points) // DISCREPANCIES
-            self._resumed += len(points) // DISCREPANCIES if known else 0
+            self.done += len(batch.points) // DISCREPANCIES
+            self._resumed += resumed * len(batch.points) // DISCREPANCIES
             self._misfit = min(self._misfit, float(np.sum([one.misfit for one in scores], axis=0).min()))
             self._say()
-        return scores
 
-    def _keep(self, batch: int, points: Array, scores: list[Score]) -> None:
+    def _keep(self, batch: Batch, scores: list[Score]) -> None:
         """Put a batch on the disk."""
         if self._store is not None:
             arrays = {
                 f"{f.name}_{place}": getattr(one, f.name) for place, one in enumerate(scores) for f in fields(Score)
             }
-            self._store.save(batch, {"points": points, **arrays})
+            self._store.save(batch.seed, {"points": batch.points, **arrays})
 
     def scores(self) -> list[Score]:
         """One score per shot over all sets so far."""

@@ -9,7 +9,7 @@ import pytest
 import xarray
 
 from warpimpact.cli import main
-from warpimpact.identification import identify
+from warpimpact.identification import crew, identify
 from warpimpact.identification.fit import Fit
 from warpimpact.identification.identify import FitProgress, identify_to_file, rounds
 from warpimpact.identification.posterior import Sampled, learnt, parameters_of
@@ -109,7 +109,7 @@ def test_batches_side_by_side_are_those_of_one_thread(
             threads[number] += 1
             return Worker(device, threads=number)
 
-        monkeypatch.setattr(identify, "Worker", worker)
+        monkeypatch.setattr(crew, "Worker", worker)
         return identify.sample(fit, device="cpu")
 
     alone, together = sampled(1), sampled(3)
