@@ -111,12 +111,18 @@ def _generations(design: Design) -> Iterator[tuple[list[Array], Tell]]:
 
 @dataclass
 class _State:
-    """What a search knows."""
+    """What a search knows.
+
+    Attributes:
+        records: designs that are computed; front: those on the front, in that order.
+        refused: designs that break a constraint.
+    """
 
     design: Design
     work: Work
     follow: Follow
     records: dict[bytes, Record] = field(default_factory=dict)
+    front: list[Record] = field(default_factory=list)
     refused: dict[bytes, Checked] = field(default_factory=dict)
     pilots: list[tuple[Array, int, str]] = field(default_factory=list)
     history: list[tuple[int, float]] = field(default_factory=list)
@@ -160,12 +166,13 @@ class _State:
             self._tell(f"{len(going)} designs at {hits} hits", len(new))
             for key, record in zip(going, self._more([new[key] for key in going], before, hits), strict=True):
                 new[key] = record
-            best = [record for record in self._front() if record.hits >= hits]
+            best = [record for record in self.front if record.hits >= hits]
             candidates = [new[key] for key in going]
             keep = undecided(self.design, candidates, [*best, *candidates], hits)
             going, before = [key for key, kept in zip(going, keep, strict=True) if kept], hits
             if not going:
                 break
+        self._admit(list(new.values()))
         self.records |= new
 
     def _more(self, records: Sequence[Record], first: int, stop: int) -> list[Record]:
@@ -214,39 +221,31 @@ class _State:
         ]
         return np.asarray(np.nan_to_num(np.array(shares), nan=-1e6))
 
-    def _valid(self) -> list[Record]:
-        """Designs that keep the bounds, with all the hits that they may have."""
+    def _admit(self, new: Sequence[Record]) -> None:
+        """Those of some designs to the front that keep the bounds, have all the hits that they may have, and are
+        dominated by none."""
         most = self.design.search.most_hits if self.design.keys else self.design.search.hits
-        full = [one for one in self.records.values() if one.hits >= most]
-        return [
-            one
-            for one in full
-            if not excesses(self.design, one).any() and np.isfinite(objectives(self.design, one)).all()
-        ]
-
-    def _front(self) -> list[Record]:
-        valid = self._valid()
-        points = np.array([objectives(self.design, one) for one in valid]).reshape(
-            len(valid), len(self.design.objectives)
-        )
-        return [valid[number] for number in front_of(points)]
+        full = [one for one in new if one.hits >= most and not excesses(self.design, one).any()]
+        may = [*self.front, *(one for one in full if np.isfinite(objectives(self.design, one)).all())]
+        points = np.array([objectives(self.design, one) for one in may]).reshape(len(may), len(self.design.objectives))
+        self.front = [may[number] for number in front_of(points)]
 
     def _measure(self) -> None:
         """Note the hypervolume, in the box of the first generation in which some design keeps the bounds."""
-        every = [objectives(self.design, one) for one in self.records.values() if not excesses(self.design, one).any()]
-        finite = np.array([one for one in every if np.isfinite(one).all()])
-        if self.box is None and len(finite):
-            low, high = finite.min(axis=0), finite.max(axis=0)
-            self.box = high, np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
+        if self.box is None:
+            kept = [one for one in self.records.values() if not excesses(self.design, one).any()]
+            every = [objectives(self.design, one) for one in kept]
+            if finite := [one for one in every if np.isfinite(one).all()]:
+                low, high = np.min(finite, axis=0), np.max(finite, axis=0)
+                self.box = high, np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
         self.history.append((self.done, self._volume()))
         self._tell("", 0)
 
     def _volume(self) -> float:
-        front = self._front()
-        if self.box is None or not front:
+        if self.box is None or not self.front:
             return 0.0
         reference, scale = self.box
-        points = np.array([objectives(self.design, one) for one in front])
+        points = np.array([objectives(self.design, one) for one in self.front])
         return hypervolume((points - reference) / scale, np.full(len(scale), MARGIN))
 
     def told(self, points: Sequence[Array]) -> tuple[Array, Array]:
@@ -267,7 +266,7 @@ class _State:
     def _tell(self, what: str, under: int) -> None:
         plan, last = self.design.search, self.history[-1][1] if self.history else math.nan
         total = int(min(plan.designs, self.design.space.size))
-        self.follow(SearchProgress(self.done, total, self.work.resumed, len(self._front()), last, what))
+        self.follow(SearchProgress(self.done, total, self.work.resumed, len(self.front), last, what))
 
     def why_none(self) -> str:
         """Which constraint rules out all designs that were tried."""
@@ -288,7 +287,7 @@ class _State:
 
     def searched(self) -> Searched:
         records = list(self.records.values())
-        on_front = {id(one) for one in self._front()}
+        on_front = {id(one) for one in self.front}
         front = [number for number, one in enumerate(records) if id(one) in on_front]
         front.sort(key=lambda number: tuple(objectives(self.design, records[number])))
         reference, scale = self.box or (np.zeros(0), np.zeros(0))
