@@ -3,8 +3,8 @@
 It uses float32 and fast-math. Hits run in parallel; each thread has its own window of the plate. Rings outside the slab
 are skipped. Terms that do not depend on the ring are computed once per azimuth and step. A list of the patches in
 contact passes data from the first pass to the second. The march allocates no memory. It covers only what the benchmark
-needs: a plate without rim, stress Y, β < 1. Contact sets in over the law's share of the core's speed; the slope of this
-ramp enters the step by the trapezoid rule.
+needs: a plate without rim that weakens through its thickness, stress Y, β < 1. Contact sets in over the law's share of
+the core's speed; the slope of this ramp enters the step by the trapezoid rule.
 """
 
 from __future__ import annotations
@@ -61,6 +61,7 @@ class Peer:
 
     def __init__(self, core: Core, plate: Plate, interaction: Interaction, setting: Setting) -> None:
         assert setting.around <= LANES
+        assert plate.degradation_depth >= plate.thickness, "the peer weakens a plate through its thickness"
         self.core, self.plate, self.setting = core, plate, setting
         self.rings = rings_of(core, setting.axial, setting.around).astype(f4)
         azimuth = (np.arange(setting.around) + 0.5) * (2.0 * np.pi / setting.around)

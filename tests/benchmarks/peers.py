@@ -7,7 +7,8 @@ Costs are processor time of one core per hit. All contenders of a scene run in t
 round counts, so the ratios mean something on a busy machine, too. Errors are those of 90 % of the hits against the
 converged answer of the law with its onset. The peer's cost at an accuracy is interpolated between its settings.
 
-The exit code is 1 if standard is not as accurate as it states, or if the two programs of the literal scheme disagree.
+The exit code is 1 if standard is not as accurate as it states, if the finest setting of the Numba peer has more than
+half of these errors, so that it solves another law, or if the two programs of the literal scheme disagree.
 """
 
 from __future__ import annotations
@@ -92,6 +93,11 @@ class Bout(NamedTuple):
     uncertainty: Errors
     floor: dict[str, Any]
 
+    @property
+    def finest_peer(self) -> Contender:
+        """The Numba peer at its finest setting, which comes as near to the answer as finer levels do."""
+        return [one for one in self.contenders if one.program == "Numba"][-1]
+
     def ours(self, level: int) -> Contender:
         """warpimpact at a level of LADDER."""
         return next(one for one in self.contenders if one.setting == _name(level))
@@ -106,7 +112,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     bouts = [fight(name, file, hits, peak) for name, file in SCENES.items()]
     for bout in bouts:
         print(table(bout))
-    apart = literal_difference(Campaign.from_toml(_path("slotted plate")))
+    apart = literal_difference(_campaign(SCENES["slotted plate"]))
     print(f"literal scheme, warpimpact against NumPy: {apart[0]:.2g} m/s and {apart[1]:.2g}° apart (90 %)")
     values = {
         "machine": machine() | {"numba": numba.__version__, "numpy": np.__version__},
@@ -117,6 +123,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     }
     store("peers", values)
     wrong = [bout.name for bout in bouts if excess(bout.ours(STANDARD).error, STATED) > SLACK]
+    wrong += [f"Numba on {bout.name}" for bout in bouts if excess(bout.finest_peer.error, STATED) > 0.5]
     if any(np.array(apart) > SAME):
         wrong.append("the literal scheme")
     if wrong:
@@ -126,7 +133,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def fight(name: str, file: str, hits: int, peak: float) -> Bout:
     """All contenders on one scene: errors, costs, and warpimpact's distance from the floor."""
-    campaign = Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml")
+    campaign = _campaign(file)
     shots = shots_of(campaign, hits)
     coarse, truth = (_converged(campaign, shots, level) for level in FINE)
     contenders = [*_warpimpact(campaign), *_numba(campaign)]
@@ -144,8 +151,12 @@ def fight(name: str, file: str, hits: int, peak: float) -> Bout:
     return bout._replace(floor=asdict(work) | {"above_floor": above})
 
 
-def _path(name: str) -> Any:
-    return CHECKOUT / "campaigns" / f"{SCENES[name]}.toml"
+def _campaign(file: str) -> Campaign:
+    """A campaign whose plate weakens through its thickness, as the peers have no depth of weakening."""
+    campaign = Campaign.from_toml(CHECKOUT / "campaigns" / f"{file}.toml")
+    plate = campaign.plate
+    through = max(plate.degradation_depth, plate.thickness)
+    return campaign.model_copy(update={"plate": plate.model_copy(update={"degradation_depth": through})})
 
 
 def _scene(campaign: Campaign) -> Scene:

@@ -49,6 +49,13 @@ def test_rows_follow_from_the_results(found: Results) -> None:
         assert f"| {name} | {one['ratio']:.1f}; level {one['level']}{coarser}," in text
 
 
+def test_the_peer_solves_the_same_law(found: Results) -> None:
+    for scene, bout in found["peers"]["scenes"].items():
+        *_, finest = (one for one in bout["contenders"] if one["program"] == "Numba")
+        assert finest["residual_velocity_error"] < 0.5, scene
+        assert finest["tilt_error"] < 0.5, scene
+
+
 def test_results_that_change_change_the_table(found: Results) -> None:
     found["roads"]["roads"]["slotted plate"]["ratio"] = 123.456
     assert any(row.figure.startswith("123.5; level") for row in page.rows(found))
