@@ -25,10 +25,11 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.results import attributes as attr
 from warpimpact.results import variables as v
 from warpimpact.results.dataset import study_dataset
-from warpimpact.scene import Hits, Numerics, Shots, make_shots
+from warpimpact.scene import Hits, Numerics, Scene, Shots, make_shots
 from warpimpact.solver.device import find_device
 from warpimpact.solver.marching import Progress
 from warpimpact.solver.materials import weakens
+from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import Level, Resolution, resolve
 from warpimpact.solver.simulate import simulate
 
@@ -130,7 +131,7 @@ def study(
             "got a burst, but a study measures hits on fresh plates: leave out the table [burst]; the first hit of a "
             "burst has the errors of such a hit"
         )
-    settings = default_settings(campaign) if settings is None else settings
+    settings = default_settings(campaign, hits) if settings is None else settings
     bench = _Bench(campaign, hits, device, progress or (lambda done, total: None))
     pairs = [(spelt_out(_doubled(level), campaign), spelt_out(level, campaign)) for level in levels]
     bench.expect([*settings.values(), *(numerics for pair in pairs for numerics in pair)])
@@ -165,14 +166,29 @@ def study(
     )
 
 
-def default_settings(campaign: Campaign) -> dict[str, Numerics]:
-    """Levels of the ladder by their numbers; the sweep and the literal scheme, which takes one plate, by their
-    settings."""
+def default_settings(campaign: Campaign, hits: int = 512) -> dict[str, Numerics]:
+    """Levels of the ladder by their numbers; the sweep and, where it knows all of the scene, the literal scheme, by
+    their settings."""
     levels = {f"level {level}": Numerics(level=level) for level in LADDER_LEVELS}
     sweep = [spelt_out(setting, campaign) for setting in SWEEP]
     nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
     swept = levels | {label(campaign, numerics): numerics for numerics in sweep}
-    return swept if campaign.layer else swept | nodal
+    scene, shots = _compared(campaign, hits)
+    try:
+        for numerics in nodal.values():
+            prepare(scene, shots, numerics)
+    except ValueError:  # layers, a depth of weakening, a distance
+        return swept
+    return swept | nodal
+
+
+def _compared(campaign: Campaign, hits: int) -> tuple[Scene, Shots]:
+    """The scene with what every scheme computes, and shots spread over the campaign's cell."""
+    plain = campaign.scene.record.model_copy(update={"bending": False})  # the literal scheme computes no bending
+    core = campaign.core if campaign.core.strength is None else campaign.core.model_copy(update={"strength": None})
+    spread = Hits(count=hits, seed=campaign.hits.seed, replicates=1)
+    shots = make_shots(campaign.impact, spread, campaign.plate, campaign.scatter)
+    return campaign.scene.model_copy(update={"core": core, "record": plain}), shots
 
 
 def spelt_out(level: Level, campaign: Campaign) -> Numerics:
@@ -241,12 +257,8 @@ class _Bench:
 
     def __init__(self, campaign: Campaign, hits: int, device: str, progress: Progress) -> None:
         self.campaign, self.device = campaign, find_device(device)
-        plain = campaign.scene.record.model_copy(update={"bending": False})  # the literal scheme computes no bending
-        core = campaign.core if campaign.core.strength is None else campaign.core.model_copy(update={"strength": None})
-        self.scene = campaign.scene.model_copy(update={"core": core, "record": plain})
+        self.scene, self.shots = _compared(campaign, hits)
         self.progress, self.work, self.total = progress, 0.0, 0.0
-        spread = Hits(count=hits, seed=campaign.hits.seed, replicates=1)
-        self.shots = make_shots(campaign.impact, spread, campaign.plate, campaign.scatter)
 
     def expect(self, runs: Sequence[Numerics]) -> None:
         """Announce all runs to come, for the progress."""

@@ -5,6 +5,7 @@ import io
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -145,9 +146,19 @@ def test_default_settings_hold_levels_sweep_and_literal_scheme(campaign: Campaig
     assert label(campaign, settings["8×12, ℓ/0.7, 3.86 µs"]) == "8×12, ℓ/0.7, 3.86 µs"
 
 
-def test_a_target_of_layers_is_studied_without_the_literal_scheme(campaign: Campaign) -> None:
-    behind = campaign.model_copy(update={"layer": ({"thickness": "2 mm", "resistance": "1 GPa", "gap": "50 mm"},)})
-    settings = default_settings(behind)
+@pytest.mark.parametrize(
+    ("table", "changed"),
+    [
+        ("layer", ({"thickness": "2 mm", "resistance": "1 GPa", "gap": "50 mm"},)),
+        ("plate", {"thickness": 6e-3}),  # more than its depth of weakening
+        ("plate", {"degradation_interval": None, "degradation_distance": 0.8e-3}),
+    ],
+)
+def test_what_the_literal_scheme_does_not_know_is_studied_without_it(
+    campaign: Campaign, table: str, changed: Any
+) -> None:
+    part = campaign.plate.model_copy(update=changed) if table == "plate" else changed
+    settings = default_settings(campaign.model_copy(update={table: part}))
     assert {one.scheme for one in settings.values()} == {"consistent"}
     assert len(settings) == sum(one.scheme == "consistent" for one in default_settings(campaign).values())
 
