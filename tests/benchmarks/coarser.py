@@ -56,8 +56,8 @@ def measured(scene: Scene, shots: Shots, resolutions: Sequence[Numerics], truth:
     return [
         {
             "resolution": f"level {numerics.level}" + (f" ({numerics.coarser})" if numerics.coarser else ""),
-            "found": errors(found, truth),
-            "counted": counted(NAME, found, truth),
+            "found": errors(found, truth, scene.free_behind),
+            "counted": counted(NAME, found, truth, scene.free_behind),
             "layered": LAYER_RESIDUAL_VELOCITY in found,
             "seconds": min(times),
         }
@@ -108,7 +108,7 @@ def on_a_scene(case: Case, layered: bool) -> tuple[dict[str, Any], dict[str, Any
         row["told"] = [one.residual_velocity_error, math.degrees(one.tilt_error), 1e3 * one.depth_error]
         row["told"].append(one.status_error)
         row |= {"kept": one.kept, "pilot": seconds, "whole": seconds + RUN * row["seconds"]}
-        row |= {"uncertain": errors(before, truth), "room": one.numerics.coarser is not None}
+        row |= {"uncertain": errors(before, truth, case.scene.free_behind), "room": one.numerics.coarser is not None}
         row["false"] = broken({NAME: row, "uncertain": row["uncertain"]}, NAME)
     return plain, eased
 

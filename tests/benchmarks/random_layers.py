@@ -115,31 +115,34 @@ def computed(case: Layered, shots: Shots, numerics: Numerics) -> Outcomes:
     return simulate(case.scene, shots, numerics=numerics, device="cpu", threads=1)
 
 
-def errors(found: Outcomes, truth: Outcomes, relative: tuple[float, float] = (0.0, 0.0)) -> list[float]:
+def errors(
+    found: Outcomes, truth: Outcomes, free: tuple[bool, ...], relative: tuple[float, float] = (0.0, 0.0)
+) -> list[float]:
     """90th percentiles of the errors: of velocity [m/s], tilt [degree] and depth [mm], NaN of what no hit has; and the
-    share of the hits that end otherwise."""
-    each = zip(changes(found, truth, None, relative), (1.0, math.degrees(1.0), 1e3), strict=True)
+    share of the hits that end otherwise. A residual velocity counts behind those layers that the promise counts."""
+    each = zip(changes(found, truth, None, relative, free), (1.0, math.degrees(1.0), 1e3), strict=True)
     known = [(factor, error[~np.isnan(error)]) for error, factor in each]
     status = float(ended_otherwise(found, truth).mean()) if LAYER_RESIDUAL_VELOCITY in found else 0.0
     return [*(factor * p90(error) if len(error) else math.nan for factor, error in known), status]
 
 
-def counted(name: str, found: Outcomes, truth: Outcomes) -> list[float]:
+def counted(name: str, found: Outcomes, truth: Outcomes, free: tuple[bool, ...]) -> list[float]:
     """Errors of which those of velocity and tilt behind layers are less their relative part."""
     asked = PRESETS[name]
     layered = LAYER_RESIDUAL_VELOCITY in found
     shares = asked.residual_velocity_share / asked.residual_velocity, asked.tilt_share / asked.tilt
-    return errors(found, truth, shares if layered else (0.0, 0.0))
+    return errors(found, truth, free, shares if layered else (0.0, 0.0))
 
 
 def measured(case: Layered, hits: int) -> dict[str, Any]:
     """What the promises come to on a scene."""
     shots = case.shots(hits)
     truth, before = (computed(case, shots, Numerics(level=level)) for level in (ANSWER, ANSWER - 1))
+    free = case.scene.free_behind
     row: dict[str, Any] = {
         "scene": case.name,
         "statuses": np.bincount(truth.status, minlength=4)[:4].tolist(),
-        "uncertain": errors(before, truth),
+        "uncertain": errors(before, truth, free),
     }
     for name in NAMES:
         begin = time.process_time()
@@ -154,8 +157,8 @@ def measured(case: Layered, hits: int) -> dict[str, Any]:
             "level": promise.numerics.level,
             "kept": promise.kept,
             "told": [velocity, math.degrees(tilt), 1e3 * promise.depth_error, promise.status_error],
-            "found": errors(found, truth),
-            "counted": counted(name, found, truth),
+            "found": errors(found, truth, free),
+            "counted": counted(name, found, truth, free),
         }
     return row
 
