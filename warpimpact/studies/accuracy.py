@@ -173,10 +173,8 @@ def default_settings(campaign: Campaign, hits: int = 512) -> dict[str, Numerics]
     sweep = [spelt_out(setting, campaign) for setting in SWEEP]
     nodal = {f"nodal, {step * 1e6:.3g} µs": Numerics(scheme="nodal", time_step=step) for step in NODAL_STEPS}
     swept = levels | {label(campaign, numerics): numerics for numerics in sweep}
-    scene, shots = _compared(campaign, hits)
     try:
-        for numerics in nodal.values():
-            prepare(scene, shots, numerics)
+        prepare(*_compared(campaign, hits), next(iter(nodal.values())))
     except ValueError:  # layers, a depth of weakening, a distance
         return swept
     return swept | nodal
