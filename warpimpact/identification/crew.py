@@ -38,11 +38,11 @@ class Batch(NamedTuple):
     """Sets of parameters that are scored together.
 
     Attributes:
-        seed: of the places of their hits.
+        number: of the batch, and seed of the places of its hits.
         points: standard normal numbers, shape [sets, parameters].
     """
 
-    seed: int
+    number: int
     points: Array
 
 
@@ -76,7 +76,7 @@ class Crew:
         left = list(batches) if self.pool is None else self._by_processes(self.pool, batches, ended)
 
         def here(number: int, own: Worker, _: Any) -> None:
-            ended(left[number], evaluate(self.fit, left[number].points, own, seed=left[number].seed))
+            ended(left[number], evaluate(self.fit, left[number].points, own, seed=left[number].number))
 
         side_by_side(here, len(left), self.worker)
         if self.pool is None and self.processes > 1 and time.perf_counter() - begin > WORTHWHILE:
@@ -153,5 +153,5 @@ def _end_with_parent() -> None:
 def _scored(batch: Batch) -> list[Score] | None:
     """Scores by this process; None where it cannot."""
     with suppress(Exception):
-        return evaluate(_own["fit"], batch.points, _own["worker"], seed=batch.seed)
+        return evaluate(_own["fit"], batch.points, _own["worker"], seed=batch.number)
     return None

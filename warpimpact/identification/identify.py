@@ -151,21 +151,21 @@ class _Work:
 
         def ended(batch: Batch, found: list[Score]) -> None:
             self._keep(batch, found)
-            scores[batch.seed] = found
+            scores[batch.number] = found
             self._tell_of(batch, found)
 
         for batch in batches:
             if (known := self._known(batch)) is not None:
-                scores[batch.seed] = known
+                scores[batch.number] = known
                 self._tell_of(batch, known, resumed=True)
-        self._crew.score([batch for batch in batches if batch.seed not in scores], ended)
-        found = [scores[batch.seed] for batch in batches]
+        self._crew.score([batch for batch in batches if batch.number not in scores], ended)
+        found = [scores[batch.number] for batch in batches]
         self._batches += found
         return np.concatenate([np.sum([one.log_likelihood for one in each], axis=0) for each in found])
 
     def _known(self, batch: Batch) -> list[Score] | None:
         """The scores of a batch that are on the disk."""
-        stored = None if self._store is None else self._store.load(batch.seed)
+        stored = None if self._store is None else self._store.load(batch.number)
         if stored is None or not np.array_equal(stored["points"], batch.points):
             return None
         return [
@@ -187,7 +187,7 @@ class _Work:
             arrays = {
                 f"{f.name}_{place}": getattr(one, f.name) for place, one in enumerate(scores) for f in fields(Score)
             }
-            self._store.save(batch.seed, {"points": batch.points, **arrays})
+            self._store.save(batch.number, {"points": batch.points, **arrays})
 
     def scores(self) -> list[Score]:
         """One score per shot over all sets so far."""

@@ -16,14 +16,16 @@ from warpimpact import Campaign
 from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
-from warpimpact.optimisation import searcher
+from warpimpact.optimisation import search, searcher
 from warpimpact.optimisation.confirm import fresh_seed
 from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import design_from, read_design
+from warpimpact.optimisation.judged import Record
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
 from warpimpact.optimisation.searcher import Searcher, hypervolume
 from warpimpact.optimisation.space import Space, Variable
 from warpimpact.optimisation.text import front_lines
+from warpimpact.optimisation.work import Work
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
 from warpimpact.runs.shards import folder_of as folder_of_parts
@@ -141,6 +143,20 @@ def test_a_campaign_of_the_front_runs_as_it_is(tmp_path: Path) -> None:
     for path, density in zip(campaigns, found[f.FRESH].values[:, 0], strict=True):
         assert Campaign.from_toml(path).target.areal_density == pytest.approx(density, rel=1e-9)
     assert any("shrinkage" in line for line in front_lines(found))
+
+
+def test_the_front_has_designs_that_keep_the_bounds_with_all_their_hits() -> None:
+    bound = '[[bounds]]\nmeasure = "residual_energy_fraction"\nat_most = 0.5\n'
+    plan = design(THICKNESS, WEIGHT_AND_ENERGY, bound, SEARCH)
+
+    def planted(density: float, fraction: float, hits: int = 64) -> Record:
+        return Record(np.zeros(1), {}, density, ("",), np.full((1, len(plan.keys), hits), fraction))
+
+    state = search._State(plan, Work(plan, local_crew("cpu"), None), lambda now: None)
+    light, strong = planted(20.0, 0.4), planted(30.0, 0.2)
+    state._admit([planted(10.0, 0.6), planted(15.0, 0.3, hits=32), planted(12.0, np.nan), planted(25.0, 0.45), light])
+    state._admit([strong, planted(40.0, 0.2)])
+    assert [id(one) for one in state.front] == [id(light), id(strong)]
 
 
 def test_no_design_within_the_bounds_is_an_outcome() -> None:
