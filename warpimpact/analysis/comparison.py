@@ -41,7 +41,7 @@ from warpimpact.analysis.summary import breaks_promise, hits_at_two_levels, samp
 from warpimpact.analysis.survival import draws_note, survival_of, why_not_by_draws
 from warpimpact.results import attributes as attr
 from warpimpact.results.measures import dealing
-from warpimpact.runs.shards import first_difference
+from warpimpact.runs.parts import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (

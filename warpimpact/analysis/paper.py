@@ -11,7 +11,7 @@ import xarray
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.text import CampaignError
 from warpimpact.results import variables as v
-from warpimpact.runs.shards import first_difference
+from warpimpact.runs.parts import first_difference
 
 
 class Row(NamedTuple):

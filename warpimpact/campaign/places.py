@@ -1,9 +1,12 @@
-"""Dotted places of a campaign, such as "plate.pattern.width" or "layer.0.gap": resolved, filled and read."""
+"""Dotted places of a campaign, such as "plate.pattern.width" or "layer.0.gap": resolved, filled and read; the files
+that its tables name."""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from ..scene import Impact, Interaction, Plate
@@ -16,6 +19,7 @@ _TABLES: Mapping[str, Any] = {"impact": Impact, "plate": Plate, "interaction": I
 _WHOLE = ("core", "plate", "plate.pattern", "interaction")
 _WHOLE_OF_A_LAYER = re.compile(r"layer\.\d+(\.pattern)?")
 """Tables that may be given as a whole."""
+_NAMES_A_FILE = ("file", "posterior", "catalogue")
 
 
 def is_table(place: str) -> bool:
@@ -67,6 +71,29 @@ def put(data: dict[str, Any], key: str, value: Any, name: str) -> None:
 def _parts(key: str) -> list[str | int]:
     """The parts of a dotted place; a number is that of an entry of a list."""
     return [int(part) if part.isdecimal() else part for part in key.split(".")]
+
+
+def files_in(tables: Any, key: str = "") -> Iterator[str]:
+    """Names of the files that the tables of a campaign, a design file or a fit file refer to."""
+    if isinstance(tables, Mapping):
+        for name, value in tables.items():
+            yield from files_in(value, name)
+    elif isinstance(tables, list):
+        for value in tables:
+            yield from files_in(value)
+    elif key in _NAMES_A_FILE and isinstance(tables, str):
+        yield tables
+
+
+def relocated(tables: Any, before: Path, now: Path, key: str = "") -> Any:
+    """Tables whose file names count from the folder `now` instead of `before`."""
+    if isinstance(tables, Mapping):
+        return {name: relocated(value, before, now, name) for name, value in tables.items()}
+    if isinstance(tables, list):
+        return [relocated(value, before, now) for value in tables]
+    if key in _NAMES_A_FILE and isinstance(tables, str) and not Path(tables).is_absolute():
+        return os.path.relpath(before / tables, now)
+    return tables
 
 
 def type_at(key: str, campaign: Campaign) -> Any:

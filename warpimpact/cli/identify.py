@@ -9,7 +9,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_command, add_device, add_output, add_overwrite
-from .paths import check_place
+from .paths import check_picture, check_place, check_suffix, replaces
 from .progress import Step, show_progress, warn
 
 if TYPE_CHECKING:
@@ -46,13 +46,17 @@ def _identify(arguments: argparse.Namespace) -> int:
     from warpimpact.identification.identify import identify_to_file
     from warpimpact.identification.reading import read_fit
     from warpimpact.identification.text import posterior_text
-    from warpimpact.plotting.posterior import save_posterior
+    from warpimpact.plotting.posterior import FIGURES
     from warpimpact.results import posterior_file
     from warpimpact.solver.device import cores
 
     fit = read_fit(arguments.fit)
     output = arguments.output or Path(arguments.fit.stem + ".nc")
     check_place(output)
+    check_suffix(output, "a posterior", ".nc")
+    pictures = {output.with_name(f"{output.stem}_{name}.png"): draw for name, draw in FIGURES.items()}
+    for picture in pictures:
+        check_picture(picture, overwrite=replaces(arguments, output))
     for sentence in fit.warnings:
         warn(sentence)
     with memory_told(arguments.fit), terminated_as_interrupted(), show_progress("set") as show:
@@ -68,7 +72,8 @@ def _identify(arguments: argparse.Namespace) -> int:
     tree = posterior_file.read(output)
     print(posterior_text(tree))
     print(f"written to {output}")
-    for picture in save_posterior(tree, output.parent, output.stem):
+    for picture, draw in pictures.items():
+        draw(tree).savefig(picture, dpi=150)
         print(picture)
     return 0
 

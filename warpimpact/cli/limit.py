@@ -7,7 +7,7 @@ from typing import Any
 from warpimpact.results import attributes as attr
 
 from .options import Commands, add_campaign, add_command, add_output, at_least, read_option
-from .paths import check_picture, check_place
+from .paths import check_picture, check_place, replaces
 from .progress import warn
 from .run import add_run_options, failure_code, run_shown
 
@@ -58,7 +58,7 @@ def _limit(arguments: argparse.Namespace) -> int:
     output = arguments.output or Path(arguments.campaign.stem + "_limit.nc")
     picture = output.with_suffix(".png")
     check_place(output)
-    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
+    check_picture(picture, overwrite=replaces(arguments, output))
     computation = LimitMap.of(campaign, arguments.quantity, _tolerance(arguments), arguments.layer)
     if sentence := warning_of(campaign, arguments.quantity):
         warn(sentence)

@@ -10,7 +10,7 @@ from warpimpact.results.interrupts import terminated_as_interrupted
 
 from .mistakes import memory_told
 from .options import Commands, add_command, add_computing, add_output, add_overwrite
-from .paths import check_picture, check_place, check_suffix
+from .paths import check_picture, check_place, check_suffix, replaces
 from .progress import Step, show_progress
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def _optimise(arguments: argparse.Namespace) -> int:
     check_suffix(output, "a search", ".nc")
     check_place(output)
     picture = output.with_suffix(".png")
-    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
+    check_picture(picture, overwrite=replaces(arguments, output))
     cluster = arguments.scheduler is not None or arguments.workers is not None
     where = {"address": arguments.scheduler, "workers": arguments.workers, "device": arguments.device}
     own = cluster_crew(**where) if cluster else nullcontext(local_crew(arguments.device))

@@ -1,6 +1,7 @@
 """Checks of paths: results get different names, and an output that cannot be written is refused before the computing
 starts."""
 
+import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +15,14 @@ def named(paths: Sequence[Path]) -> dict[str, Path]:
         raise ResultError(f"{repeated[0]}: got this result {len(repeated)} times, but each result counts once")
     stems = [path.stem for path in paths]
     return dict(zip(stems if len(set(stems)) == len(stems) else map(str, paths), paths, strict=True))
+
+
+def replaces(arguments: argparse.Namespace, output: Path) -> bool:
+    """Whether files beside a result are the command's to replace: with --overwrite, and with --resume where the result
+    is begun or complete."""
+    from warpimpact.runs.parts import is_begun
+
+    return arguments.overwrite or (arguments.resume and is_begun(output))
 
 
 def check_output(path: Path, *, overwrite: bool) -> None:

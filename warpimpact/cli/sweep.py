@@ -7,7 +7,7 @@ from typing import Any
 
 from .mistakes import memory_told
 from .options import Commands, add_campaign, add_command, add_count, add_device, add_output, add_overwrite
-from .paths import check_picture, check_place, check_suffix
+from .paths import check_picture, check_place, check_suffix, replaces
 from .progress import show_run, warn
 
 
@@ -40,7 +40,7 @@ def _sweep(arguments: argparse.Namespace) -> None:
     picture = output.with_suffix(".png")
     check_place(output)
     check_suffix(output, "a sweep", ".nc")
-    check_picture(picture, overwrite=arguments.overwrite or arguments.resume)
+    check_picture(picture, overwrite=replaces(arguments, output))
 
     with memory_told(arguments.campaign), show_run() as follow:
 

@@ -15,9 +15,10 @@ from warpimpact.identification.fit import Fit, Sampling
 from warpimpact.identification.likelihood import Score
 from warpimpact.identification.parameters import FitError
 from warpimpact.identification.posterior import Sampled, to_datatree
+from warpimpact.results import attributes as attr
 from warpimpact.results import posterior_file
 from warpimpact.runs.describe import made_by
-from warpimpact.runs.store import Store, stored
+from warpimpact.runs.store import Store, content_of, stored
 from warpimpact.statistics.importance import LARGEST_K, ImportanceSampler
 
 Array = NDArray[np.float64]
@@ -77,9 +78,13 @@ def identify_to_file(
         Interrupted: by the keyboard; what is saved can be resumed.
     """
     made = made_by(device)
-    with stored(output, {"fit": fit.text, **made}, "fit", resume=resume, overwrite=overwrite) as store:
-        sampled = sample(fit, device=device, store=store, progress=progress, processes=processes)
-        posterior_file.write(to_datatree(fit, sampled, made), output)
+    content = content_of(fit.text, "fit", fit.folder, made)
+    with stored(output, content, "fit", resume=resume, overwrite=overwrite) as store:
+        if store is not None:
+            sampled = sample(fit, device=device, store=store, progress=progress, processes=processes)
+            tree = to_datatree(fit, sampled, made)
+            tree.attrs[attr.FINGERPRINT] = store.parts.fingerprint
+            posterior_file.write(tree, output)
 
 
 def sample(

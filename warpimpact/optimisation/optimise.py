@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 from warpimpact.optimisation.confirm import check_references, confirm
 from warpimpact.optimisation.crew import Crew, local_crew
 from warpimpact.optimisation.design import Design, read_design
-from warpimpact.optimisation.outcome import to_dataset, write_campaigns
+from warpimpact.optimisation.outcome import check_campaigns, to_dataset, write_campaigns
 from warpimpact.optimisation.search import Follow, SearchProgress, search
 from warpimpact.optimisation.searcher import check_installed
 from warpimpact.optimisation.work import Work
+from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
-from warpimpact.runs.store import Store, stored
+from warpimpact.runs.parts import is_begun
+from warpimpact.runs.store import Store, content_of, stored
 
 if TYPE_CHECKING:
     import xarray
@@ -35,7 +37,7 @@ def optimise(design: Design | str | Path, *, device: str = "auto", progress: Fol
         DeviceError: the device is absent.
     """
     one = design if isinstance(design, Design) else read_design(design)
-    return _found(one, local_crew(device), None, progress or (lambda now: None))[0]
+    return _found(one, local_crew(device), None, progress or (lambda now: None))
 
 
 def optimise_to_file(
@@ -53,6 +55,8 @@ def optimise_to_file(
 
     Args:
         crew: who computes, in place of `device`.
+        resume: continue what is in `output`.parts; of a search that is complete, write the campaigns that are missing.
+        overwrite: replace an existing result with its campaigns, and begin anew in place of an unfinished search.
 
     Returns:
         The campaign files.
@@ -62,12 +66,14 @@ def optimise_to_file(
         CampaignError: no design keeps the constraints.
         Interrupted: by the keyboard; what is saved can be resumed.
     """
-    crew = crew or local_crew(device)
-    content = {"design": design.text, **crew.made_by}
+    crew, folder = crew or local_crew(device), folder_of(output)
+    content = content_of(design.text, design.name, design.folder, crew.made_by)
+    check_campaigns(folder, overwrite=overwrite or (resume and is_begun(output)))
     with stored(output, content, "search", resume=resume, overwrite=overwrite) as store:
-        dataset, campaigns = _found(design, crew, store, progress or (lambda now: None), folder_of(output))
-        f.write(dataset, output)
-    return campaigns
+        if store is not None:
+            dataset = _found(design, crew, store, progress or (lambda now: None))
+            f.write(dataset.assign_attrs({attr.FINGERPRINT: store.parts.fingerprint}), output)
+    return write_campaigns(design, f.read(output), folder, overwrite=overwrite)
 
 
 def folder_of(output: Path) -> Path:
@@ -75,9 +81,7 @@ def folder_of(output: Path) -> Path:
     return output.with_name(f"{output.stem}_designs")
 
 
-def _found(
-    design: Design, crew: Crew, store: Store | None, follow: Follow, folder: Path | None = None
-) -> tuple[xarray.Dataset, list[Path]]:
+def _found(design: Design, crew: Crew, store: Store | None, follow: Follow) -> xarray.Dataset:
     check_installed()
     check_references(design)
     work = Work(design, crew, store)
@@ -89,9 +93,7 @@ def _found(
 
     found = search(design, work, kept)
     confirmed = confirm(design, work, found, lambda what: follow(_with(last[-1], what)))
-    dataset = to_dataset(design, found, confirmed, crew.made_by)
-    names = [str(name) for name in dataset[f.FILE].values]
-    return dataset, write_campaigns(design, confirmed, names, folder) if folder is not None and names else []
+    return to_dataset(design, found, confirmed, crew.made_by)
 
 
 def _with(now: SearchProgress, what: str) -> SearchProgress:

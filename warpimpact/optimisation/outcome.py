@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.campaign.places import relocated
 from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.confirm import Confirmed
 from warpimpact.optimisation.design import Bound, Design, Objective, Threat
@@ -19,13 +20,16 @@ from warpimpact.optimisation.measures import AREAL_DENSITY, WORST_TENTH
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
-from warpimpact.results.files import aside
+from warpimpact.results.files import OutputError, aside
+from warpimpact.runs.parts import remove
 
 if TYPE_CHECKING:
     import xarray
 
 Array = NDArray[np.float64]
 
+_LONGEST_ENDING = 80
+"""Bytes of a threat's name in the name of a file, which may have 255."""
 LABELS = {
     AREAL_DENSITY: ("areal density", "kg/m²"),
     "residual_energy_fraction": ("residual energy fraction", ""),
@@ -84,11 +88,13 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.GROUP: confirmed.groups,
         f.SURVIVAL: confirmed.survival[..., 0],
         f.SURVIVAL_AT_LEAST: confirmed.survival[..., 1],
-        f.CAMPAIGN: _texts(toml_text(campaign_tables(design, one, 0)) for one in confirmed.records),
+        f.CAMPAIGN: _texts(
+            toml_text(campaign_tables(design, one.tables, one.values, design.threats[0])) for one in confirmed.records
+        ),
         f.FILE: _texts(f"design_{number:0{width}d}.toml" for number in range(len(confirmed.records))),
         f.FRESH_LEVELS: _texts(_levels(one) for one in confirmed.records),
         f.REFERENCE: _texts(one.name for one in design.references),
-        f.REFERENCE_CAMPAIGN: _texts(toml_text(campaign_tables(design, one, 0)) for one in confirmed.references),
+        f.REFERENCE_CAMPAIGN: _texts(_campaign(design, record) for record in confirmed.references),
         f.COMPUTED: found.history[:, 0].astype(np.int64),
         f.VOLUME: found.history[:, 1],
     }
@@ -134,45 +140,97 @@ def _attributes(design: Design, found: Searched, made_by: Mapping[str, str]) -> 
     }
 
 
-def campaign_tables(design: Design, record: Record, threat: int) -> dict[str, Any]:
-    """The tables of the campaign of a design and a threat, which `warpimpact run` takes."""
-    one: Threat = design.threats[threat]
-    tables = json.loads(json.dumps(record.tables, default=str))
-    named = f", {one.name}" if len(design.threats) > 1 else ""
-    told = design.space.text(record.values) if len(record.values) else ""
-    tables["title"] = " ".join(f"{design.title}{named}: {told}"[:200].split()).rstrip(":")
-    if one.core:
-        tables["core"] = dict(one.core)
-    tables["impact"] = tables.get("impact", {}) | one.impact
-    tables.setdefault("hits", {"sampling": "sobol", "count": 4096, "seed": design.search.seed})
-    return dict(tables)
+def _campaign(design: Design, record: Record) -> str:
+    """The campaign of a target and the first threat, as TOML."""
+    return toml_text(campaign_tables(design, record.tables, record.values, design.threats[0]))
 
 
-def write_campaigns(design: Design, confirmed: Confirmed, names: Sequence[str], folder: Path) -> list[Path]:
+def campaign_tables(design: Design, tables: Mapping[str, Any], values: Array, threat: Threat) -> dict[str, Any]:
+    """The tables of the campaign of a target and a threat, which `warpimpact run` takes.
+
+    Args:
+        tables: of the target.
+        values: of the variables; none of a reference.
+    """
+    made = json.loads(json.dumps(tables, default=str))
+    named = f", {threat.name}" if len(design.threats) > 1 else ""
+    told = design.space.text(values) if len(values) else ""
+    made["title"] = " ".join(f"{design.title}{named}: {told}"[:200].split()).rstrip(":")
+    if threat.core:
+        made["core"] = dict(threat.core)
+    made["impact"] = made.get("impact", {}) | threat.impact
+    made.setdefault("hits", {"sampling": "sobol", "count": 4096, "seed": design.search.seed})
+    return dict(made)
+
+
+def check_campaigns(folder: Path, *, overwrite: bool) -> None:
+    """Refuse a folder for campaigns that is somebody's own, before anything is computed.
+
+    Raises:
+        OutputError: something is in the folder, or it is a file.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f"{folder}: is no folder, but the campaigns of the designs need one of this name")
+    if not overwrite and folder.is_dir() and any(folder.iterdir()):
+        raise OutputError(
+            f"{folder}: contains files already, and the campaigns of the designs belong there; name another file or "
+            "give --overwrite"
+        )
+
+
+def write_campaigns(
+    design: Design, dataset: xarray.Dataset, folder: Path, *, overwrite: bool, tell: Tell = warnings.warn
+) -> list[Path]:
     """A campaign file per design of the front, and per threat where there are several.
+
+    Args:
+        dataset: of the search, as results/front.py has it.
+        overwrite: replace campaigns of an earlier search, and remove those of designs that there are no more; otherwise
+            a file that is there and differs is kept.
+        tell: called with a sentence for each file that is kept.
+
+    Returns:
+        The files of the designs.
 
     Raises:
         OutputError: one cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    for record, name in zip(confirmed.records, names, strict=True):
-        for number, threat in enumerate(design.threats):
-            ending = "" if len(design.threats) == 1 else "_" + "".join(c if c.isalnum() else "_" for c in threat.name)
-            path = folder / f"{Path(name).stem}{ending}.toml"
-            tables = _relocated(campaign_tables(design, record, number), design.folder, folder)
-            with aside(path) as file:
-                file.write_text(toml_text(tables), encoding="utf-8")
-            written.append(path)
-    return written
+    numbers, names = dataset[f.NUMBER].values, dataset[f.FILE].values
+    texts = {}
+    for number, name in zip(numbers, names, strict=True):
+        values = dataset[f.VALUE].values[int(number)]
+        target = design.tables(values)
+        for threat, ending in zip(design.threats, endings(design.threats), strict=True):
+            tables = relocated(campaign_tables(design, target, values, threat), design.folder, folder)
+            texts[folder / f"{Path(str(name)).stem}{ending}.toml"] = toml_text(tables)
+    if overwrite:
+        for stale in set(folder.glob("design_[0-9]*.toml")) - texts.keys():
+            remove(stale)
+    if texts:
+        folder.mkdir(parents=True, exist_ok=True)
+    for path, text in texts.items():
+        _write_campaign(path, text, tell if not overwrite else None)
+    return list(texts)
 
 
-def _relocated(part: Any, before: Path, now: Path, key: str = "") -> Any:
-    """Tables whose file names count from another folder."""
-    if isinstance(part, dict):
-        return {name: _relocated(one, before, now, name) for name, one in part.items()}
-    if isinstance(part, list):
-        return [_relocated(one, before, now) for one in part]
-    if key in ("file", "posterior", "catalogue") and isinstance(part, str) and not Path(part).is_absolute():
-        return os.path.relpath(before / part, now)
-    return part
+Tell = Callable[[str], object]
+
+
+def _write_campaign(path: Path, text: str, tell: Tell | None) -> None:
+    """Write a campaign; one that is there and differs is kept and told where there is `tell`."""
+    if tell is not None and path.exists():
+        if not path.is_file() or path.read_bytes() != text.encode():
+            tell(f"{path}: differs from the design of the front and is kept; --overwrite replaces it")
+        return
+    with aside(path) as file:
+        file.write_text(text, encoding="utf-8")
+
+
+def endings(threats: Sequence[Threat]) -> list[str]:
+    """Endings of the names of campaign files, by threat, each its own; none where there is one threat."""
+    if len(threats) == 1:
+        return [""]
+    words = ["".join(c if c.isalnum() else "_" for c in threat.name) for threat in threats]
+    short = [word.encode()[:_LONGEST_ENDING].decode(errors="ignore") for word in words]
+    alike = len({word.casefold() for word in short}) < len(short)  # some file systems ignore the case
+    return [f"_{number}_{word}" if alike else f"_{word}" for number, word in enumerate(short)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,15 +28,6 @@ _MM = 1e3
 _POINTS = 600
 _CELLS = 5.0
 """Cells of holes that a figure shows at most on either side of the middle; a fit looks for hits in the first."""
-
-
-def save_posterior(tree: xarray.DataTree, folder: Path, stem: str) -> Iterator[Path]:
-    """Write the figures of a posterior as PNG; returns their paths."""
-    figures = {"pairs": pairs_figure, "measured": measured_figure, "hits": hits_figure}
-    for name, draw in figures.items():
-        path = folder / f"{stem}_{name}.png"
-        draw(tree).savefig(path, dpi=150)
-        yield path
 
 
 def _values(tree: xarray.DataTree, group: str, name: str) -> tuple[Array, str]:
@@ -171,3 +162,11 @@ def hits_figure(tree: xarray.DataTree) -> Figure:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
     return figure
+
+
+FIGURES: Mapping[str, Callable[[xarray.DataTree], Figure]] = {
+    "pairs": pairs_figure,
+    "measured": measured_figure,
+    "hits": hits_figure,
+}
+"""All figures of a posterior, by the endings of their files."""

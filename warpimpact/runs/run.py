@@ -24,8 +24,9 @@ from warpimpact.results.table import Table, joined
 from warpimpact.runs.compute import numerics_of
 from warpimpact.runs.foreseen import Cost
 from warpimpact.runs.levels import OF_THE_NUMERICS
+from warpimpact.runs.parts import Interrupted, claimed
 from warpimpact.runs.progress import Follow, RunProgress, followed
-from warpimpact.runs.shards import Shards, ShardsOnDisk, claimed, extent, manifest
+from warpimpact.runs.shards import Shards, ShardsOnDisk, extent, manifest
 from warpimpact.runs.task import Task
 from warpimpact.runs.team import Team, awaited, local_team
 from warpimpact.scene import Shots
@@ -40,10 +41,6 @@ if TYPE_CHECKING:
 
 _REPORT_EVERY = 0.2
 """Seconds between two looks at what is under way."""
-
-
-class Interrupted(KeyboardInterrupt):
-    """A run was interrupted; the message says what is saved."""
 
 
 def run(
@@ -108,21 +105,12 @@ def run_to_file(
                 end = _fill(campaign, parts, members, follow)
             parts.finish(end.shards, lambda first: _attributes(first, end))
         except KeyboardInterrupt:
-            raise Interrupted(f"interrupted; {_kept(parts)}") from None
+            raise Interrupted(f"interrupted; {parts.kept()}") from None
         except OutputError as error:
-            raise OutputError(f"{error}; {_kept(parts)}") from None
+            raise OutputError(f"{error}; {parts.kept()}") from None
         except BaseException:
-            _kept(parts)
+            parts.kept()
             raise
-
-
-def _kept(parts: ShardsOnDisk) -> str:
-    """What a run that breaks off leaves behind; the folder is emptied if that is nothing."""
-    kept = parts.kept()
-    if not kept:
-        parts.discard()
-        return "nothing is saved"
-    return f"{kept} of {parts.count} shards are saved in {parts.folder}; continue with --resume"
 
 
 @dataclass(frozen=True)

@@ -1,16 +1,14 @@
-"""What a fit or a search has computed, on the disk: a folder beside its result, from which a later call goes on.
+"""What a fit or a search has computed, on the disk: batches as parts beside its result (`parts.py`).
 
-RESULT.nc.parts holds a manifest, which says what is computed, and a file per batch with a checksum of the manifest and
-of the batch in it. Batches follow from what is computed and from earlier batches alone, so a resumed computation equals
-an undisturbed one.
+Batches follow from what is computed and from earlier batches alone, so a resumed computation equals an undisturbed one.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import shutil
-from collections.abc import Iterator, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,36 +16,62 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpimpact.campaign.places import files_in
+from warpimpact.campaign.text import parsed
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
-from warpimpact.runs.run import Interrupted
-from warpimpact.runs.shards import claimed, difference, fingerprint, folder_of
+from warpimpact.runs.parts import Interrupted, Parts, claimed, digest
 
-_MANIFEST = "manifest.json"
+
+def content_of(text: str, name: str, folder: Path, made_by: Mapping[str, str]) -> dict[str, Any]:
+    """What decides every bit of a result: the tables of a design or fit file, the contents of the files that it names,
+    versions and kind of device.
+
+    Args:
+        name: what errors call the file.
+        folder: from which file names in it count.
+    """
+    tables = json.loads(json.dumps(parsed(text, name), default=str))
+    named = {file: folder / file for file in files_in(tables)}
+    return {**tables, "files": {file: digest(path) for file, path in named.items() if path.is_file()}, **made_by}
 
 
 @contextmanager
-def stored(output: Path, content: Mapping[str, Any], kind: str, *, resume: bool, overwrite: bool) -> Iterator[Store]:
-    """The `Store` of a computation while it runs. It is empty when the result is written; whatever ends the computation
-    before leaves what can be resumed.
+def stored(
+    output: Path,
+    content: Mapping[str, Any],
+    kind: str,
+    *,
+    resume: bool,
+    overwrite: bool,
+    tell: Callable[[str], object] = warnings.warn,
+) -> Iterator[Store | None]:
+    """The `Store` of a computation while it runs; None if its result is complete already. The store is empty when the
+    result is written; whatever ends the computation before leaves what can be resumed.
+
+    Args:
+        content, kind, tell: as in `Parts`.
 
     Raises:
-        OutputError: something is there that must be neither resumed nor overwritten, or another computation is at work.
+        OutputError: something is there that must be neither resumed nor overwritten, another computation is at work, or
+            the disk is full; the message says what is saved.
         Interrupted: by the keyboard; the message says what is saved.
     """
     with claimed(output):
-        store = Store(output, content, kind)
-        store.begin(resume=resume, overwrite=overwrite)
+        store = Store(output, content, kind, tell)
+        if not store.begin(resume=resume, overwrite=overwrite):
+            yield None
+            return
         try:
             yield store
         except KeyboardInterrupt:
-            kept = f"{store.count} batches are saved in {store.folder}; continue with --resume"
-            raise Interrupted(f"interrupted; {kept if store.count else 'nothing is saved'}") from None
-        except Exception:
-            if not store.count:
-                store.discard()
+            raise Interrupted(f"interrupted; {store.parts.kept()}") from None
+        except OutputError as error:
+            raise OutputError(f"{error}; {store.parts.kept()}") from None
+        except BaseException:
+            store.parts.kept()
             raise
-        store.discard()
+        store.parts.discard()
 
 
 class Store:
@@ -55,67 +79,41 @@ class Store:
 
     Args:
         output: the file of the result.
-        content: what decides every number of it.
-        kind: what messages call the computation.
+        content, kind, tell: as in `Parts`.
     """
 
-    def __init__(self, output: Path, content: Mapping[str, Any], kind: str) -> None:
-        self._output, self._content, self._kind = output, json.loads(json.dumps(content)), kind
-        self.folder = folder_of(output)
-        self._seal = fingerprint(self._content)
+    def __init__(
+        self, output: Path, content: Mapping[str, Any], kind: str, tell: Callable[[str], object] = warnings.warn
+    ) -> None:
+        def counted(count: int) -> str:
+            return f"{count} batch{'' if count == 1 else 'es'}"
 
-    def begin(self, *, resume: bool, overwrite: bool) -> None:
-        """Take the folder, with what is in it if that is to be resumed.
+        self.parts = Parts(output, content, kind, "batch_*.npz", counted, tell)
 
-        Raises:
-            OutputError: something is there that must be neither resumed nor overwritten.
-        """
-        begun = self._begun()
-        if begun is not None and resume:
-            if changed := difference(begun, self._content):
-                raise OutputError(
-                    f"{self.folder}: cannot be resumed: {changed}; put it back, or begin anew with --overwrite"
-                )
-            return
-        if begun is not None and not overwrite:
-            raise OutputError(
-                f"{self.folder}: contains an unfinished {self._kind} ({self.count} batches); continue it with --resume "
-                "or begin anew with --overwrite"
-            )
-        if self._output.exists() and not overwrite:
-            raise OutputError(f"{self._output}: exists already; name another file or give --overwrite")
-        self.discard()
-        with files.aside(self.folder / _MANIFEST) as file:
-            file.write_text(json.dumps(self._content, indent=1), encoding="utf-8")
-
-    def _begun(self) -> Any:
-        """What was begun here, None if nothing was; a damaged manifest is nothing."""
-        manifest = self.folder / _MANIFEST
-        try:
-            return json.loads(manifest.read_bytes()) if manifest.is_file() else None
-        except (OSError, ValueError):
-            return None
-
-    def _batches(self) -> list[Path]:
-        return sorted(path for path in self.folder.glob("batch_*.npz") if not path.is_fifo())
+    def begin(self, *, resume: bool, overwrite: bool) -> bool:
+        """See `Parts.begin`."""
+        return self.parts.begin(lambda path: self._read(path) is not None, resume=resume, overwrite=overwrite)
 
     def _path(self, batch: int) -> Path:
-        return self.folder / f"batch_{batch:06d}.npz"
+        return self.parts.folder / f"batch_{batch:06d}.npz"
 
     def load(self, batch: int) -> dict[str, NDArray[Any]] | None:
-        """A batch that was computed; None if it is not there, is damaged or is of another computation."""
+        """A batch that was computed; None if it is not there, is damaged or is of another place or computation."""
+        return self._read(self._path(batch))
+
+    def _read(self, path: Path) -> dict[str, NDArray[Any]] | None:
         try:
-            if not self._path(batch).is_file():  # a pipe would be waited for
+            if not path.is_file():  # a pipe would be waited for
                 return None
-            with np.load(self._path(batch), allow_pickle=False) as file:
+            with np.load(path, allow_pickle=False) as file:
                 arrays = dict(file)
         except Exception:  # a bit that was flipped leads zipfile into errors of many classes
             return None
-        return arrays if str(arrays.pop("seal", "")) == self._seal_of(arrays) else None
+        return arrays if str(arrays.pop("seal", "")) == self._seal_of(path, arrays) else None
 
-    def _seal_of(self, arrays: Mapping[str, NDArray[Any]]) -> str:
-        """Of a batch of this computation: zipfile leaves out a member whose entry is damaged, without an error."""
-        seal = hashlib.sha256(self._seal.encode())
+    def _seal_of(self, path: Path, arrays: Mapping[str, NDArray[Any]]) -> str:
+        """Seal of a batch: zipfile leaves out a member whose entry is damaged, without an error."""
+        seal = hashlib.sha256(f"{self.parts.fingerprint} {path.name}".encode())
         for name, array in sorted(arrays.items()):
             seal.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
         return seal.hexdigest()
@@ -126,17 +124,6 @@ class Store:
         Raises:
             OutputError: it cannot be written.
         """
-        with files.aside(self._path(batch)) as path, path.open("wb") as file:
-            np.savez(file, allow_pickle=False, **{"seal": np.array(self._seal_of(arrays)), **arrays})
-
-    @property
-    def count(self) -> int:
-        return len(self._batches())
-
-    def discard(self) -> None:
-        """Empty the folder."""
-        for path in (self.folder / _MANIFEST, *self._batches(), *self.folder.glob(".*.part")):
-            if path.is_dir():
-                shutil.rmtree(path, ignore_errors=True)
-            else:
-                path.unlink(missing_ok=True)
+        path = self._path(batch)
+        with files.aside(path) as written, written.open("wb") as file:
+            np.savez(file, allow_pickle=False, **{"seal": np.array(self._seal_of(path, arrays)), **arrays})

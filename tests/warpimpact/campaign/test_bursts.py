@@ -14,8 +14,9 @@ from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally, dealing
 from warpimpact.runs import shards
 from warpimpact.runs.compute import HitMap
+from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, RunProgress, run, run_to_file
+from warpimpact.runs.run import RunProgress, run, run_to_file
 from warpimpact.solver.findings import HitErrors
 from warpimpact.solver.worker import Worker
 

@@ -25,8 +25,8 @@ from warpimpact.cli import main
 from warpimpact.cli.plain import Plain, say
 from warpimpact.results import files
 from warpimpact.results.files import ResultError
+from warpimpact.runs.parts import folder_of
 from warpimpact.runs.run import run_to_file
-from warpimpact.runs.shards import folder_of
 from warpimpact.scene.patterns.mask_files import read_mask
 from warpimpact.scene.units import Length, quantity, quoted
 from warpimpact.solver.grid import tile_of

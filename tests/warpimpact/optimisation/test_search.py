@@ -28,7 +28,8 @@ from warpimpact.optimisation.text import front_lines
 from warpimpact.optimisation.work import Work
 from warpimpact.results import front as f
 from warpimpact.results.files import OutputError, read
-from warpimpact.runs.shards import folder_of as folder_of_parts
+from warpimpact.runs.parts import Interrupted
+from warpimpact.runs.parts import folder_of as folder_of_parts
 
 from ..campaign.test_posterior import posterior
 from .conftest import CORE, HOLES, SEARCH, WEIGHT_AND_ENERGY, design
@@ -143,6 +144,79 @@ def test_a_campaign_of_the_front_runs_as_it_is(tmp_path: Path) -> None:
     for path, density in zip(campaigns, found[f.FRESH].values[:, 0], strict=True):
         assert Campaign.from_toml(path).target.areal_density == pytest.approx(density, rel=1e-9)
     assert any("shrinkage" in line for line in front_lines(found))
+
+
+def test_a_folder_with_files_of_somebody_is_left_alone(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "front.nc")
+    folder.mkdir()
+    own = folder / "design_00.toml"
+    own.write_text("mine")
+    with pytest.raises(OutputError, match="front_designs: contains files already"):
+        optimise_to_file(design(*SEARCHED, SEARCH), tmp_path / "front.nc")
+    with pytest.raises(OutputError, match="front_designs: contains files already"):
+        optimise_to_file(design(*SEARCHED, SEARCH), tmp_path / "front.nc", resume=True)
+    assert own.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_overwriting_replaces_the_designs_of_an_earlier_search(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "front.nc")
+    folder.mkdir()
+    for name in ("design_00.toml", "design_77.toml", "notes.txt"):
+        (folder / name).write_text("of before")
+    campaigns = optimise_to_file(design(*SEARCHED, SEARCH), tmp_path / "front.nc", overwrite=True)
+    assert {path.name for path in folder.iterdir()} == {path.name for path in campaigns} | {"notes.txt"}
+    Campaign.from_toml(folder / "design_00.toml")
+
+
+def test_threats_of_like_names_have_files_of_their_own(tmp_path: Path) -> None:
+    names, velocities = ("a b", "a_b", "\U0001d41a" * 80), (600, 700, 800)
+    threats = [
+        f'[[threats]]\nname = "{name}"\nimpact = {{ velocity = {velocity} }}'
+        for name, velocity in zip(names, velocities, strict=True)
+    ]
+    one_point = design(HOLES, WEIGHT_AND_ENERGY, *threats, SEARCH)
+    campaigns = optimise_to_file(one_point, tmp_path / "front.nc")
+    assert [Campaign.from_toml(path).impact.velocity for path in campaigns] == list(velocities)
+
+
+def test_a_complete_search_is_resumed_to_its_campaigns(tmp_path: Path) -> None:
+    """As after a death between the result and its campaigns; a campaign that was changed is kept."""
+    file, output = tmp_path / "d.toml", tmp_path / "front.nc"
+    file.write_text("\n".join([CORE, *SEARCHED, SEARCH]))
+    command = ["optimise", str(file), "-o", str(output), "-q", "--resume"]
+    assert main(command) == 0
+    changed, *others = sorted(folder_of(output).iterdir())
+    before = [path.read_text() for path in others]
+    for path in (*others, output.with_suffix(".png")):
+        path.unlink()
+    changed.write_text("changed")
+    when = output.stat().st_mtime_ns
+    with pytest.warns(UserWarning, match=f"{changed.name}: differs from the design of the front and is kept"):
+        optimise_to_file(read_design(file), output, resume=True)
+    assert main(command) == 0
+    assert output.with_suffix(".png").exists()
+    assert (output.stat().st_mtime_ns, changed.read_text()) == (when, "changed")
+    assert [path.read_text() for path in others] == before
+    with pytest.raises(OutputError, match=r"exists already|contains files already"):
+        optimise_to_file(read_design(file), output)
+
+
+def test_a_search_with_another_drawing_is_not_resumed(tmp_path: Path) -> None:
+    """The contents of a file that the design names decide its numbers."""
+    np.save(tmp_path / "holes.npy", np.eye(8, dtype=bool))
+    mask = '[plate.pattern]\nshape = "mask"\nfile = "holes.npy"\ncell_size = "1 mm"\n'
+    one = design(THICKNESS, mask, WEIGHT_AND_ENERGY, SEARCH, folder=tmp_path)
+
+    def stop(now: search.SearchProgress) -> None:
+        if now.done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="batches are saved"):
+        optimise_to_file(one, tmp_path / "front.nc", progress=stop)
+    np.save(tmp_path / "holes.npy", ~np.eye(8, dtype=bool))
+    with pytest.raises(OutputError, match=r"cannot be resumed: files\.holes\.npy was"):
+        optimise_to_file(one, tmp_path / "front.nc", resume=True)
 
 
 def test_the_front_has_designs_that_keep_the_bounds_with_all_their_hits() -> None:

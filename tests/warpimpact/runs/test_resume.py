@@ -23,8 +23,8 @@ from warpimpact.cli import main
 from warpimpact.results import files
 from warpimpact.results.files import OutputError
 from warpimpact.runs import shards
-from warpimpact.runs.run import Interrupted, RunProgress, run, run_to_file
-from warpimpact.runs.shards import folder_of
+from warpimpact.runs.parts import Interrupted, difference, folder_of
+from warpimpact.runs.run import RunProgress, run, run_to_file
 
 SameBits = Callable[[Path, Path], None]
 SLOTTED_PLATE = (Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -175,7 +175,7 @@ def test_a_kill_between_any_two_steps_on_the_disk_is_survived(
         with monkeypatch.context() as patched:
             for name in ("replace", "rmdir", "unlink"):
                 patched.setattr(os, name, dying(getattr(os, name)))
-            patched.setattr("warpimpact.runs.run._kept", lambda _: "")  # a killed process cleans nothing up
+            patched.setattr(shards.ShardsOnDisk, "kept", lambda _: "")  # a killed process cleans nothing up
             try:
                 run_to_file(small, output, device="cpu", resume=True)
             except Killed:
@@ -277,9 +277,9 @@ def test_a_file_that_the_campaign_names_counts_by_its_contents(tmp_path: Path) -
         (tmp_path / folder / "campaign.toml").write_text(text, encoding="utf-8")
         (tmp_path / folder / "hits.csv").write_text(f"hit_y,hit_z\n{row}\n", encoding="utf-8")
     a, b, c = (shards.manifest(Campaign.from_toml(tmp_path / f / "campaign.toml"), {"device": "cpu"}) for f in "abc")
-    assert shards.difference(a, b) is None
-    assert shards.difference(a, c).startswith("hits.file was ")
-    assert shards.difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
+    assert difference(a, b) is None
+    assert difference(a, c).startswith("hits.file was ")
+    assert difference(a, a | {"device": "NVIDIA H100"}) == 'device was "cpu" and is "NVIDIA H100"'
 
 
 def _shards(output: Path) -> list[Path]:
@@ -329,7 +329,7 @@ def test_a_shard_that_lies_is_computed_again_and_told(
     told: list[str] = []
     finished(broken_off, tell=told.append)
     assert len(told) == 1
-    assert "damaged, or not of this place or campaign; computed again" in told[0]
+    assert "damaged, or not of this place or run; computed again" in told[0]
     assert not folder_of(broken_off).exists()
 
 
@@ -378,7 +378,7 @@ def test_a_damaged_manifest_is_written_again_and_told(
     with pytest.raises(OutputError, match="contains an unfinished run"):
         run_to_file(campaign, broken_off, device="cpu")
     standings: list[RunProgress] = []
-    with pytest.warns(UserWarning, match=r"manifest.json: is damaged; it is written again"):
+    with pytest.warns(UserWarning, match=r"manifest.json: is missing or damaged; it is written again"):
         finished(broken_off, progress=standings.append)
     assert standings[0].resumed >= 256  # a shard tells itself which campaign it is of
 

@@ -15,8 +15,9 @@ from warpimpact.campaign.campaign import CampaignError
 from warpimpact.kernels.status import Status
 from warpimpact.results import files
 from warpimpact.results.measures import Measure, Tally
+from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, RunProgress, _Watch, run, run_to_file
+from warpimpact.runs.run import RunProgress, _Watch, run, run_to_file
 from warpimpact.runs.shards import Shards
 from warpimpact.statistics.intervals import estimate_of
 

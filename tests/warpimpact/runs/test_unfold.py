@@ -20,8 +20,9 @@ from warpimpact.results.measures import Measure, Tally
 from warpimpact.results.variables import OUTCOME_VARIABLES, SHOT_VARIABLES
 from warpimpact.runs import compute as computing
 from warpimpact.runs import shards
+from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
+from warpimpact.runs.run import RunProgress, run_to_file
 from warpimpact.scene import Scatter, TrianglePattern, make_shots, symmetries_used
 from warpimpact.solver import replay as replaying
 from warpimpact.solver import simulate as simulation

@@ -17,8 +17,9 @@ from warpimpact.results import files
 from warpimpact.results import variables as v
 from warpimpact.results.measures import Measure
 from warpimpact.runs import shards
+from warpimpact.runs.parts import Interrupted
 from warpimpact.runs.replay import replay
-from warpimpact.runs.run import Interrupted, RunProgress, run_to_file
+from warpimpact.runs.run import RunProgress, run_to_file
 from warpimpact.runs.task import Task
 from warpimpact.runs.team import local_team
 from warpimpact.scene import Numerics, make_shots

@@ -1,0 +1,114 @@
+"""Batches on the disk: what is damaged, missing or complete when a computation begins again."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+
+from warpimpact.results.files import OutputError
+from warpimpact.runs.parts import Interrupted, folder_of
+from warpimpact.runs.store import Store, stored
+
+CONTENT = {"fit": {"seed": 1}, "threats": [{"speed": 1}]}
+ARRAYS = {"points": np.arange(3.0)}
+FRESH = {"resume": False, "overwrite": False}
+
+
+def saving(output: Path, **options: Any) -> None:
+    """Save the batches that are not there, and be interrupted."""
+    with stored(output, CONTENT, "fit", **FRESH | options) as store:
+        assert store is not None
+        for batch in range(3):
+            if store.load(batch) is None:
+                store.save(batch, ARRAYS)
+        raise KeyboardInterrupt
+
+
+def opening(output: Path, content: Mapping[str, Any] = CONTENT, **options: Any) -> None:
+    with stored(output, content, "fit", **FRESH | options):
+        pass
+
+
+def begun(output: Path) -> Path:
+    """The manifest of a computation that was interrupted after three batches."""
+    with pytest.raises(Interrupted, match="3 batches are saved"):
+        saving(output)
+    return folder_of(output) / "manifest.json"
+
+
+def missing(manifest: Path) -> None:
+    manifest.unlink()
+
+
+def truncated(manifest: Path) -> None:
+    manifest.write_bytes(manifest.read_bytes()[:40])
+
+
+def nested(manifest: Path) -> None:
+    manifest.write_text("[" * 200_000)
+
+
+DAMAGES = [missing, truncated, nested]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_batches_outlive_their_manifest(
+    damage: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    output = tmp_path / "fit.nc"
+    damage(begun(output))
+    with pytest.raises(OutputError, match=r"contains an unfinished fit \(3 batches\)"):
+        opening(output)
+    told: list[str] = []
+    monkeypatch.setattr(Store, "save", None)  # nothing is computed again
+    with pytest.raises(Interrupted):
+        saving(output, resume=True, tell=told.append)
+    assert len(told) == 1
+    assert "manifest.json: is missing or damaged" in told[0]
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_batches_of_another_computation_do_not_count(damage: Callable[[Path], None], tmp_path: Path) -> None:
+    output = tmp_path / "fit.nc"
+    damage(begun(output))
+    told: list[str] = []
+    other = {"fit": {"seed": 2}}
+    with stored(output, other, "fit", resume=True, overwrite=False, tell=told.append) as store:
+        assert store is not None
+        assert store.load(0) is None
+    assert any("computed again" in sentence for sentence in told)
+
+
+def test_a_batch_in_another_place_does_not_count(tmp_path: Path) -> None:
+    store = Store(tmp_path / "fit.nc", CONTENT, "fit")
+    store.parts.folder.mkdir()
+    store.save(0, ARRAYS)
+    (store.parts.folder / "batch_000000.npz").rename(store.parts.folder / "batch_000001.npz")
+    assert store.load(1) is None
+
+
+def test_another_content_is_refused_with_the_difference(tmp_path: Path) -> None:
+    output = tmp_path / "fit.nc"
+    begun(output)
+    other = CONTENT | {"threats": [{"speed": 2}]}
+    with pytest.raises(OutputError, match=r"cannot be resumed: threats\.0\.speed was 1 and is 2"):
+        opening(output, other, resume=True)
+
+
+@pytest.mark.parametrize("left", [True, False])
+def test_a_complete_result_is_resumed_to_itself(left: bool, tmp_path: Path) -> None:
+    """With or without batches, as a death may come before they are removed."""
+    output = tmp_path / "fit.nc"
+    if left:
+        begun(output)
+    with netCDF4.Dataset(output, "w") as file:
+        file.fingerprint = Store(output, CONTENT, "fit").parts.fingerprint
+    with pytest.raises(OutputError, match="exists already"):
+        opening(output)
+    with stored(output, CONTENT, "fit", resume=True, overwrite=False) as store:
+        assert store is None
+    assert output.exists()
+    assert not folder_of(output).exists()
