@@ -1,10 +1,11 @@
-"""Random campaigns that are signalled, killed, starved of disk, bereft of workers or scheduler and damaged, until each
-result is there: are its bits those of an undisturbed run?
+"""Random computations that are signalled, killed, starved of disk, bereft of workers or scheduler and damaged, until
+each result is there: are its bits those of an undisturbed one?
 
-A round draws a campaign, computes it undisturbed, and then disturbs and resumes it until it is complete. Half of the
-rounds compute on Dask workers: of the run itself, or of a scheduler of their own. A fault is counted if it befell a run
-that was going on, a flipped bit if it is in a shard that a run left behind. The figures add up: a run goes on where the
-file of figures ended. python tests/benchmarks/soak.py --minutes 60
+A round draws a command and its file, computes it undisturbed, and then disturbs and resumes it until it is complete:
+runs, searches and limits by threads, by Dask workers of their own or by those of a scheduler; fits by threads and
+processes; sweeps and reports by threads. A fault is counted if it befell a computation that was going on, a flipped bit
+if it is in a part that was left behind. The figures add up: a call goes on where the file of figures ended.
+python tests/benchmarks/soak.py --minutes 60
 """
 
 import argparse
@@ -12,13 +13,14 @@ import json
 import os
 import platform
 import random
+import re
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -28,28 +30,40 @@ import psutil
 
 TOP = Path(__file__).parents[2]
 FIGURES = Path(__file__).parent / "results" / "soak.json"
-SCENE = (TOP / "campaigns" / "slotted_plate.toml").read_text(encoding="utf-8")
+CAMPAIGNS = TOP / "campaigns"
+SCENE = (CAMPAIGNS / "slotted_plate.toml").read_text(encoding="utf-8")
 COMMAND = """
 import resource, signal, sys
-from warpimpact.runs import shards
-shards.FEWEST = 256
-shards.HELD = 0.1
-signal.signal(signal.SIGINT, signal.default_int_handler)
-if int(sys.argv[1]):
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
 from warpimpact.cli import command
-sys.argv[1:] = sys.argv[2:]
-command()
+from warpimpact.runs import shards
+def small_parts():
+    shards.FEWEST = 256
+    shards.HELD = 0.1
+    if "identify" in sys.argv:
+        from warpimpact.identification import crew, identify
+        crew.WORTHWHILE, identify.BATCH = 0.2, 4
+if __name__ == "__main__":  # not in a process of a fit
+    small_parts()
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if int(sys.argv[1]):
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
+    sys.argv[1:] = sys.argv[2:]
+    command()
 """
-"""The command with small shards and, if the first argument is not 0, with a limit of the size of files."""
+"""The command with small parts and, if the first argument is not 0, with a limit of the size of files."""
 SIGNALS = ("SIGINT", "SIGTERM", "SIGKILL")
 FAULTS = {
     "threads": (*SIGNALS, "disk limit"),
+    "processes": (*SIGNALS, "worker killed", "disk limit"),
     "workers": (*SIGNALS, "worker killed", "worker killed", "disk limit"),
     "scheduler": ("scheduler killed", "scheduler killed", "worker killed", "SIGTERM"),
 }
-"""What befalls the runs of a round, by who computes."""
+"""What befalls the computations of a round, by who computes."""
+TIMES = ("cost", "compute_time", "hits_per_second")
+"""Variables that differ from run to run."""
+MADE = re.compile(r"Report made .* by warpimpact")
+"""The line of a report that has its time."""
 MOST_FAULTS = 8
 """Per round; the runs after that are left alone."""
 LONGEST = 300.0
@@ -66,8 +80,26 @@ ENDS = {
 """Exit codes that a run may end with; before it listens to signals, the system ends it, and it may be done already."""
 
 
+class Kind(NamedTuple):
+    """A command whose result is disturbed.
+
+    Attributes:
+        command: its name.
+        text: draws its file.
+        who: may compute it.
+        ending: of the result.
+        resumes: whether it takes --resume; else it begins again with --overwrite.
+    """
+
+    command: str
+    text: Callable[[random.Random], str]
+    who: tuple[str, ...] = ("threads",)
+    ending: str = ".nc"
+    resumes: bool = True
+
+
 class Run(NamedTuple):
-    """A run under way, and the file that takes what it says."""
+    """A command under way, and the file that takes what it says."""
 
     process: subprocess.Popen[bytes]
     folder: Path
@@ -77,19 +109,60 @@ class Run(NamedTuple):
         return (self.folder / "said.txt").read_text(errors="replace")
 
 
-def campaign(draw: random.Random) -> str:
+def campaign(draw: random.Random, *counts: int) -> str:
     """A campaign of some seconds."""
     return (
         SCENE.replace('"standard"', '"draft"')
-        .replace("count = 4096", f"count = {draw.choice([1000, 2000, 5000])}")
+        .replace("count = 4096", f"count = {draw.choice(counts or (1000, 2000, 5000))}")
         .replace("seed = 1", f"seed = {draw.randrange(10**6)}")
         .replace('"825 m/s"', f'"{draw.randint(300, 900)} m/s"')
     )
 
 
-def start(folder: Path, output: str, *options: str, limit: int = 0) -> Run:
-    """A run of the campaign in a folder."""
-    command = [sys.executable, "-c", COMMAND, str(limit), "run", "campaign.toml", "-o", output, "--device", "cpu"]
+def limits(draw: random.Random) -> str:
+    """A campaign of limits."""
+    return campaign(draw, 512, 1024).replace("degradation = 0.8", "degradation = 1.0")
+
+
+def sweep(draw: random.Random) -> str:
+    return (
+        campaign(draw, 256, 512)
+        + '\n[sweep]\nobliquity = ["0 deg", "10 deg", "20 deg"]\nvelocity = ["600 m/s", "825 m/s"]\n'
+    )
+
+
+def search(draw: random.Random) -> str:
+    """A search of some seconds."""
+    text = (CAMPAIGNS / "designs" / "lightest_plate.toml").read_text(encoding="utf-8").partition("[search]")[0]
+    plan = (
+        f"seed = {draw.randrange(10**6)}\ndesigns = {draw.choice((40, 80))}\npopulation = 20\nhits = 16\nmost_hits = 64"
+    )
+    return f"{text}[search]\n{plan}\nconfirmed = 6\nconfirm_hits = 64\n"
+
+
+def fit(draw: random.Random) -> str:
+    """A fit of some seconds."""
+    text = (TOP / "tests" / "validation" / "calibration.toml").read_text(encoding="utf-8")
+    plan = f"seed = {draw.randrange(10**6)}\nsets = 512\ndraws = 100\neffective = 400\nhits = 64"
+    return text.replace("hits = 64\nseed = 3", plan)
+
+
+KINDS = (
+    *(Kind("run", campaign, ("threads", "workers", "scheduler")),) * 2,
+    Kind("optimise", search, ("threads", "workers", "scheduler")),
+    Kind("identify", fit, ("processes",)),
+    Kind("limit", limits, ("threads", "workers")),
+    Kind("sweep", sweep),
+    Kind("report", campaign, ending=".html", resumes=False),
+)
+
+
+def start(kind: Kind, folder: Path, stem: str, *options: str, limit: int = 0) -> Run:
+    """A command under way in a folder; a report is that of the undisturbed result."""
+    given = "map.nc" if kind.command == "report" else "file.toml"
+    where = [] if kind.command == "report" else ["--device", "cpu"]
+    command = [sys.executable, "program.py", str(limit), kind.command, given, "-o", stem + kind.ending, *where]
+    (folder / "program.py").write_text(COMMAND)
     with (folder / "said.txt").open("wb") as said:
         return Run(subprocess.Popen([*command, *options], cwd=folder, stdout=subprocess.DEVNULL, stderr=said), folder)
 
@@ -140,18 +213,19 @@ def offspring(pid: int) -> list[psutil.Process]:
         return []
 
 
-def shards(folder: Path) -> list[Path]:
-    """What a run has saved so far."""
-    return sorted((folder / "a.nc.parts").glob("hits_*.nc"))
+def parts(folder: Path) -> list[Path]:
+    """What a computation has saved so far, the complete points of a sweep included."""
+    patterns = ("a.nc.parts/hits_*.nc", "a.nc.parts/batch_*.npz", "a_points/*.nc", "a_points/*.parts/hits_*.nc")
+    return sorted(path for pattern in patterns for path in folder.glob(pattern))
 
 
-def strike(run: Run, fault: str, scheduler: subprocess.Popen[bytes] | None, draw: random.Random) -> bool:
+def strike(kind: Kind, run: Run, fault: str, scheduler: subprocess.Popen[bytes] | None, draw: random.Random) -> bool:
     """Let a fault befall a run: early, or after it has saved some more shards; returns whether the run was still on."""
-    before, more, pause = len(shards(run.folder)), draw.randint(1, 6), draw.uniform(0.0, 0.5)
-    if draw.random() < 0.25:
+    before, more, pause = len(parts(run.folder)), draw.randint(1, 6), draw.uniform(0.0, 0.5)
+    if draw.random() < 0.25 or not kind.resumes:
         time.sleep(draw.uniform(0.1, 4.0))
     else:
-        wait_for(lambda: run.process.poll() is not None or len(shards(run.folder)) >= before + more, LONGEST)
+        wait_for(lambda: run.process.poll() is not None or len(parts(run.folder)) >= before + more, LONGEST)
         time.sleep(pause)
     if run.process.poll() is not None:
         return False
@@ -161,7 +235,7 @@ def strike(run: Run, fault: str, scheduler: subprocess.Popen[bytes] | None, draw
         assert scheduler is not None
         scheduler.kill()
     elif fault == "worker killed":
-        workers = [child for child in offspring(os.getpid()) if is_worker(child)]
+        workers = [child for child in offspring(os.getpid() if scheduler else run.process.pid) if is_worker(child)]
         if not workers:
             return False
         draw.choice(workers).kill()
@@ -169,7 +243,7 @@ def strike(run: Run, fault: str, scheduler: subprocess.Popen[bytes] | None, draw
 
 
 def is_worker(process: psutil.Process) -> bool:
-    """Whether it computes for a nanny of Dask."""
+    """Whether it computes for a nanny of Dask, or for a fit."""
     try:
         return "spawn_main" in str(process.cmdline())
     except psutil.Error:
@@ -178,7 +252,7 @@ def is_worker(process: psutil.Process) -> bool:
 
 def flip(folder: Path, draw: random.Random) -> int:
     """Flip a bit of some shards that an interrupted run has left; returns of how many."""
-    files = shards(folder)
+    files = [path for path in parts(folder) if path.parent.suffix == ".parts"]
     chosen = draw.sample(files, min(len(files), draw.randint(1, 3)))
     for path in chosen:
         data = bytearray(path.read_bytes())
@@ -187,14 +261,23 @@ def flip(folder: Path, draw: random.Random) -> int:
     return len(chosen)
 
 
-def same_bits(one: Path, other: Path) -> bool:
-    """Whether two results hold the same bits in every variable."""
-    with netCDF4.Dataset(one) as a, netCDF4.Dataset(other) as b:
-        for file in (a, b):
-            file.set_auto_maskandscale(False)
-        return list(a.variables) == list(b.variables) and all(
-            a[name][...].tobytes() == b[name][...].tobytes() for name in a.variables
-        )
+def same_bits(kind: Kind, folder: Path) -> bool:
+    """Whether two results hold the same bits in every variable, and the same campaigns beside them."""
+    if kind.ending != ".nc":
+        pages = [(folder / f"{stem}{kind.ending}").read_text(encoding="utf-8") for stem in ("a", "straight")]
+        return len({MADE.sub("", page) for page in pages}) == 1
+    designs = [sorted((folder / f"{stem}_designs").glob("*")) for stem in ("a", "straight")]
+    texts = [[path.read_text() for path in paths] for paths in designs]
+    with netCDF4.Dataset(folder / "a.nc") as a, netCDF4.Dataset(folder / "straight.nc") as b:
+        return texts[0] == texts[1] and bits(a) == bits(b)
+
+
+def bits(file: netCDF4.Dataset) -> dict[str, Any]:
+    """The values of all variables, those of groups included."""
+    file.set_auto_maskandscale(False)
+    values = {name: variable[...] for name, variable in file.variables.items() if name not in TIMES}
+    own = {name: array.tobytes() if array.dtype != object else array.tolist() for name, array in values.items()}
+    return own | {name: bits(group) for name, group in file.groups.items()}
 
 
 def ended(run: Run) -> int | str:
@@ -221,54 +304,61 @@ def starved(pid: int) -> float:
     return max(waits)
 
 
-def one_round(folder: Path, draw: random.Random, counts: Counter[str]) -> list[str]:
-    """Disturb a campaign until its result is there; returns what went wrong."""
-    (folder / "campaign.toml").write_text(campaign(draw), encoding="utf-8")
-    straight = start(folder, "straight.nc")
+def one_round(folder: Path, draw: random.Random, counts: Counter[str], only: str | None) -> list[str]:
+    """Disturb a computation until its result is there; returns what went wrong."""
+    kind = draw.choice([kind for kind in KINDS if only in (None, kind.command)])
+    (folder / "file.toml").write_text(kind.text(draw), encoding="utf-8")
+    if kind.command == "report" and (code := ended(of_map := start(KINDS[0], folder, "map"))) != 0:
+        return [f"map of a report: {code}, {of_map.said[-500:]}"]
+    straight = start(kind, folder, "straight")
     if (code := ended(straight)) != 0:
-        return [f"undisturbed run: {code}, {straight.said[-500:]}"]
-    who = draw.choice(["threads", "threads", "workers", "scheduler"])
-    counts[f"rounds on {who}"] += 1
+        return [f"undisturbed {kind.command}: {code}, {straight.said[-500:]}"]
+    who = draw.choice(kind.who)
+    counts[f"{kind.command} on {who}"] += 1
     wrong, flipped, told = [], 0, False
     for attempt in range(MOST_FAULTS + 2):
         fault = draw.choice(FAULTS[who]) if attempt < MOST_FAULTS else "none"
-        code, said = one_run(folder, who, fault, draw, counts)
+        code, said = one_run(kind, folder, who, fault, draw, counts)
         told = told or "computed again" in said
-        if code not in ENDS[fault] or "Traceback" in said or (code == 2 and not promises(folder, said)):
-            wrong.append(f"{who}, {fault}: {code}, {said[-500:]}")
+        if code not in ENDS[fault] or "Traceback" in said or (code == 2 and not promises(kind, folder, said)):
+            wrong.append(f"{kind.command} on {who}, {fault}: {code}, {said[-500:]}")
         if code == 0:
             break
         if draw.random() < 0.5:
             flipped += (number := flip(folder, draw))
-            counts["flipped bits in shards"] += number
+            counts["flipped bits in parts"] += number
     if flipped:
         counts["rounds with flipped bits"] += 1
         counts["of which told of damage"] += told
-    if not (folder / "a.nc").exists():
-        wrong.append(f"no result after {MOST_FAULTS + 2} runs")
-    elif not same_bits(folder / "a.nc", folder / "straight.nc"):
+    if not (folder / f"a{kind.ending}").exists():
+        wrong.append(f"{kind.command}: no result after {MOST_FAULTS + 2} tries")
+    elif not same_bits(kind, folder):
         counts["wrong bits"] += 1
-        wrong.append("wrong bits")
+        wrong.append(f"{kind.command} on {who}: wrong bits")
     return wrong
 
 
-def promises(folder: Path, said: str) -> bool:
-    """Whether a run that broke off tells how to go on, if there is anything to go on with and it had begun."""
-    return "--resume" in said or "cannot be reached" in said or not shards(folder)
+def promises(kind: Kind, folder: Path, said: str) -> bool:
+    """Whether a command that broke off tells how to go on, if there is anything to go on with and it had begun."""
+    return not kind.resumes or "--resume" in said or "cannot be reached" in said or not parts(folder)
 
 
-def one_run(folder: Path, who: str, fault: str, draw: random.Random, counts: Counter[str]) -> tuple[int | str, str]:
-    """Resume the campaign and let a fault befall it; returns exit code and words."""
-    limit = draw.randint(100, (folder / "straight.nc").stat().st_size) if fault == "disk limit" else 0
+def one_run(
+    kind: Kind, folder: Path, who: str, fault: str, draw: random.Random, counts: Counter[str]
+) -> tuple[int | str, str]:
+    """Resume the computation and let a fault befall it; returns exit code and words."""
+    again = "--resume" if kind.resumes else "--overwrite"
+    largest = (folder / f"straight{kind.ending}").stat().st_size
+    limit = draw.randint(100, largest) if fault == "disk limit" else 0
     if who == "scheduler":
         with cluster(folder) as scheduler:
             address = json.loads((folder / "scheduler.json").read_text())["address"]
-            run = start(folder, "a.nc", "--resume", "--scheduler", address)
-            struck = fault != "none" and strike(run, fault, scheduler, draw)
+            run = start(kind, folder, "a", again, "--scheduler", address)
+            struck = fault != "none" and strike(kind, run, fault, scheduler, draw)
             code = ended(run)
     else:
-        run = start(folder, "a.nc", "--resume", *(["--workers", "2"] if who == "workers" else []), limit=limit)
-        struck = fault not in ("none", "disk limit") and strike(run, fault, None, draw)
+        run = start(kind, folder, "a", again, *(["--workers", "2"] if who == "workers" else []), limit=limit)
+        struck = fault not in ("none", "disk limit") and strike(kind, run, fault, None, draw)
         code = ended(run)
         struck = struck or (fault == "disk limit" and code == 2)
     counts[fault] += fault != "none" and struck
@@ -282,6 +372,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=60.0, help="how long to go on")
     parser.add_argument("--seed", type=int, default=1, help="of new figures")
     parser.add_argument("--figures", type=Path, default=FIGURES, help="file that is read and written")
+    parser.add_argument("--only", choices=sorted({kind.command for kind in KINDS}), help="command to disturb")
     arguments = parser.parse_args()
     zero = {"seed": arguments.seed, "rounds": 0, "seconds": 0.0, "counts": {"wrong bits": 0}, "wrong": []}
     figures: dict[str, Any] = json.loads(arguments.figures.read_text()) if arguments.figures.exists() else zero
@@ -290,7 +381,8 @@ def main() -> None:
         counts = Counter(figures["counts"])
         draw = random.Random(f"{figures['seed']} {figures['rounds']}")
         with tempfile.TemporaryDirectory() as folder:
-            figures["wrong"] += [f"round {figures['rounds']}: {text}" for text in one_round(Path(folder), draw, counts)]
+            found = one_round(Path(folder), draw, counts, arguments.only)
+            figures["wrong"] += [f"round {figures['rounds']}: {text}" for text in found]
         figures["rounds"] += 1
         figures["counts"] = dict(sorted(counts.items()))
         figures["seconds"] = round(before + time.monotonic() - begin, 1)
