@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import xarray
 from numpy.typing import NDArray
 
 from warpimpact.analysis.base import solid_note
+from warpimpact.analysis.declared import MEAN, SHARE, SHOWN_UNITS, WORST_POINT, WORST_TENTH, Statistic
 from warpimpact.analysis.effects import Effect, effects
 from warpimpact.analysis.numbers import Ends, intervals_text, number_text
 from warpimpact.analysis.survival import by_draws, over_draws
@@ -106,26 +106,6 @@ class Evidence:
     solid_drawn: Array | None = None
 
 
-class _Statistic(NamedTuple):
-    """What is made of an effect: the endings of its name, label, definition and source."""
-
-    name: str
-    label: str
-    definition: str
-    source: str
-
-
-_SHARE = _Statistic("", "", "", "")
-_MEAN = _Statistic("", ", mean", " Mean over the area.", "")
-_WORST_TENTH = _Statistic(
-    "_worst_tenth",
-    ", worst tenth",
-    " Mean over the worst tenth of the area.",
-    "; R. T. Rockafellar, S. Uryasev, Journal of Risk 2 (2000) 21",
-)
-_WORST_POINT = _Statistic("_worst_point", ", worst point", " The worst of the hits, an observed extreme.", "")
-
-
 def effectiveness(
     dataset: xarray.Dataset, *, angle: float | str = ANGLE, standoff: float | str | None = None
 ) -> list[EffectMeasure]:
@@ -166,16 +146,16 @@ def gather(
         values, solid = effect.over(dataset), None if reference is None else effect.over(reference)
         levels = None if pair is None else (effect.judged(pair[0]), effect.judged(pair[1]))
         if effect.kind == "share":
-            yield _averaged(effect, _SHARE, values, solid, levels, dealt, dataset)
+            yield _averaged(effect, SHARE, values, solid, levels, dealt, dataset)
         else:
-            yield _averaged(effect, _MEAN, values, solid, levels, dealt, dataset)
-            yield _averaged(effect, _WORST_TENTH, values, solid, levels, dealt, dataset)
+            yield _averaged(effect, MEAN, values, solid, levels, dealt, dataset)
+            yield _averaged(effect, WORST_TENTH, values, solid, levels, dealt, dataset)
             yield _worst_point(effect, values, solid, dataset)
 
 
 def _averaged(
     effect: Effect,
-    statistic: _Statistic,
+    statistic: Statistic,
     values: Array,
     solid: Array | None,
     levels: tuple[Array, Array] | None,
@@ -186,14 +166,14 @@ def _averaged(
     two levels of resolution."""
     numbers = drawn = values
     of_solid = solid_drawn = solid
-    if statistic is _WORST_TENTH:
+    if statistic is WORST_TENTH:
         sign = -1.0 if effect.higher_is_better else 1.0
         numbers, drawn = sign * worst_tenth(sign * values), sign * by_draws(dataset, sign * values, of_worst_tenth)
         if solid is not None:
             of_solid = sign * worst_tenth(sign * solid)
             solid_drawn = of_solid if len(solid) == 1 else sign * by_draws(dataset, sign * solid, of_worst_tenth)
     estimate = estimate_of(effect.kind, numbers, **dealt)
-    if statistic is _WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
+    if statistic is WORST_TENTH and not has_interval(estimate.count, dealt["images"]):
         estimate = _without_interval(estimate.value)
     if levels is not None:
         estimate = replace(estimate, numerics=_shift(effect, statistic, levels, dealt))
@@ -209,12 +189,12 @@ def _averaged(
     return Evidence(measure, effect.kind, numbers, of_solid, drawn, solid_drawn)
 
 
-def _shift(effect: Effect, statistic: _Statistic, levels: tuple[Array, Array], dealt: Estimating) -> float:
+def _shift(effect: Effect, statistic: Statistic, levels: tuple[Array, Array], dealt: Estimating) -> float:
     """How far the numerics may shift a measure, by what some hits say at two levels."""
     dealt = {**dealt, "replicates": 1}
     if effect.kind == "share":
         return (shift_of_yes if effect.margin is None else shift_of_share)(*levels, **dealt)
-    if statistic is _WORST_TENTH:
+    if statistic is WORST_TENTH:
         sign = -1.0 if effect.higher_is_better else 1.0
         levels = worst_tenth(sign * levels[0]), worst_tenth(sign * levels[1])
     return shift_of_mean(*levels, **dealt)
@@ -234,7 +214,7 @@ def _worst_point(effect: Effect, values: Array, solid: Array | None, dataset: xa
     hit = None if place is None else int(dataset[v.HIT][place])
     worst = None if solid is None else np.atleast_1d(sign * np.fmax.reduce(sign * solid))
     against = Ratio.of(estimate, values, worst, {})
-    return Evidence(_measure(effect, _WORST_POINT, estimate, against, hit), effect.kind)
+    return Evidence(_measure(effect, WORST_POINT, estimate, against, hit), effect.kind)
 
 
 def _without_interval(value: float) -> Estimate:
@@ -242,7 +222,7 @@ def _without_interval(value: float) -> Estimate:
 
 
 def _measure(
-    effect: Effect, statistic: _Statistic, estimate: Estimate, against: Ratio, hit: int | None = None
+    effect: Effect, statistic: Statistic, estimate: Estimate, against: Ratio, hit: int | None = None
 ) -> EffectMeasure:
     return EffectMeasure(
         name=effect.name + statistic.name,
@@ -262,10 +242,6 @@ def _measure(
         parameters=estimate.parameters,
         numerics=estimate.numerics,
     )
-
-
-SHOWN_UNITS = {"1": "", "mm": " [mm]", "J mm-2": " [J/mm²]", "kg m-2": " [kg/m²]", "m s-1": " [m/s]"}
-"""Units behind a label."""
 
 
 def effectiveness_text(

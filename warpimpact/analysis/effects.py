@@ -1,17 +1,18 @@
-"""What every shot says of how well a plate protects: defined, cited, one number per shot."""
+"""What every shot says of how well a plate protects: one number per shot of each effect of declared.py."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from warpimpact.analysis import base
+from warpimpact.analysis.declared import EFFECTS, Declaration, angle_text, layer_text, length_text
 from warpimpact.analysis.summary import slices
 from warpimpact.campaign.problems import complaint
 from warpimpact.results import attributes as attr
@@ -35,32 +36,32 @@ EFFECT_VARIABLES = (*_OF_A_HIT, _THICKNESS, _VELOCITY, *base.NEEDED)
 """All that effects are made of, beside coordinates and attributes."""
 
 
-@dataclass(frozen=True)
-class Effect:
-    """What is measured of each shot.
+@dataclass(frozen=True, kw_only=True)
+class Effect(Declaration):
+    """An effect of a result.
 
     Attributes:
-        name: for programs.
-        label: for people.
-        units: "1", "mm", "J mm-2", "kg m-2" or "m s-1".
-        definition: one sentence.
-        source: where it comes from.
-        higher_is_better: for whoever is behind the plate.
-        kind: "mean" of any numbers, or "share" of numbers 0 and 1.
         values: of a hit map with the variables of EFFECT_VARIABLES, NaN where a shot does not count.
         margin: of a share: numbers that are positive where the value is 1, NaN where a shot does not count; None where
             there are none.
     """
 
-    name: str
-    label: str
-    units: str
-    definition: str
-    source: str
-    higher_is_better: bool
-    kind: str
     values: Callable[[Result], Array]
     margin: Callable[[Result], Array] | None = None
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        values: Callable[[Result], Array],
+        *,
+        margin: Callable[[Result], Array] | None = None,
+        **words: str,
+    ) -> Self:
+        """An effect as it is declared, with these words in its label and definition."""
+        declared = EFFECTS[name]
+        told = replace(declared, label=declared.label.format(**words), definition=declared.definition.format(**words))
+        return cls(**vars(told), values=values, margin=margin)
 
     def judged(self, dataset: Result) -> Array:
         """The margins of all shots where there are such, else their values; shape [hits]."""
@@ -90,177 +91,53 @@ def effects(dataset: Result, *, angle: float | str, standoff: float | str | None
         return
     if base.has_base(dataset):
         yield from _of_base()
-    yield Effect(
-        name="residual_energy_fraction",
-        label="residual energy fraction",
-        units="1",
-        definition="Kinetic energy of translation behind the plate as a fraction of that on impact, (v_r/v_0)²; 0 for "
-        "a core that was arrested or ricocheted.",
-        source="R. F. Recht, T. W. Ipson, Journal of Applied Mechanics 30 (1963) 384",
-        higher_is_better=False,
-        kind="mean",
-        values=_energy_fraction,
-    )
+    yield Effect.of("residual_energy_fraction", _energy_fraction)
     if standoff is not None or dataset.sizes["standoff"]:
         degrees = math.degrees(_read("angle", Obliquity, angle))
         yield from _at_a_standoff(dataset, degrees, _at_standoff(dataset, standoff))
-    yield Effect(
-        name="stopped_share",
-        label="P(stopped)",
-        units="1",
-        definition="Share of the shots that do not pass the plate: arrested in it, or ricocheted off it.",
-        source="partial penetration as in MIL-STD-662F, V50 Ballistic Test for Armor",
-        higher_is_better=True,
-        kind="share",
-        values=lambda part: np.where(failed(part), np.nan, ~passed(part)),
-    )
+    yield Effect.of("stopped_share", lambda part: np.where(failed(part), np.nan, ~passed(part)))
     if v.BROKEN not in dataset:
         return
-    yield Effect(
-        name="broken_share",
-        label="P(broken)",
-        units="1",
-        definition="Share of the shots whose nominal bending stress passed the strength of the core.",
-        source="beam theory for a rigid core; a bound, not a prediction of fragments",
-        higher_is_better=True,
-        kind="share",
-        values=_is_broken,
-    )
-    yield Effect(
-        name="stopped_or_broken_share",
-        label="P(stopped, or broken)",
-        units="1",
-        definition="Share of the shots that do not pass the plate, or pass it with a broken core.",
-        source="partial penetration as in MIL-STD-662F, V50 Ballistic Test for Armor; a broken core counts as stopped",
-        higher_is_better=True,
-        kind="share",
-        values=lambda part: np.where(passed(part), _is_broken(part), np.where(failed(part), np.nan, 1.0)),
-    )
+    yield Effect.of("broken_share", _is_broken)
+    yield Effect.of("stopped_or_broken_share", lambda part: _of_passed(part, _is_broken(part), 1.0))
 
 
 def _at_a_standoff(dataset: Result, degrees: float, standoff: float) -> Iterator[Effect]:
     """Of where and how the core is at a stand-off [m]; it is tilted beyond so many degrees."""
-    at = f"{standoff * 1e3:g} mm"
+    at = length_text(standoff)
     if attr.CORE in dataset.attrs:
-        yield Effect(
-            name="residual_energy_density",
-            label=f"proxy: energy per presented area at {at}",
-            units="J mm-2",
-            definition="Kinetic energy of translation behind the plate over the area of the core's silhouette along "
-            f"the line of fire {at} behind it, nose or base first alike; 0 for a core that was arrested or "
-            "ricocheted. A proxy of how deep the core goes into what follows, which takes resistance times area from "
-            "it per depth.",
-            source="G. Ben-Dor, A. Dubinsky, T. Elperin, Applied Mechanics Reviews 58 (2005) 355; the silhouette of "
-            "a convex body is Cauchy's",
-            higher_is_better=False,
-            kind="mean",
-            values=_energy_density(TypeAdapter[Core](AnyCore).validate_json(dataset.attrs[attr.CORE]), standoff),
-        )
-    yield Effect(
-        name="tilted_share",
-        label=f"P(inclined > {degrees:g}° at {at}, either end first, or stopped)",
-        units="1",
-        definition=f"Share of the shots that {at} behind the plate are inclined to the line of fire by more than "
-        f"{degrees:g}°, tilt beyond 90° counted back from 180°, or that do not get there because they were arrested "
-        "or ricocheted.",
-        source="Numerical and experimental investigation of asymmetrical contact between a steel plate and "
-        "armour-piercing projectiles: what protects is mostly the distortion of the trajectory",
-        higher_is_better=True,
-        kind="share",
-        values=_is_tilted(degrees, standoff),
-        margin=_beyond(degrees, standoff),
-    )
+        core = TypeAdapter[Core](AnyCore).validate_json(dataset.attrs[attr.CORE])
+        yield Effect.of("residual_energy_density", _energy_density(core, standoff), standoff=at)
+    words = {"angle": angle_text(degrees), "standoff": at}
+    yield Effect.of("tilted_share", _is_tilted(degrees, standoff), margin=_beyond(degrees, standoff), **words)
 
 
 def _of_base() -> Iterator[Effect]:
     """Of the base behind the other layers."""
-    yield Effect(
-        name="base_perforated_share",
-        label="P(base perforated)",
-        units="1",
-        definition="Share of the shots that pass the last layer, the base: they perforate it, or go through a hole of "
-        "it or past its rim. Of the solid plate: the share that perforates it.",
-        source="complete penetration as in MIL-STD-662F, V50 Ballistic Test for Armor",
-        higher_is_better=False,
-        kind="share",
-        values=lambda part: np.where(failed(part), np.nan, passed(part)),
-    )
-    yield Effect(
-        name="base_pierced_share",
-        label="P(base pierced)",
-        units="1",
-        definition="Share of the shots in which the core comes out of the rear face of the last layer, the base, "
-        "whether it rests there or passes.",
-        source="Army criterion; P(base perforated) is that of the Navy: J. A. Zukas and others, Impact Dynamics, Wiley "
-        "1982",
-        higher_is_better=False,
-        kind="share",
-        values=base.is_pierced,
-    )
-    yield Effect(
-        name="base_depth",
-        label="depth in the base",
-        units="mm",
-        definition="How far behind the front face of the last layer, the base, any point of a core comes that rests in "
-        "it, at most the thickness of the base; 0 for a core that stops before the base or bounces off it. A core that "
-        "passes the base counts with this thickness, too: the numbers are lower bounds if any core pierces the base.",
-        source="residual depth of penetration in a backing: Z. Rosenberg, E. Dekel, Terminal Ballistics, Springer 2012",
-        higher_is_better=False,
-        kind="mean",
-        values=lambda part: 1e3 * base.base_depth(part),
-    )
+    yield Effect.of("base_perforated_share", lambda part: np.where(failed(part), np.nan, passed(part)))
+    yield Effect.of("base_pierced_share", base.is_pierced)
+    yield Effect.of("base_depth", lambda part: 1e3 * base.base_depth(part))
 
 
 def _of_limits(dataset: Result) -> Iterator[Effect]:
     """Of the thickness that a layer needs to stop every core."""
     told = dataset.attrs
-    layer, highest = int(told[attr.LIMIT_LAYER]), float(told[attr.LIMIT_HIGHEST])
-    whose = f"layer {layer}" if layer else "the plate"
+    whose, highest = layer_text(int(told[attr.LIMIT_LAYER])), length_text(float(told[attr.LIMIT_HIGHEST]))
 
     def of_layer(part: Result) -> Array:
         is_this = all(part.attrs.get(name) == told.get(name) for name in (attr.LIMIT_LAYER, attr.LIMIT_ELSEWHERE))
         values = 1e3 * _limits(part, _THICKNESS)
         return values if is_this else np.full_like(values, np.nan)  # a solid plate for the whole has no such layer
 
-    yield Effect(
-        name="limit_thickness",
-        label=f"limit thickness of {whose}",
-        units="mm",
-        definition=f"Thickness of {whose} that a core just perforates; a core that perforates the largest thickness "
-        f"tried, {highest * 1e3:g} mm, counts with that.",
-        source="ballistic limit as in MIL-STD-662F, V50 Ballistic Test for Armor, of the thickness at one velocity",
-        higher_is_better=False,
-        kind="mean",
-        values=of_layer,
-    )
+    yield Effect.of("limit_thickness", of_layer, layer=whose, highest=highest)
     if attr.LIMIT_ELSEWHERE not in told:
         return
-    yield Effect(
-        name="limit_areal_density",
-        label="areal density needed",
-        units="kg m-2",
-        definition=f"Mass per area of the whole target where {whose} has the limit thickness of the hit.",
-        source="armour is compared by its areal density at the limit: Z. Rosenberg, E. Dekel, Terminal Ballistics, "
-        "Springer 2012",
-        higher_is_better=False,
-        kind="mean",
-        values=_needed_density,
-    )
+    yield Effect.of("limit_areal_density", _needed_density, layer=whose)
 
 
 def _of_limit_velocity(dataset: Result) -> Effect:
-    highest = float(dataset.attrs[attr.LIMIT_HIGHEST])
-    return Effect(
-        name="limit_velocity",
-        label="limit velocity",
-        units="m s-1",
-        definition="Impact velocity at which a core just perforates the target; 0 for a core that touches no material, "
-        f"and {highest:g} m/s for one that is stopped even at that velocity, the largest tried.",
-        source="ballistic limit as in MIL-STD-662F, V50 Ballistic Test for Armor",
-        higher_is_better=True,
-        kind="mean",
-        values=lambda part: _limits(part, _VELOCITY),
-    )
+    highest = f"{float(dataset.attrs[attr.LIMIT_HIGHEST]):g} m/s"
+    return Effect.of("limit_velocity", lambda part: _limits(part, _VELOCITY), highest=highest)
 
 
 def _limits(part: Result, name: str) -> Array:

@@ -8,7 +8,8 @@ from html import escape
 import numpy as np
 import xarray
 
-from warpimpact.analysis.effectiveness import SHOWN_UNITS, effectiveness
+from warpimpact.analysis.declared import SHOWN_UNITS
+from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.hit_map import hit_points
 from warpimpact.analysis.inspect import inspect_text
 from warpimpact.analysis.numbers import intervals_text, number_text

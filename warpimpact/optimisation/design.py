@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 
+from warpimpact.analysis.declared import EFFECTS
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import CampaignError, parsed, read_text
@@ -333,6 +334,6 @@ def _check_needs(asking: Asking, data: Mapping[str, Any], space: Space, name: st
     for table in ("objectives", "bounds"):
         for place, one in enumerate(getattr(asking, table)):
             if one.measure != measures.AREAL_DENSITY:
-                needs = missing.get(measures.EFFECTS[one.key.effect].needs, "")
+                needs = missing.get(EFFECTS[one.key.effect].needs, "")
                 if needs:
                     raise CampaignError(f'{name}: {table}[{place}].measure = "{one.measure}" needs {needs}')

@@ -1,27 +1,13 @@
-"""What a search may ask of a design: names of the measures of `warpimpact inspect`, and areal density."""
+"""What a search may ask of a design: the effects of analysis/declared.py, their worst tenths, and areal density."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+from warpimpact.analysis.declared import EFFECTS, SHOWN_UNITS, WORST_TENTH, angle_text, layer_text, length_text
+
 AREAL_DENSITY = "areal_density"
-WORST_TENTH = "_worst_tenth"
-
-
-class Kind(NamedTuple):
-    """A measure by its name.
-
-    Attributes:
-        higher_is_better: for whoever is behind the plate.
-        is_share: whether it is a share of the shots, which has no worst tenth.
-        needs: what a campaign needs to have it: "standoff", "layer", "bending" or "".
-        is_limit: whether a search of limits tells it.
-    """
-
-    higher_is_better: bool
-    is_share: bool
-    needs: str = ""
-    is_limit: bool = False
 
 
 class Key(NamedTuple):
@@ -38,34 +24,31 @@ class Key(NamedTuple):
         return EFFECTS[self.effect].is_limit
 
 
-EFFECTS = {
-    "residual_energy_fraction": Kind(False, False),
-    "residual_energy_density": Kind(False, False, "standoff"),
-    "tilted_share": Kind(True, True, "standoff"),
-    "stopped_share": Kind(True, True),
-    "broken_share": Kind(True, True, "bending"),
-    "stopped_or_broken_share": Kind(True, True, "bending"),
-    "base_perforated_share": Kind(False, True, "layer"),
-    "base_pierced_share": Kind(False, True, "layer"),
-    "base_depth": Kind(False, False, "layer"),
-    "limit_velocity": Kind(True, False, is_limit=True),
-    "limit_thickness": Kind(False, False, is_limit=True),
-    "limit_areal_density": Kind(False, False, is_limit=True),
-}
-"""Measures of analysis/effects.py by their names."""
-
-
 def names() -> list[str]:
     """All that a design file may name."""
-    tenths = [name + WORST_TENTH for name, kind in EFFECTS.items() if not kind.is_share]
+    tenths = [name + WORST_TENTH.name for name, effect in EFFECTS.items() if effect.kind != "share"]
     return [AREAL_DENSITY, *EFFECTS, *tenths]
 
 
 def effect_of(measure: str) -> str:
     """The effect that a measure is made of."""
-    return measure.removesuffix(WORST_TENTH)
+    return measure.removesuffix(WORST_TENTH.name)
 
 
 def higher_is_better(measure: str) -> bool:
     """Of a measure by its name."""
     return measure != AREAL_DENSITY and EFFECTS[effect_of(measure)].higher_is_better
+
+
+def label_of(measure: str, key: Key) -> str:
+    """A measure for people, with its unit."""
+    if measure == AREAL_DENSITY:
+        return f"areal density{SHOWN_UNITS['kg m-2']}"
+    words = {
+        "angle": angle_text(math.degrees(key.angle)),
+        "standoff": "the last stand-off" if key.standoff is None else length_text(key.standoff),
+        "layer": layer_text(key.layer),
+    }
+    effect = EFFECTS[key.effect]
+    tenth = WORST_TENTH.label if measure != key.effect else ""
+    return effect.label.format(**words) + tenth + SHOWN_UNITS[effect.units]

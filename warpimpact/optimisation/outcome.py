@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from warpimpact.campaign.places import relocated
 from warpimpact.campaign.toml import toml_text
 from warpimpact.optimisation.confirm import Confirmed
-from warpimpact.optimisation.design import Bound, Design, Objective, Threat
+from warpimpact.optimisation.design import Bound, Design, Threat
 from warpimpact.optimisation.judged import Record, estimate
-from warpimpact.optimisation.measures import AREAL_DENSITY, WORST_TENTH
+from warpimpact.optimisation.measures import label_of
 from warpimpact.optimisation.search import Searched
 from warpimpact.results import attributes as attr
 from warpimpact.results import front as f
@@ -30,32 +30,6 @@ Array = NDArray[np.float64]
 
 _LONGEST_ENDING = 80
 """Bytes of a threat's name in the name of a file, which may have 255."""
-LABELS = {
-    AREAL_DENSITY: ("areal density", "kg/m²"),
-    "residual_energy_fraction": ("residual energy fraction", ""),
-    "residual_energy_density": ("energy per presented area", "J/mm²"),
-    "tilted_share": ("P(inclined > {angle:g}°, or stopped)", ""),
-    "stopped_share": ("P(stopped)", ""),
-    "broken_share": ("P(broken)", ""),
-    "stopped_or_broken_share": ("P(stopped, or broken)", ""),
-    "base_perforated_share": ("P(base perforated)", ""),
-    "base_pierced_share": ("P(base pierced)", ""),
-    "base_depth": ("depth in the base", "mm"),
-    "limit_velocity": ("limit velocity", "m/s"),
-    "limit_thickness": ("limit thickness", "mm"),
-    "limit_areal_density": ("areal density needed", "kg/m²"),
-}
-
-
-def label_of(one: Objective | Bound) -> str:
-    """An objective or a bound for people, with its unit."""
-    name, unit = LABELS[one.measure.removesuffix(WORST_TENTH)]
-    text = name.format(angle=np.degrees(float(one.angle)))
-    if one.standoff is not None:
-        text += f" at {1e3 * one.standoff:g} mm"
-    text += f" of layer {one.layer}" if one.layer else ""
-    text += ", worst tenth" if one.measure.endswith(WORST_TENTH) else ""
-    return f"{text} [{unit}]" if unit else text
 
 
 def key_of(design: Design, place: int) -> str:
@@ -75,7 +49,7 @@ def to_dataset(design: Design, found: Searched, confirmed: Confirmed, made_by: M
         f.UNIT: _texts(one.unit for one in variables),
         f.LABELS: _texts(json.dumps(one.labels, ensure_ascii=False) if one.labels else "" for one in variables),
         f.ASKED: _texts(key_of(design, place) for place in range(len(asked))),
-        f.LABEL: _texts(map(label_of, asked)),
+        f.LABEL: _texts(label_of(measure.measure, measure.key) for measure in asked),
         f.SIGN: [int(one.sign) for one in asked],
         f.LIMIT: [one.limit if isinstance(one, Bound) else np.nan for one in asked],
         f.VALUE: np.array([one.values for one in found.records]).reshape(len(found.records), len(variables)),

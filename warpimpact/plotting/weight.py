@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
-from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note
+from warpimpact.analysis.declared import SHOWN_UNITS
+from warpimpact.analysis.effectiveness import depth_note
 from warpimpact.plotting.style import BLUE, GREY, VERMILION, bars, hide_sides
 
 if TYPE_CHECKING:
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from warpimpact.analysis.comparison_text import Comparison, Contestant
-    from warpimpact.analysis.effectiveness import EffectMeasure
+    from warpimpact.analysis.declared import SHOWN_UNITS
+from warpimpact.analysis.effectiveness import EffectMeasure
 
 _STYLES = {
     "": ("mean, or share", "o", BLUE),

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from warpimpact.analysis.base import solid_note
 from warpimpact.analysis.comparison import compare
 from warpimpact.analysis.comparison_text import RANKING_HEAD, Comparison, best_rows, conditions, rankings
-from warpimpact.analysis.effectiveness import SHOWN_UNITS, depth_note, effectiveness
+from warpimpact.analysis.declared import SHOWN_UNITS
+from warpimpact.analysis.effectiveness import depth_note, effectiveness
 from warpimpact.analysis.numbers import ends_of, intervals_text, number_text
 from warpimpact.analysis.summary import (
     estimated,
