@@ -8,8 +8,8 @@ plates that were hit by other shots are compared as independent (statistics/comp
 Plates of different weight are compared by their ratios to the solid plate of the same areal density.
 
 The intervals of all pairs of plates hold together, for each measure on its own: each has its share of the error
-(Bonferroni). The numerics may shift both plates, which their intervals hold, too. Two plates are told apart where the
-interval of their difference leaves out 0.
+(Bonferroni). The numerics and the tolerance of a limit may shift both plates, which their intervals hold, too. Two
+plates are told apart where the interval of their difference leaves out 0 by more than rounding.
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ from warpimpact.runs.parts import first_difference
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
 from warpimpact.statistics.comparisons import (
+    ROUNDED,
     Ratio,
     confidence_of_each,
     difference_numbers,
@@ -98,10 +99,15 @@ def compare(
             by_ratio.add(name)
         for (i, j), pair in zip(pairs, used, strict=True):
             dealt: list[Estimating] = [{**dealing(datasets[k]), "confidence": each} for k in (i, j)]
-            sides = [_side(evidences[k], of, by_ratio=name in by_ratio) for k, of in zip((i, j), dealt, strict=True)]
+            sides = [
+                _side(evidences[k], of, _sought_to(datasets[k], evidences[k].measure.units), by_ratio=name in by_ratio)
+                for k, of in zip((i, j), dealt, strict=True)
+            ]
             value, low, high = _difference(sides[0], sides[1], dealt[0], paired=not pair.independent)
-            shift = sum(np.nan_to_num(side.estimate.numerics or 0.0) for side in sides)
-            interval = value, low - shift, high + shift
+            shift = sum(side.estimate.numerics or 0.0 for side in sides)
+            rounded = ROUNDED * max(abs(side.estimate.value) for side in sides)
+            value, low, high = (0.0 if abs(at) <= rounded else at for at in (value, low - shift, high + shift))
+            interval = value, low, high
             drawn = sides[0].drawn, sides[1].drawn
             why = why_not_by_draws(drawn, independent=pair.independent, by_ratio=name in by_ratio)
             both = datasets[i], datasets[j]
@@ -173,10 +179,18 @@ class _Side(NamedTuple):
     estimate: Estimate
 
 
-def _side(evidence: Evidence, dealt: Estimating, *, by_ratio: bool) -> _Side:
+def _sought_to(dataset: xarray.Dataset, units: str) -> float:
+    """How far a limit of a result may lie from the one that is told, in the units of a measure; 0 of other results."""
+    told = dataset.attrs
+    per_meter = {"mm": 1e3, "kg m-2": told.get(attr.LIMIT_DENSITY, 0.0)}
+    return float(told.get(attr.LIMIT_TOLERANCE, 0.0) * per_meter.get(units, 1.0))
+
+
+def _side(evidence: Evidence, dealt: Estimating, sought_to: float, *, by_ratio: bool) -> _Side:
     assert evidence.numbers is not None
     assert evidence.drawn is not None
-    estimate = replace(estimate_of(evidence.kind, evidence.numbers, **dealt), numerics=evidence.measure.numerics)
+    shift = float(np.nan_to_num(evidence.measure.numerics or 0.0)) + sought_to
+    estimate = replace(estimate_of(evidence.kind, evidence.numbers, **dealt), numerics=shift)
     if math.isnan(evidence.measure.low):  # as of a worst tenth of few hits
         estimate = replace(estimate, low=math.nan, high=math.nan)
     if not by_ratio:
@@ -186,8 +200,7 @@ def _side(evidence: Evidence, dealt: Estimating, *, by_ratio: bool) -> _Side:
     ratio = Ratio.of(estimate, evidence.numbers, evidence.solid, dealt)
     numbers = ratio_numbers(evidence.numbers, evidence.solid, ratio.value)
     drawn = ratio_of_draws(evidence.drawn, evidence.solid_drawn)
-    shift = estimate.numerics and estimate.numerics / ratio.reference
-    estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high, numerics=shift)
+    estimate = replace(estimate, value=ratio.value, low=ratio.low, high=ratio.high, numerics=shift / ratio.reference)
     return _Side(evidence.kind == "share", True, numbers, drawn, estimate)
 
 

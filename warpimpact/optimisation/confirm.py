@@ -18,6 +18,7 @@ from warpimpact.optimisation.measures import AREAL_DENSITY
 from warpimpact.optimisation.search import Searched
 from warpimpact.optimisation.searcher import front_of
 from warpimpact.optimisation.work import Work
+from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.random_effects import positive_share
 
 Array = NDArray[np.float64]
@@ -194,13 +195,10 @@ def is_better(design: Design, one: Record, other: Record) -> bool:
     """Whether some objective tells at 95 %, by the same hits of both, that one design is better than another."""
     count = len(design.objectives)
     signs = np.array([asked.sign for asked in design.objectives])[:, None]
-    gain = signs * (means(design, other, other.hits) - means(design, one, one.hits))[:count]
-    low = interval(gain)[0]
-    for row, asked in enumerate(design.objectives):
-        least = SAME_WEIGHT * other.areal_density if asked.measure == AREAL_DENSITY else 0.0
-        if low[row] > least:
-            return True
-    return False
+    theirs = means(design, other, other.hits)[:count]
+    low = interval(signs * (theirs - means(design, one, one.hits)[:count]))[0]
+    same = [SAME_WEIGHT if asked.measure == AREAL_DENSITY else ROUNDED for asked in design.objectives]
+    return bool((low > np.array(same) * np.nan_to_num(np.abs(theirs)).max(axis=1)).any())
 
 
 def survival(design: Design, front: Sequence[Record], draws: Sequence[Array], leads: NDArray[np.bool_]) -> Array:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from warpimpact.optimisation.design import Bound, Design, Objective
 from warpimpact.optimisation.measures import AREAL_DENSITY, effect_of, higher_is_better
+from warpimpact.statistics.comparisons import ROUNDED
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
 from warpimpact.statistics.worst_tenth import worst_tenth
@@ -109,18 +110,19 @@ def objectives(design: Design, record: Record, hits: int | None = None) -> Array
 
 
 def excesses(design: Design, record: Record, hits: int | None = None) -> Array:
-    """By how much each bound is violated, as a share of its limit, 0 where it is kept, shape [bounds]."""
+    """By how much each bound is violated, as a share of its limit; 0 where it is kept to rounding, shape [bounds]."""
     found = values(design, record, hits)[len(design.objectives) :]
     over = [
         bound.sign * (value - bound.limit) / (abs(bound.limit) or 1.0)
         for bound, value in zip(design.bounds, found, strict=True)
     ]
-    return np.asarray(np.maximum(np.nan_to_num(np.array(over), nan=1.0), 0.0))
+    shares = np.nan_to_num(np.array(over), nan=1.0)
+    return np.where(shares > ROUNDED, shares, 0.0)
 
 
 def undecided(design: Design, candidates: Sequence[Record], rivals: Sequence[Record], hits: int) -> list[bool]:
     """Whether each candidate may be on the front, by the first hits: it certainly breaks no bound, and no rival is
-    certainly better."""
+    certainly better; rounding decides nothing."""
     signs = np.array([one.sign for one in design.asked])[:, None]
     count = len(design.objectives)
     limits = np.array([one.sign * one.limit for one in design.bounds]).reshape(-1, 1)
@@ -128,10 +130,11 @@ def undecided(design: Design, candidates: Sequence[Record], rivals: Sequence[Rec
     found = []
     for one in candidates:
         own = signs * means(design, one, hits)
-        broken = (interval(own[count:] - limits)[0] > 0.0).any()
+        broken = (interval(own[count:] - limits)[0] > ROUNDED * np.abs(limits[:, 0])).any()
         others = theirs[[rival is not one for rival in rivals]]
         low = interval(own[None, :count] - others[:, :count])[0]
-        worse = (low >= 0.0).all(axis=1) & (low > 0.0).any(axis=1)
+        rounded = ROUNDED * np.nan_to_num(np.abs(own[:count])).max(axis=1)
+        worse = (low >= -rounded).all(axis=1) & (low > rounded).any(axis=1)
         found.append(not broken and not bool(worse.any()))
     return found
 

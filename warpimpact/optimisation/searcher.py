@@ -98,7 +98,10 @@ def hypervolume(points: Array, reference: Array) -> float:
 
 
 def front_of(points: Array) -> NDArray[np.int64]:
-    """Numbers of the points to minimise that no other dominates; of equal ones the first."""
+    """Numbers of the points to minimise that no other dominates; of those that are equal to seven digits the first."""
     import moocore
 
-    return np.flatnonzero(moocore.is_nondominated(points)) if len(points) else np.zeros(0, dtype=np.int64)
+    if not len(points):
+        return np.zeros(0, dtype=np.int64)
+    rounded = [[float(f"{number:.7g}") for number in point] for point in points]
+    return np.flatnonzero(moocore.is_nondominated(np.array(rounded)))

@@ -9,6 +9,10 @@ import numpy as np
 
 from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 
+ROUNDED = 1e-6
+"""Share of their size by which numbers may differ through rounding alone: shots are computed and stored in single
+precision, and a few operations follow."""
+
 
 def difference_of_independent(one: Estimate, other: Estimate) -> tuple[float, float]:
     """Interval of the difference of two independent estimates, from the intervals of both.

@@ -135,6 +135,16 @@ def test_targets_are_ranked_by_the_depth_in_bases_that_hold(make_plate_result) -
     assert "not ranked" in {axes.get_title(loc="left") for axes in comparison_figure(comparison).axes}
 
 
+def test_a_base_that_stands_elsewhere_is_as_thick(make_plate_result) -> None:
+    """Its thickness is the distance of its faces, which rounding changes with their place."""
+    near = layered(make_plate_result(np.full(64, 500.0)), np.full(64, -1), np.zeros(64), base=0.012)
+    far = near.assign(layer_front=near["layer_front"] + 0.2, layer_rear=near["layer_rear"] + 0.2)
+    assert 0.0 < abs(named(near)["base_depth"].value - named(far)["base_depth"].value) < 1e-12
+    comparison = compare([near, far], ["near", "far"])
+    assert not any(pair.told_apart for pair in comparison.differences)
+    assert comparison.ranks("base_depth") == {"near": 1, "far": 1}
+
+
 def test_a_plate_without_layers_is_compared_in_what_both_have(make_plate_result, mixed) -> None:
     alone = make_plate_result(np.full(6, 500.0))
     comparison = compare([mixed, alone], ["layered", "alone"])

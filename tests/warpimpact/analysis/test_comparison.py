@@ -62,6 +62,22 @@ def test_identical_plates_cannot_be_told_apart(make_plate_result) -> None:
     assert "<pre>500 hits of each plate: " in comparison._repr_html_()
 
 
+@pytest.mark.parametrize(("apart", "told"), [(1e-8, False), (1e-4, True)])
+def test_rounding_tells_no_plates_apart(apart: float, told: bool, make_plate_result) -> None:
+    fraction = NUMBERS.uniform(0.5, 0.9, 500)
+    one, other = (make_plate_result(velocities(part)) for part in (fraction, (1.0 + apart) * fraction))
+    for comparison in (
+        compare([one, other], ["a", "b"]),
+        compare(
+            [with_solid(one, 0.9), with_solid(other.assign_attrs(areal_density=40.0), 0.9)], ["a", "b"]
+        ),  # by the ratio
+    ):
+        for measure in (MEAN, TAIL, "residual_energy_density"):
+            pair = difference(comparison, measure, "a", "b")
+            assert (pair.told_apart, pair.value != 0.0) == (told, told)
+            assert comparison.ranks(measure) == {"a": 1, "b": 2 if told else 1}
+
+
 def test_plates_that_share_a_rank_cannot_be_told_apart(make_plate_result) -> None:
     """Two plates that hardly scatter differ; the third scatters so that it is told apart from neither."""
     plates = [

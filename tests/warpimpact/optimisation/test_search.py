@@ -17,12 +17,12 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.campaign.text import CampaignError
 from warpimpact.cli import main
 from warpimpact.optimisation import search, searcher
-from warpimpact.optimisation.confirm import fresh_seed
+from warpimpact.optimisation.confirm import fresh_seed, is_better
 from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import design_from, read_design
-from warpimpact.optimisation.judged import Record
+from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
-from warpimpact.optimisation.searcher import Searcher, hypervolume
+from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.optimisation.space import Space, Variable
 from warpimpact.optimisation.text import front_lines
 from warpimpact.optimisation.work import Work
@@ -128,6 +128,26 @@ def test_a_killed_search_is_resumed_to_the_same_file(tmp_path: Path) -> None:
     assert resumed[-1] > 0
     _same(f.read(whole), f.read(killed))
     assert not parts.exists()
+
+
+def test_rounding_decides_nothing() -> None:
+    bound = '[[bounds]]\nmeasure = "areal_density"\nat_most = 30.0\n'
+    plan = design(THICKNESS, WEIGHT_AND_ENERGY, bound, SEARCH)
+    energies = np.linspace(0.5, 0.9, 64)
+
+    def record(density: float, less: float = 0.0) -> Record:
+        return Record(np.zeros(1), {}, density, (), (energies - less)[None, None])
+
+    heavier, lighter, better = record(30.0 * (1 + 1e-9)), record(30.0 * (1 - 1e-9)), record(30.0 * (1 + 1e-9), 0.1)
+    nearly = record(30.0 * (1 - 1e-9), 1e-9)
+    assert not excesses(plan, heavier).any()
+    assert undecided(plan, [heavier, lighter], [heavier, lighter], 64) == [True, True]
+    assert undecided(plan, [better, lighter], [better, lighter], 64) == [True, False]
+    assert is_better(plan, better, lighter)
+    assert not is_better(plan, nearly, heavier)
+    points = np.array([objectives(plan, one) for one in (better, lighter, nearly)])
+    assert list(front_of(points)) == [0]
+    assert list(front_of(points[1:])) == [0]
 
 
 def test_a_seed_gives_one_search_and_another_seed_another() -> None:

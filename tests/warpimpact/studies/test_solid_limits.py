@@ -103,6 +103,16 @@ def test_plates_of_other_weight_are_ranked_by_the_ratio(velocity: xarray.Dataset
     assert found.ranks("limit_velocity") == {"light": 1, "heavy": 2}
 
 
+@pytest.mark.parametrize(("more", "ranks"), [(1.0, [1, 1]), (3.0, [2, 1])])
+def test_limits_within_their_tolerance_are_not_told_apart(
+    velocity: xarray.Dataset, more: float, ranks: list[int]
+) -> None:
+    """Each limit is known to 1 m/s."""
+    other = velocity.assign(limit_velocity=velocity["limit_velocity"] + more)
+    found = compare([velocity, other], ["one", "other"])
+    assert [found.ranks("limit_velocity")[name] for name in ("one", "other")] == ranks
+
+
 def test_of_a_thickness_it_tells_the_areal_density_that_a_solid_plate_needs(thickness: xarray.Dataset) -> None:
     measures = {one.name: one for one in effectiveness(thickness)}
     solid = 7850.0 * float(thickness["solid_limit_thickness"][0])
