@@ -1,6 +1,9 @@
 """The command design: a page on this machine where a plate is drawn and its map answers."""
 
 import argparse
+import os
+import tempfile
+from contextlib import ExitStack
 from pathlib import Path
 
 from .options import Commands, add_command, add_device
@@ -46,19 +49,45 @@ def _design(arguments: argparse.Namespace) -> None:
     if not 0 <= arguments.port < 2**16:
         raise CampaignError(f"--port: got {arguments.port}, but it must be a number from 0 to 65535")
 
+    opened = ExitStack()
+
     def ready(address: str) -> None:
         print(address, flush=True)
         if not arguments.no_browser:
             import webbrowser
 
-            webbrowser.open(address)
+            try:
+                path = _leading_to(address)
+            except OSError as error:
+                say(f"no browser is opened, because a file for it cannot be written ({error.strerror})")
+                return
+            opened.callback(path.unlink, missing_ok=True)
+            webbrowser.open(path.as_uri())
 
     try:
-        serve(shelf, port=arguments.port, device=arguments.device, ready=ready)
+        with opened:
+            serve(shelf, port=arguments.port, device=arguments.device, ready=ready, entered=opened.close)
     except OSError as error:
         raise CampaignError(f"--port: got {arguments.port}, but it cannot be used ({error.strerror})") from None
     except KeyboardInterrupt:
         say("ended")
+
+
+def _leading_to(address: str) -> Path:
+    """A file that leads a browser to an address and that only its owner can read.
+
+    Every user of the machine sees with which words a browser is started, so the address is none of them. The file is in
+    the home folder: browsers in a sandbox see neither that for temporary files nor hidden ones.
+    """
+    home = Path("~").expanduser()
+    folder = home if os.access(home, os.W_OK) else None
+    number, name = tempfile.mkstemp(".html", "warpimpact-design-", folder)
+    with os.fdopen(number, "w", encoding="utf-8") as file:
+        file.write(
+            f'<!DOCTYPE html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
+            f'<meta http-equiv="refresh" content="0;url={address}"><a href="{address}">warpimpact design</a>'
+        )
+    return Path(name)
 
 
 def _example() -> Path:

@@ -347,7 +347,7 @@
   at("copy").addEventListener("click", async () => {
     settle();
     history.replaceState(null, "", `#${await address.packed(state)}`);
-    await navigator.clipboard.writeText(location.href);
+    await navigator.clipboard.writeText(`${location.origin}/${location.hash}`); // not the token: it goes to others
     at("copy").textContent = "Copied";
     setTimeout(() => { at("copy").textContent = "Copy address"; }, 1500);
   });

@@ -55,7 +55,7 @@ class Guard:
             return PlainTextResponse("This page is for this machine: http://127.0.0.1.", status_code=403)
         if not hmac.compare_digest(token.encode(), self._token.encode()):
             return PlainTextResponse(
-                "This address has another token. warpimpact design prints the address when it starts; "
+                "This address has not the token of this start. warpimpact design prints the address when it starts; "
                 "warpimpact design 'ADDRESS' opens the design of an old one.",
                 status_code=403,
             )

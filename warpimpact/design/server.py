@@ -28,6 +28,7 @@ from warpimpact.design.changes import changed
 from warpimpact.design.designs import Design, Shelf, Tables, as_json, stages
 from warpimpact.design.desk import Desk
 from warpimpact.design.guard import Guard
+from warpimpact.design.hasty import Hasty
 from warpimpact.results.files import ResultError
 from warpimpact.scene.plausible import Implausible
 from warpimpact.scene.units import quoted
@@ -50,9 +51,19 @@ _LINES = "application/x-ndjson"
 _STAGES = {"first": _FIRST, "draft": _REFINE, "full": _LAST}
 
 
-def application(shelf: Shelf, *, token: str, port: int, device: str = "auto") -> Guard:
-    """The page and all that it asks, as an ASGI application."""
-    pages = _Pages(Answers(shelf, device), Desk())
+def _nothing() -> None:
+    pass
+
+
+def application(
+    shelf: Shelf, *, token: str, port: int, device: str = "auto", entered: Callable[[], object] = _nothing
+) -> Guard:
+    """The page and all that it asks, as an ASGI application.
+
+    Args:
+        entered: called whenever a browser gets the page.
+    """
+    pages = _Pages(Answers(shelf, device), Desk(), entered)
     routes = [
         Route("/", pages.page),
         Route("/files/{name}", _file),
@@ -70,10 +81,11 @@ def application(shelf: Shelf, *, token: str, port: int, device: str = "auto") ->
 class _Pages:
     """What the paths of the page answer; it holds nothing of a single browser."""
 
-    def __init__(self, answers: Answers, desk: Desk) -> None:
-        self._answers, self._desk, self._shelf = answers, desk, answers.shelf
+    def __init__(self, answers: Answers, desk: Desk, entered: Callable[[], object]) -> None:
+        self._answers, self._desk, self._shelf, self._entered = answers, desk, answers.shelf, entered
 
     async def page(self, request: Request) -> Response:
+        self._entered()
         return HTMLResponse(self._answers.page(version=warpimpact.__version__))
 
     async def start(self, request: Request) -> Response:
@@ -279,23 +291,43 @@ def bound(port: int) -> socket.socket:
     return own
 
 
-def serve(shelf: Shelf, *, port: int = 0, device: str = "auto", ready: Callable[[str], object]) -> None:
+def server_of(app: Guard) -> uvicorn.Server:
+    """What serves the page."""
+    return uvicorn.Server(
+        uvicorn.Config(
+            app,
+            http=Hasty,
+            ws="none",
+            log_level="critical",
+            access_log=False,
+            lifespan="off",
+            timeout_graceful_shutdown=1,
+        )
+    )
+
+
+def serve(
+    shelf: Shelf,
+    *,
+    port: int = 0,
+    device: str = "auto",
+    ready: Callable[[str], object],
+    entered: Callable[[], object] = _nothing,
+) -> None:
     """Serve the page until a signal ends it.
 
     Args:
         ready: called with the address of the page.
+        entered: called whenever a browser gets the page.
 
     Raises:
         OSError: the port is taken.
     """
     with bound(port) as own:
         token, port = secrets.token_urlsafe(18), own.getsockname()[1]
-        app = application(shelf, token=token, port=port, device=device)
-        config = uvicorn.Config(
-            app, log_level="critical", access_log=False, lifespan="off", timeout_graceful_shutdown=1
-        )
+        server = server_of(application(shelf, token=token, port=port, device=device, entered=entered))
         own.listen()
         ready(f"http://127.0.0.1:{port}/{token}/")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Implausible)  # the page shows these
-            uvicorn.Server(config).run(sockets=[own])
+            server.run(sockets=[own])

@@ -15,15 +15,13 @@ CAMPAIGNS = Path(__file__).parents[3] / "campaigns"
 
 @contextmanager
 def served(shelf: Shelf) -> Iterator[str]:
-    uvicorn = pytest.importorskip("uvicorn", reason="needs the extra design")
-    from warpimpact.design.server import application, bound
+    pytest.importorskip("uvicorn", reason="needs the extra design")
+    from warpimpact.design.server import application, bound, server_of
 
     with bound(0) as own:
         own.listen()
         port = own.getsockname()[1]
-        app = application(shelf, token=TOKEN, port=port, device="cpu")
-        config = uvicorn.Config(app, log_level="critical", lifespan="off", timeout_graceful_shutdown=1)
-        server = uvicorn.Server(config)
+        server = server_of(application(shelf, token=TOKEN, port=port, device="cpu"))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [own]})
         thread.start()
         try:

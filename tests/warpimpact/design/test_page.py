@@ -18,6 +18,8 @@ from warpimpact.analysis.effectiveness import effectiveness
 from warpimpact.analysis.numbers import number_text
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.cli import main
+from warpimpact.cli.design import _leading_to
+from warpimpact.design.designs import from_address
 from warpimpact.results import files
 from warpimpact.runs.run import run
 
@@ -103,6 +105,28 @@ def test_the_address_holds_the_design_and_undo_brings_it_back(page: Any) -> None
     page.open(address)
     page.wait(lambda: page.values(thickness) == ["5"])
     assert page.errors() == []
+
+
+def test_the_file_that_a_browser_is_opened_on_leads_to_the_page(
+    browser: Any, serve: Callable[..., str], small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    address = serve(small)
+    browser.open(_leading_to(address).as_uri())
+    browser.wait(lambda: browser.driver.current_url.startswith(address), 60.0)
+    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
+    browser.driver.refresh()
+    browser.wait(lambda: "Complete" in browser.text("#status"), 180.0)
+    assert browser.errors() == []
+
+
+def test_a_copied_address_holds_the_design_and_not_the_token(page: Any) -> None:
+    page.driver.execute_script("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
+    page.press("#copy")
+    page.wait(lambda: page.text("#copy") == "Copied")
+    copied = page.driver.execute_script("return window.copied")
+    assert urlsplit(copied)[:3] == (*urlsplit(page.driver.current_url)[:2], "/")
+    assert from_address(copied)["plate"]["thickness"] == "4 mm"
 
 
 def test_a_click_on_the_map_shows_that_hit(page: Any) -> None:

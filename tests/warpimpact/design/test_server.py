@@ -2,9 +2,15 @@
 
 import http.client
 import json
+import os
+import socket
+import stat
+import subprocess
+import sys
 import time
 import tomllib
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -15,6 +21,7 @@ from warpimpact.campaign.text import CampaignError
 from warpimpact.catalogue.catalogue import Catalogue
 from warpimpact.catalogue.entries import Threat
 from warpimpact.cli import main
+from warpimpact.design import hasty
 from warpimpact.design.answers import Answers
 from warpimpact.design.changes import SHAPES, changed
 from warpimpact.design.designs import FILE_KEYS, shelf_of, stages
@@ -79,6 +86,63 @@ def test_it_answers_its_own_page_alone(address: str, given: dict[str, Any], path
 @pytest.mark.parametrize("token", ["", "another", "a-toke", "a-tokenn"])
 def test_it_asks_for_its_token(address: str, token: str) -> None:
     assert asked(address.replace("a-token", token), "")[0] == 403
+
+
+def test_a_socket_that_sends_no_whole_request_is_closed(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hasty, "LIMIT", 0.5)
+    place = urlsplit(address)
+    headers = f"Host: {place.netloc}\r\nOrigin: http://{place.netloc}\r\nContent-Length: 9\r\n"
+    begun = ["", f"GET {place.path} HT", f"POST {place.path}compute HTTP/1.1\r\n{headers}\r\n{{"]
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.create_connection((place.hostname, place.port))) for _ in range(60)]
+        for number, one in enumerate(sockets):
+            one.sendall(begun[number % 3].encode())
+            one.settimeout(30.0)
+        assert asked(address)[0] == 200
+        assert [one.recv(1) for one in sockets] == [b""] * 60
+        assert asked(address)[0] == 200
+
+
+def test_bytes_that_trickle_do_not_keep_a_socket(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hasty, "LIMIT", 0.5)
+    place = urlsplit(address)
+    with socket.create_connection((place.hostname, place.port)) as one, suppress(ConnectionError):
+        one.settimeout(0.05)
+        for _ in range(400):
+            one.sendall(b"G")
+            with suppress(TimeoutError):
+                assert one.recv(1) == b""
+                return
+        pytest.fail("the socket is open")
+
+
+def test_the_browser_is_opened_on_a_file_that_only_its_owner_reads(small: Path, tmp_path: Path) -> None:
+    """The words with which a program is started are seen by every user of the machine."""
+    script, words = tmp_path / "browser", tmp_path / "words"
+    script.write_text(f'#!/bin/sh\necho "$@" > {words}.new && mv {words}.new {words}\n')
+    script.chmod(0o700)
+    home = tmp_path / "home"
+    home.mkdir()
+    command = [sys.executable, "-m", "warpimpact", "design", str(small), "--device", "cpu"]
+    environment = os.environ | {"HOME": str(home), "BROWSER": f"{script} %s"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        try:
+            assert process.stdout is not None
+            address, until = process.stdout.readline().strip(), time.monotonic() + 60.0
+            token = urlsplit(address).path.strip("/")
+            while not words.exists() and time.monotonic() < until:
+                time.sleep(0.05)
+            (file,) = home.glob("*.html")
+            assert words.read_text().strip() == file.as_uri()
+            assert len(token) > 20
+            assert token not in words.read_text()
+            assert stat.S_IMODE(file.stat().st_mode) == 0o600
+            assert f"url={address}" in file.read_text()
+            assert asked(address)[0] == 200
+            assert not file.exists()  # it has served
+            assert asked(address)[0] == 200  # as for a second tab
+        finally:
+            process.terminate()
 
 
 @pytest.mark.parametrize(
