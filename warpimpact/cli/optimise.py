@@ -65,7 +65,9 @@ def _optimise(arguments: argparse.Namespace) -> int:
             crew=crew,
             resume=arguments.resume,
             overwrite=arguments.overwrite,
-            progress=lambda now: show(Step(now.done, now.total, 0, _running(now))),
+            progress=lambda now: show(
+                Step(now.done, now.total, now.resumed, _running(now), certain=now.certain, now=now.what)
+            ),
         )
     dataset = front.read(output)
     print("\n".join(front_lines(dataset)))
@@ -79,4 +81,4 @@ def _running(now: "SearchProgress") -> str:
     parts = [f"{now.front} on the front"]
     if math.isfinite(now.hypervolume):
         parts.append(f"hypervolume {now.hypervolume:.4f}")
-    return ", ".join(parts + ([now.what] if now.what else []))
+    return ", ".join(parts)

@@ -20,6 +20,7 @@ _SHORT_PILOT = 2.0
 """Seconds for which a pilot works without a word."""
 _BAR = "{l_bar}{bar:20}{r_bar}"
 """Of a terminal: a bar of one width, as estimates beside it would leave it one character."""
+_BAR_OF_MOST = "{l_bar}{bar:20}| {n_fmt}/{total_fmt} at most [{elapsed}, {rate_fmt}{postfix}]"
 
 
 _quiet = False
@@ -65,6 +66,8 @@ class Step(NamedTuple):
         resumed: how many of those an earlier computation had done, which tell nothing of the rate.
         text: what else there is to say.
         before: what is under way before the first one is computed; its time does not count in the rate.
+        certain: whether `total` will be computed; else it is the most, and the time that is left is not known.
+        now: which part is under way, from the start on.
     """
 
     done: int
@@ -72,6 +75,13 @@ class Step(NamedTuple):
     resumed: int = 0
     text: str = ""
     before: str = ""
+    certain: bool = True
+    now: str = ""
+
+    @property
+    def words(self) -> str:
+        """All that there is to say."""
+        return ", ".join(filter(None, (self.text, self.now)))
 
 
 @contextmanager
@@ -89,13 +99,15 @@ def show_progress(unit: str = "hit") -> Iterator[Callable[[Step], None]]:
         return
     from tqdm import tqdm
 
-    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR) as bar:
+    with tqdm(unit=unit, dynamic_ncols=True, bar_format=_BAR, miniters=0) as bar:
 
         def show(step: Step) -> None:
+            bar.bar_format = _BAR if step.certain else _BAR_OF_MOST
             if step.before or bar.total is None or _another(step, int(bar.n), int(bar.total)):
                 bar.reset(step.total)
-                bar.initial = bar.n = step.resumed
-            bar.set_postfix_str(step.before or step.text, refresh=bool(step.before))
+                bar.n = step.resumed
+            bar.initial = step.resumed
+            bar.set_postfix_str(step.before or step.words, refresh=bool(step.before))
             bar.update(max(0, step.done - bar.n))
 
         yield show
@@ -136,13 +148,14 @@ class _Log:
         print(line, file=sys.stderr, flush=True)
 
     def _line(self, step: Step, elapsed: float) -> str:
-        line, fresh = f"{step.done} of {step.total} {self._unit}s", step.done - step.resumed
+        most = "" if step.certain else "at most "
+        line, fresh = f"{step.done} of {most}{step.total} {self._unit}s", step.done - step.resumed
         if fresh <= 0:
-            return line
+            return f"{line}; {step.now}".removesuffix("; ")
         if elapsed <= 0.0:
-            return f"{line}; {step.text}".removesuffix("; ")
-        left = (step.total - step.done) * elapsed / fresh
-        return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s, {left:.0f} s left; {step.text}".removesuffix("; ")
+            return f"{line}; {step.words}".removesuffix("; ")
+        left = f", {(step.total - step.done) * elapsed / fresh:.0f} s left" if step.certain else ""
+        return f"{line}, {fresh / elapsed:.4g} {self._unit}s/s{left}; {step.words}".removesuffix("; ")
 
 
 @contextmanager

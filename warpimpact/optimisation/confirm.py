@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpimpact.campaign.text import CampaignError
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import Job, campaign_of
+from warpimpact.optimisation.evaluate import Job, Told, campaign_of
 from warpimpact.optimisation.judged import Record, excesses, interval, means, numbers_of, objectives
 from warpimpact.optimisation.measures import AREAL_DENSITY
 from warpimpact.optimisation.search import Searched
@@ -58,16 +58,18 @@ class Confirmed:
     survival: Array
 
 
-def confirm(design: Design, work: Work, found: Searched, follow: Callable[[str], None]) -> Confirmed:
+Follow = Callable[[int, int, str], object]
+"""Called with how many targets are done, how many there are, and what is computed of them."""
+
+
+def confirm(design: Design, work: Work, found: Searched, follow: Follow) -> Confirmed:
     """Compute the front, its solid plates and the references with fresh hits at standard."""
     numbers = spread(found.front, design.search.confirmed)
     chosen = [found.records[int(number)] for number in numbers]
     others = [_reference(design, place) for place in range(len(design.references))]
-    follow(f"{len(chosen)} designs of the front with fresh hits")
-    records, places, draws = _fresh(design, work, [*chosen, *others])
-    follow("solid plates of the same weight")
-    solids = _solids(design, work, records[: len(chosen)])
+    records, places, draws = _fresh(design, work, [*chosen, *others], follow)
     front = records[: len(chosen)]
+    solids = _solids(design, work, front, follow)
     kept, leaders = _kept(design, front), groups(design, front)
     return Confirmed(
         numbers=numbers,
@@ -118,7 +120,14 @@ def check_references(design: Design) -> None:
         _reference(design, place)
 
 
-def _fresh(design: Design, work: Work, targets: Sequence[Record]) -> tuple[list[Record], Array, list[Array]]:
+def _telling(follow: Follow, targets: int, jobs: int, what: str) -> Told:
+    """Tells of jobs, as many of each target, how many targets are done."""
+    return lambda done: follow(int(targets * done / jobs), targets, what)
+
+
+def _fresh(
+    design: Design, work: Work, targets: Sequence[Record], follow: Follow
+) -> tuple[list[Record], Array, list[Array]]:
     """Targets with fresh hits, where these lie, and the draws of a posterior that they took."""
     seed, count = fresh_seed(design), design.search.confirm_hits if design.keys else 1
     threats = range(len(design.threats))
@@ -127,8 +136,10 @@ def _fresh(design: Design, work: Work, targets: Sequence[Record]) -> tuple[list[
         empty = np.zeros((len(threats), 0, count))
         found = [Record(one.values, one.tables, one.areal_density, ("",) * len(threats), empty) for one in targets]
         return found, np.zeros((len(targets), 2, 0)), [np.zeros(0)] * len(targets)
-    levels = work.levels(asked)
-    said = work.said([Job(*_of(job), level, seed) for job, level in zip(asked, levels, strict=True)])
+    whose = "the front and references" if design.references else "the front"
+    levels = work.levels(asked, _telling(follow, len(targets), len(asked), f"pilots for fresh hits of {whose}"))
+    jobs = [Job(*_of(job), level, seed) for job, level in zip(asked, levels, strict=True)]
+    said = work.said(jobs, _telling(follow, len(targets), len(jobs), f"fresh hits of {whose}"))
     records = []
     for number, one in enumerate(targets):
         own = slice(number * len(threats), (number + 1) * len(threats))
@@ -150,7 +161,7 @@ def _of(job: Job) -> tuple[Any, int, int, int]:
     return job.tables, job.threat, job.first, job.count
 
 
-def _solids(design: Design, work: Work, front: Sequence[Record]) -> list[Record]:
+def _solids(design: Design, work: Work, front: Sequence[Record], follow: Follow) -> list[Record]:
     """The solid plate of the areal density of every design of the front."""
     if not design.keys or not front:
         return list(front)
@@ -159,7 +170,8 @@ def _solids(design: Design, work: Work, front: Sequence[Record]) -> list[Record]
         for one in front
         for threat, level in enumerate(one.levels)
     ]
-    said, threats = work.said(jobs), len(design.threats)
+    said = work.said(jobs, _telling(follow, len(front), len(jobs), "solid plates of the same weight"))
+    threats = len(design.threats)
     return [
         Record(
             values=one.values,

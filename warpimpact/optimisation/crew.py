@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import Job, Said, level_of, said_by
+from warpimpact.optimisation.evaluate import Job, Said, Told, level_of, said_by, untold
 from warpimpact.results.interrupts import stop_if_asked
 from warpimpact.runs.cluster import LISTEN_EVERY, check_alike, connected
 from warpimpact.runs.describe import made_by
@@ -23,13 +23,13 @@ class Crew:
     """Computes jobs; the results are those of any other crew of the same kind.
 
     Attributes:
-        said: what jobs say, in their order.
-        levels: what the pilots of jobs find.
+        said: what jobs say, in their order; tells how many are done.
+        levels: what the pilots of jobs find; tells, too.
         made_by: versions and kind of device, which decide the bits.
     """
 
-    said: Callable[[Design, Sequence[Job]], list[Said]]
-    levels: Callable[[Design, Sequence[Job]], list[str]]
+    said: Callable[[Design, Sequence[Job], Told], list[Said]]
+    levels: Callable[[Design, Sequence[Job], Told], list[str]]
     made_by: dict[str, str]
 
 
@@ -40,18 +40,19 @@ def local_crew(device: str) -> Crew:
         DeviceError: the device is absent.
     """
 
-    def said(design: Design, jobs: Sequence[Job]) -> list[Said]:
+    def said(design: Design, jobs: Sequence[Job], told: Told) -> list[Said]:
         found: list[Said] = []
         for some in parts(jobs):
             stop_if_asked()
-            found += said_by(design, some, device)
+            found.extend(said_by(design, some, device, told=lambda done: told(len(found) + done)))
         return found
 
-    def levels(design: Design, jobs: Sequence[Job]) -> list[str]:
-        found = []
+    def levels(design: Design, jobs: Sequence[Job], told: Told) -> list[str]:
+        found: list[str] = []
         for job in jobs:
             stop_if_asked()
-            found.append(level_of(design, job, device))
+            told(len(found))
+            found.append(level_of(design, job, device, lambda level: told(len(found))))
         return found
 
     return Crew(said, levels, made_by(device))
@@ -74,22 +75,26 @@ def cluster_crew(*, address: str | None = None, workers: int | None = None, devi
     """
     with connected(address, workers) as (reached, executor, threads):
 
-        def each(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]]) -> list[Any]:
-            futures = [reached.asked(executor.submit, function, *call) for call in calls]
+        def each(function: Callable[..., Any], calls: Sequence[tuple[Any, ...]], told: Told = untold) -> list[Any]:
+            futures, ended = [reached.asked(executor.submit, function, *call) for call in calls], []
             try:
-                return [awaited(future, LISTEN_EVERY, reached.threads) for future in futures]
+                for future in futures:
+                    ended.append(awaited(future, LISTEN_EVERY, reached.threads))
+                    told(len(ended))
+                return ended
             finally:
                 for future in futures:
                     future.cancel()
 
         (kind,) = each(made_by, [(device,)])
 
-        def said(design: Design, jobs: Sequence[Job]) -> list[Said]:
-            of_parts = each(_said_alike, [(design, some, device, threads, kind) for some in parts(jobs)])
+        def said(design: Design, jobs: Sequence[Job], told: Told) -> list[Said]:
+            calls = [(design, some, device, threads, kind) for some in parts(jobs)]
+            of_parts = each(_said_alike, calls, lambda done: told(min(done * TOGETHER, len(jobs))))
             return [one for some in of_parts for one in some]
 
-        def levels(design: Design, jobs: Sequence[Job]) -> list[str]:
-            return each(level_of, [(design, job, device) for job in jobs])
+        def levels(design: Design, jobs: Sequence[Job], told: Told) -> list[str]:
+            return each(level_of, [(design, job, device) for job in jobs], told)
 
         yield Crew(said, levels, kind)
 

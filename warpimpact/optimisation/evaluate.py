@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -101,31 +102,47 @@ def hits_of(campaign: Campaign, first: int, count: int) -> Shots:
     return sampler.shots(first * sampler.images, count * sampler.images)[:: sampler.images]
 
 
-def said_by(design: Design, jobs: Sequence[Job], device: str = "auto", threads: int | None = None) -> list[Said]:
+Told = Callable[[float], object]
+"""Called with how many jobs are done, parts of jobs included, by any thread."""
+
+
+def untold(done: float) -> None:
+    """Nobody asks how many jobs are done."""
+
+
+def said_by(
+    design: Design, jobs: Sequence[Job], device: str = "auto", threads: int | None = None, told: Told = untold
+) -> list[Said]:
     """Compute jobs side by side; what one says depends on nothing but the job.
 
     Raises:
         DeviceError: the device is absent.
     """
     scenes = [_scene_of(design, job) for job in jobs]
-    outcomes, seconds = _marched([job.level for job in jobs], scenes, Worker(device, threads))
-    said = []
-    for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
-        table = narrow_table(scene, shots, one, EFFECT_VARIABLES)
-        draws = np.zeros(0) if shots.posterior_draw is None else shots.posterior_draw
-        places = np.array([shots.hit_y, shots.hit_z])
-        said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
     limits = [
         (number, row)
         for number, job in enumerate(jobs)
         for row, key in enumerate(design.keys)
         if key.is_limit and not (job.solid and key.layer)
     ]
+    steps = 1 + len(limits)
+    outcomes, seconds = _marched(
+        [job.level for job in jobs], scenes, Worker(device, threads), lambda share: told(share * len(jobs) / steps)
+    )
+    said = []
+    for one, (_, scene, shots) in zip(outcomes, scenes, strict=True):
+        table = narrow_table(scene, shots, one, EFFECT_VARIABLES)
+        draws = np.zeros(0) if shots.posterior_draw is None else shots.posterior_draw
+        places = np.array([shots.hit_y, shots.hit_z])
+        said.append(Said(said_of(design, table), places, draws, seconds / len(jobs)))
+    ended = count(1)
 
     def limit(which: int, worker: Worker, _: Any) -> Array:
         number, row = limits[which]
         numerics = Numerics.model_validate_json(jobs[number].level)
-        return limits_said(*scenes[number][1:], design.keys[row], numerics, worker)
+        values = limits_said(*scenes[number][1:], design.keys[row], numerics, worker)
+        told((1 + next(ended)) * len(jobs) / steps)
+        return values
 
     for (number, row), values in zip(limits, side_by_side(limit, len(limits), Worker(device, threads)), strict=True):
         said[number].values[row] = values
@@ -139,15 +156,22 @@ def _scene_of(design: Design, job: Job) -> tuple[Campaign, Scene, Shots]:
 
 
 def _marched(
-    levels: Sequence[str], scenes: Sequence[tuple[Campaign, Scene, Shots]], worker: Worker
+    levels: Sequence[str], scenes: Sequence[tuple[Campaign, Scene, Shots]], worker: Worker, told: Told
 ) -> tuple[list[Outcomes], float]:
-    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took."""
+    """Outcomes of the shots of scenes, each with its numerics as JSON, and the processor time [s] that they took; tells
+    the share of the shots that are done."""
     found: dict[int, Outcomes] = {}
-    begin = time.process_time()
+    begin, total = time.process_time(), sum(len(shots) for *_, shots in scenes)
     for level in dict.fromkeys(levels):
         numerics = Numerics.model_validate_json(level)
         same = [number for number, one in enumerate(levels) if one == level]
-        found |= zip(same, simulate_many([scenes[number][1:] for number in same], numerics, worker), strict=True)
+        before = sum(len(scenes[number][2]) for number in found)
+
+        def progress(done: int, _: int, before: int = before) -> None:
+            told((before + done) / total)
+
+        some = simulate_many([scenes[number][1:] for number in same], numerics, worker, progress)
+        found |= zip(same, some, strict=True)
     return [found[number] for number in range(len(scenes))], time.process_time() - begin
 
 
@@ -185,18 +209,21 @@ def _effects(
     return of
 
 
-def level_of(design: Design, job: Job, device: str = "auto") -> str:
+def level_of(
+    design: Design, job: Job, device: str = "auto", trying: Callable[[int], object] = lambda level: None
+) -> str:
     """The numerics, as JSON, that a pilot finds for a job; those of the campaign where it fixes a resolution.
 
     Args:
         job: its `level` is the fidelity that is asked for, where the campaign does not fix a resolution.
+        trying: as in `pilot_of`.
     """
     campaign = campaign_of(design, job.tables, design.threats[job.threat], job.seed)
     if campaign.numerics.explicit is not None:
         return campaign.numerics.model_dump_json()
     asked = campaign.numerics.model_copy(update={"fidelity": job.level, "accuracy": None})
     shots, worker = hits_of(campaign, 0, pilot_size(asked.asked)), Worker(device)
-    found = [limits_level(campaign.scene, shots, key, asked, worker) for key in design.keys if key.is_limit]
+    found = [limits_level(campaign.scene, shots, key, asked, worker, trying) for key in design.keys if key.is_limit]
     if len(found) < len(design.keys):
-        found.append(pilot_of(campaign.scene, shots, asked, worker).numerics)
+        found.append(pilot_of(campaign.scene, shots, asked, worker, trying).numerics)
     return max(found, key=lambda one: one.level or 0).model_dump_json()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,7 +47,9 @@ def limits_said(scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker
     return np.asarray(scene.target.areal_density + layer.areal_density * (value / layer.thickness - 1.0))
 
 
-def limits_level(scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker: Worker) -> Numerics:
-    """The numerics that a pilot finds for a limit."""
+def limits_level(
+    scene: Scene, shots: Shots, key: Key, numerics: Numerics, worker: Worker, trying: Callable[[int], object]
+) -> Numerics:
+    """The numerics that a pilot finds for a limit; `trying` is as in `pilot_of`."""
     some = shots[: limits_pilot_size(numerics.asked)]
-    return pilot_of_limits(scene, some, sought_by(scene, key), numerics, worker).numerics
+    return pilot_of_limits(scene, some, sought_by(scene, key), numerics, worker, trying).numerics

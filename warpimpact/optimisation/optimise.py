@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -92,9 +93,9 @@ def _found(design: Design, crew: Crew, store: Store | None, follow: Follow) -> x
         follow(now)
 
     found = search(design, work, kept)
-    confirmed = confirm(design, work, found, lambda what: follow(_with(last[-1], what)))
+
+    def confirming(done: int, total: int, what: str) -> None:
+        follow(replace(last[-1], done=done, total=total, resumed=0, what=what))
+
+    confirmed = confirm(design, work, found, confirming)
     return to_dataset(design, found, confirmed, crew.made_by)
-
-
-def _with(now: SearchProgress, what: str) -> SearchProgress:
-    return SearchProgress(now.done, now.total, now.resumed, now.front, now.hypervolume, what)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,8 +34,9 @@ class SearchProgress:
     """How far a search is.
 
     Attributes:
-        done, total: designs that are computed; `total` is the most.
-        resumed: hits of designs that an earlier call had computed, as a number of designs.
+        done, total: designs that are computed, at the end with fresh hits.
+        certain: whether `total` will be reached; else it is the most.
+        resumed: of `done`, those that an earlier call had computed.
         front: designs on the front.
         hypervolume: of the front up to a tenth beyond the worst values of the first generation, in units of the box
             between its best and worst values; NaN before there is one.
@@ -44,6 +45,7 @@ class SearchProgress:
 
     done: int
     total: int
+    certain: bool
     resumed: int
     front: int
     hypervolume: float
@@ -83,13 +85,21 @@ def search(design: Design, work: Work, follow: Follow = lambda now: None) -> Sea
         CampaignError: no design keeps the constraints; the message names the one that rules them out.
     """
     state = _State(design, work, follow)
-    for points, tell in _generations(design):
-        state.generation(points)
-        if state.done >= design.search.designs or state.idle >= IDLE:
-            break
-        tell(*state.told(points))
+    if design.space.size <= design.search.designs:
+        every = state.feasible(design.space.points())
+        state.total, state.certain = len(every), True
+        for first in range(0, len(every), design.search.population):
+            state.generation(every[first : first + design.search.population])
+    else:
+        for points, tell in _generations(design):
+            state.generation(points)
+            if state.done >= design.search.designs or state.idle >= IDLE:
+                break
+            tell(*state.told(points))
     if not state.records:
         raise CampaignError(f"{design.name}: {state.why_none()}")
+    state.total, state.certain = state.done, True
+    state.tell("")
     return state.searched()
 
 
@@ -99,11 +109,6 @@ Tell = Callable[[Array, Array], None]
 def _generations(design: Design) -> Iterator[tuple[list[Array], Tell]]:
     """Points of the space, with a function that takes what became of them."""
     space, plan = design.space, design.search
-    if space.size <= plan.designs:
-        every = list(space.points())
-        for first in range(0, len(every), plan.population):
-            yield every[first : first + plan.population], lambda told, broken: None
-        return
     searcher = Searcher(space, len(design.objectives), 1 + len(design.bounds), plan.population, plan.seed)
     while asked := searcher.ask():
         yield [space.at(one) for one in asked], searcher.tell
@@ -115,7 +120,9 @@ class _State:
 
     Attributes:
         records: designs that are computed; front: those on the front, in that order.
+        drafts: designs that keep the constraints and are not yet computed.
         refused: designs that break a constraint.
+        total, certain, resumed: as of `SearchProgress`.
     """
 
     design: Design
@@ -123,11 +130,17 @@ class _State:
     follow: Follow
     records: dict[bytes, Record] = field(default_factory=dict)
     front: list[Record] = field(default_factory=list)
+    drafts: dict[bytes, Record] = field(default_factory=dict)
     refused: dict[bytes, Checked] = field(default_factory=dict)
     pilots: list[tuple[Array, int, str]] = field(default_factory=list)
     history: list[tuple[int, float]] = field(default_factory=list)
     box: tuple[Array, Array] | None = None
     idle: int = 0
+    certain: bool = False
+    resumed: int = 0
+
+    def __post_init__(self) -> None:
+        self.total = int(min(self.design.search.designs, self.design.space.size))
 
     @property
     def done(self) -> int:
@@ -138,22 +151,38 @@ class _State:
         new: dict[bytes, Record] = {}
         for values in points:
             key = values.tobytes()
-            if key in self.records or key in self.refused or key in new:
+            if key in self.records or key in new:
                 continue
             if self.done + len(new) == self.design.search.designs:
                 break
-            tables = self.design.tables(values)
-            found = checked(self.design, tables)
-            if found.violations or found.campaign is None:
-                self.refused[key] = found
-                continue
-            threats, effects = len(self.design.threats), len(self.design.keys)
-            nothing = np.zeros((threats, effects, 0))
-            new[key] = Record(values, tables, found.campaign.target.areal_density, (), nothing)
+            if self.feasible([values]):
+                new[key] = self.drafts.pop(key)
         self.idle = 0 if new else self.idle + 1
         if new:
+            before = self.work.computed
             self._compute(new)
+            self.resumed += len(new) if self.work.computed == before else 0
             self._measure()
+
+    def feasible(self, points: Iterable[Array]) -> list[Array]:
+        """Those points that keep the constraints."""
+        found = []
+        for values in points:
+            key = values.tobytes()
+            if key not in self.drafts and key not in self.refused:
+                self._check(key, values)
+            if key in self.drafts:
+                found.append(values)
+        return found
+
+    def _check(self, key: bytes, values: Array) -> None:
+        tables = self.design.tables(values)
+        found = checked(self.design, tables)
+        if found.violations or found.campaign is None:
+            self.refused[key] = found
+            return
+        nothing = np.zeros((len(self.design.threats), len(self.design.keys), 0))
+        self.drafts[key] = Record(values, tables, found.campaign.target.areal_density, (), nothing)
 
     def _compute(self, new: dict[bytes, Record]) -> None:
         """Hits of designs, from rung to rung for those that may be on the front."""
@@ -163,7 +192,6 @@ class _State:
             new[key] = Record(one.values, one.tables, one.areal_density, of_threats, one.said)
         going, before = list(new), 0
         for hits in self.design.search.rungs if self.design.keys else [self.design.search.hits]:
-            self._tell(f"{len(going)} designs at {hits} hits", len(new))
             for key, record in zip(going, self._more([new[key] for key in going], before, hits), strict=True):
                 new[key] = record
             best = [record for record in self.front if record.hits >= hits]
@@ -185,7 +213,8 @@ class _State:
             for one in records
             for threat, level in enumerate(one.levels)
         ]
-        said, threats = self.work.said(jobs), len(design.threats)
+        what, threats = f"{len(records)} designs at {stop} hits", len(design.threats)
+        said = self.work.said(jobs, lambda done: self.tell(f"{what}, {done / len(jobs):.0%}"))
         found = []
         for number, one in enumerate(records):
             own = said[number * threats : (number + 1) * threats]
@@ -204,8 +233,7 @@ class _State:
                 if not any(of == threat and _near(place, centre) for centre, of in centres):
                     centres.append((place, threat))
                     jobs.append(Job(one.tables, threat, 0, 0, FIDELITY, self.design.search.seed))
-        self._tell(f"{len(jobs)} pilots", 0)
-        found = self.work.levels(jobs)
+        found = self.work.levels(jobs, lambda done: self.tell(f"{done:.0f} of {len(jobs)} pilots"))
         self.pilots += [(*centre, level) for centre, level in zip(centres[len(self.pilots) :], found, strict=True)]
         return [tuple(self._nearest(place, threat) for threat in range(len(self.design.threats))) for place in places]
 
@@ -239,7 +267,7 @@ class _State:
                 low, high = np.min(finite, axis=0), np.max(finite, axis=0)
                 self.box = high, np.where(high > low, high - low, np.maximum(np.abs(high), 1.0))
         self.history.append((self.done, self._volume()))
-        self._tell("", 0)
+        self.tell("")
 
     def _volume(self) -> float:
         if self.box is None or not self.front:
@@ -263,10 +291,11 @@ class _State:
         told = np.array(rows)
         return told[:, :count], told[:, count:]
 
-    def _tell(self, what: str, under: int) -> None:
-        plan, last = self.design.search, self.history[-1][1] if self.history else math.nan
-        total = int(min(plan.designs, self.design.space.size))
-        self.follow(SearchProgress(self.done, total, self.work.resumed, len(self.front), last, what))
+    def tell(self, what: str) -> None:
+        """Say how far the search is, and what is computed."""
+        volume = self.history[-1][1] if self.history else math.nan
+        told = (self.done, self.total, self.certain, self.resumed, len(self.front), volume)
+        self.follow(SearchProgress(*told, what))
 
     def why_none(self) -> str:
         """Which constraint rules out all designs that were tried."""

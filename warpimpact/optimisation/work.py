@@ -13,45 +13,61 @@ from numpy.typing import NDArray
 
 from warpimpact.optimisation.crew import Crew
 from warpimpact.optimisation.design import Design
-from warpimpact.optimisation.evaluate import Job, Said
+from warpimpact.optimisation.evaluate import Job, Said, Told
 from warpimpact.runs.store import Store
 
 
 class Work:
-    """Computes what a search asks for, or takes it from the disk."""
+    """Computes what a search asks for, or takes it from the disk.
+
+    Attributes:
+        computed: jobs that were not on the disk.
+    """
 
     def __init__(self, design: Design, crew: Crew, store: Store | None) -> None:
         self._design, self._crew, self._store = design, crew, store
-        self._batch, self.resumed = 0, 0
+        self._batch, self.computed = 0, 0
 
-    def said(self, jobs: Sequence[Job]) -> list[Said]:
+    def said(self, jobs: Sequence[Job], told: Told) -> list[Said]:
         """What jobs say; one batch."""
+        if jobs:
+            told(0)
+        found = self._said(jobs, told)
+        if jobs:
+            told(len(jobs))
+        return found
+
+    def _said(self, jobs: Sequence[Job], told: Told) -> list[Said]:
         seal = _seal(jobs)
         stored = self._load(seal)
         if stored is None:
-            found = self._crew.said(self._design, jobs)
+            found = self._crew.said(self._design, jobs, told)
+            self.computed += len(jobs)
             arrays = {
                 f"{name}_{k}": np.asarray(part) for k, one in enumerate(found) for name, part in one._asdict().items()
             }
             self._save(seal, arrays)
             return found
-        self.resumed += len(jobs)
         return [
             Said(stored[f"values_{k}"], stored[f"places_{k}"], stored[f"draws_{k}"], float(stored[f"seconds_{k}"]))
             for k, _ in enumerate(jobs)
         ]
 
-    def levels(self, jobs: Sequence[Job]) -> list[str]:
+    def levels(self, jobs: Sequence[Job], told: Told) -> list[str]:
         """What the pilots of jobs find; one batch."""
         if not jobs:
             return []
+        told(0)
         seal = _seal(jobs)
         stored = self._load(seal)
         if stored is None:
-            found = self._crew.levels(self._design, jobs)
+            found = self._crew.levels(self._design, jobs, told)
+            self.computed += len(jobs)
             self._save(seal, {"levels": np.array(found)})
-            return found
-        return [str(one) for one in stored["levels"]]
+        else:
+            found = [str(one) for one in stored["levels"]]
+        told(len(jobs))
+        return found
 
     def _load(self, seal: str) -> dict[str, NDArray[Any]] | None:
         batch, self._batch = self._batch, self._batch + 1

@@ -2,12 +2,14 @@
 
 import io
 import math
+import re
 import sys
+import time
 from dataclasses import replace
 
 import pytest
 
-from warpimpact.cli.progress import show_run
+from warpimpact.cli.progress import Step, show_progress, show_run
 from warpimpact.results.measures import Estimate, Measure
 from warpimpact.runs.progress import RunProgress
 from warpimpact.scene import Numerics
@@ -115,6 +117,40 @@ def test_a_log_says_what_a_pilot_tries_and_counts_no_time_of_it(
     assert sum("level 4" in line for line in lines) < 10
     assert [line for line in lines if line.startswith("0 of")] == ["0 of 1000 hits"]
     assert lines[-1].startswith("400 of 1000 hits, 100 hits/s, 6 s left; ")
+
+
+def test_what_may_end_early_tells_no_time_that_is_left(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:
+    with show_progress("design") as show:
+        show(Step(0, 6, certain=False, text="0 on the front", now="2 of 3 pilots"))
+        clock[0] += 10.0
+        show(Step(2, 6, certain=False, text="1 on the front", now="6 designs at 64 hits"))
+        show(Step(2, 2, text="1 on the front"))
+        clock[0] += 5.0
+        show(Step(0, 2, now="solid plates"))
+        clock[0] += 5.0
+        show(Step(1, 2, now="solid plates"))
+    assert capsys.readouterr().err.splitlines() == [
+        "0 of at most 6 designs; 2 of 3 pilots",
+        "2 of at most 6 designs, 0.2 designs/s; 1 on the front, 6 designs at 64 hits",
+        "2 of 2 designs; 1 on the front",
+        "0 of 2 designs; solid plates",
+        "1 of 2 designs, 0.2 designs/s, 5 s left; solid plates",
+    ]
+
+
+def test_a_terminal_tells_the_part_that_is_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with show_progress("design") as show:
+        show(Step(0, 6, certain=False, now="16 hits"))
+        for done, now in ((3, "16 hits"), (3, "64 hits")):
+            time.sleep(0.15)  # a bar is drawn anew at most ten times a second
+            show(Step(done, 6, certain=False, now=now))
+        assert re.search(r" 3/6 at most \[[^<]*, 64 hits]", terminal.getvalue())
+        show(Step(0, 7, now="solid plates"))
+        time.sleep(0.15)
+        show(Step(0, 7, now="solid plates"))
+        assert re.search(r" 0/7 \[00:00<.*, solid plates]", terminal.getvalue())
 
 
 def test_a_short_pilot_says_nothing(capsys: pytest.CaptureFixture[str], clock: list[float]) -> None:

@@ -22,6 +22,7 @@ from warpimpact.optimisation.crew import cluster_crew, local_crew
 from warpimpact.optimisation.design import design_from, read_design
 from warpimpact.optimisation.judged import Record, excesses, objectives, undecided
 from warpimpact.optimisation.optimise import folder_of, optimise, optimise_to_file
+from warpimpact.optimisation.search import SearchProgress
 from warpimpact.optimisation.searcher import Searcher, front_of, hypervolume
 from warpimpact.optimisation.space import Space, Variable
 from warpimpact.optimisation.text import front_lines
@@ -79,6 +80,41 @@ def test_a_space_of_one_point_returns_it(thickness: str) -> None:
     assert 'thickness = "4 mm"' in str(found[f.CAMPAIGN].values[0])
 
 
+def test_a_space_is_searched_whole_and_its_progress_is_that_of_what_keeps_the_constraints() -> None:
+    """140 points of 151 break the constraint, more in a row than a search waits for."""
+    told: list[SearchProgress] = []
+    reference = '[[references]]\nname = "thin"\nplate = { thickness = "3 mm", resistance = "2600 MPa" }\n'
+    least = "[constraints]\nsmallest_areal_density = 76.8\n"  # 9.78 mm
+    thickness = '[variables]\nthickness = { low = "7 mm", high = "10 mm", step = "0.02 mm" }\n'
+    few = SEARCH.replace("designs = 12", "designs = 400").replace("population = 6", "population = 4")
+    found = optimise(design(thickness, WEIGHT_AND_ENERGY, least, reference, few), progress=told.append)
+    feasible = found.sizes["design"]
+    assert feasible == 11
+    assert found.attrs[f.REFUSED] == 140
+    assert all(now.certain and now.done <= now.total for now in told)
+    searching = [now for now in told if not now.what.endswith(("of the front and references", "of the same weight"))]
+    assert {now.total for now in searching} == {feasible}
+    assert [now.done for now in searching] == sorted(now.done for now in searching)
+    assert searching[-1].done == feasible
+    for what, targets in (
+        ("pilots for fresh hits of the front and references", feasible + 1),
+        ("fresh hits of the front and references", feasible + 1),
+        ("solid plates of the same weight", feasible),
+    ):
+        of_phase = [now for now in told if now.what == what]
+        assert {now.total for now in of_phase} == {targets}
+        assert {0, targets} < {now.done for now in of_phase}  # and between them
+
+
+def test_a_search_that_may_end_early_tells_the_most_designs() -> None:
+    told: list[SearchProgress] = []
+    optimise(design(THICKNESS, WEIGHT_AND_ENERGY, SEARCH), progress=told.append)
+    over = next(number for number, now in enumerate(told) if now.certain)
+    assert {now.total for now in told[:over]} == {12}
+    assert told[over].done == told[over].total == 12
+    assert any(now.what == "6 designs at 16 hits, 100%" for now in told[:over])
+
+
 def test_a_symmetry_of_the_problem_is_one_of_the_front() -> None:
     """Round holes with exchanged spacings are the same plate, turned."""
     spacings = "".join(f'"plate.pattern.spacing.{axis}" = ["8 mm", "10 mm"]\n' for axis in (0, 1))
@@ -125,7 +161,7 @@ def test_a_killed_search_is_resumed_to_the_same_file(tmp_path: Path) -> None:
         optimise_to_file(read_design(file), killed)
     resumed = []
     optimise_to_file(read_design(file), killed, resume=True, progress=lambda now: resumed.append(now.resumed))
-    assert resumed[-1] > 0
+    assert max(resumed) > 0
     _same(f.read(whole), f.read(killed))
     assert not parts.exists()
 
