@@ -1,16 +1,12 @@
-"""What coarser levels of single settings do to the errors and the cost of a scene.
+"""What coarser levels of single settings do to the errors and the cost of scenes that nobody chose.
 
-On a road of roads.py, at levels of along, around, grid and step that are given:
-
-    python tests/benchmarks/coarser.py --road "30 degrees" 2,2,2,2 5,3,2,4
-
-On scenes that nobody chose, at what a pilot for a run of 4096 hits takes without and with trials of coarser settings:
+A pilot for a run of 4096 hits looks for the resolution without and with trials of coarser settings.
 
     python tests/benchmarks/coarser.py --seed 1 --scenes 10             # single plates of random_scenes.py
     python tests/benchmarks/coarser.py --seed 1 --scenes 10 --layers    # targets and bursts of random_layers.py
 
-Errors are those of 90 % of the hits, against level 7, or 8 on roads and behind layers; the change from the level before
-is their uncertainty. A pilot of a single plate may end at level 7 itself, whose error is then unknown. Behind layers
+Errors are those of 90 % of the hits, against level 7, or 8 behind layers; the change from the level before is their
+uncertainty. A pilot of a single plate may end at level 7 itself, whose error is then unknown. Behind layers
 those that the promise counts stand beside them: over 1 m/s + 0.2 % and over 1° + 2 %. Times are processor time of one
 core. The resolutions of a scene are timed in turn, and the least round counts.
 """
@@ -26,22 +22,20 @@ from typing import Any
 import numpy as np
 from random_layers import broken, counted, drawn, errors
 from random_scenes import RUN, Case, draw
-from roads import ROADS, ROUNDS, Road, campaign_of, scene_and_shots
+from roads import ROUNDS, Road
 
 from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import PRESETS, Coarser, Numerics, Scene, Shots
+from warpimpact.scene import PRESETS, Numerics, Scene, Shots
 from warpimpact.solver.pilot import pilot_size
-from warpimpact.solver.resolution import at_level
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
 NAME = "standard"
-ROAD_HITS = 192
 ANSWER, HITS = 7, 96
 """Level of LADDER behind the answer on a single plate, and hits."""
 ANSWER_LAYERED, HITS_LAYERED = 8, 48
-"""Likewise on a road and behind layers."""
+"""The same behind layers."""
 
 
 def computed(scene: Scene, shots: Shots, numerics: Numerics) -> Outcomes:
@@ -76,19 +70,6 @@ def said(errors: Sequence[float]) -> str:
     velocity, tilt, depth, status = errors
     behind = "" if math.isnan(depth) else f", {depth:.2f} mm, {status:.1%} end otherwise"
     return f"{velocity:.2f} m/s, {tilt:.2f}°{behind}"
-
-
-def on_a_road(text: str, settings: Sequence[Sequence[int]]) -> None:
-    """Print what settings of along, around, grid and step come to on a road of ROADS."""
-    asked, (scene, shots) = campaign_of(text).numerics, scene_and_shots(text, ROAD_HITS)
-    shots = shots[:ROAD_HITS]  # which are whole bursts
-    resolutions = []
-    for levels in settings:
-        coarser = {name: level for name, level in zip(Coarser.model_fields, levels, strict=True) if level < max(levels)}
-        resolutions.append(at_level(max(levels), asked, **coarser))
-    truth = computed(scene, shots, at_level(ANSWER_LAYERED, asked))
-    for row in measured(scene, shots, resolutions, truth):
-        print(text_of(row), flush=True)
 
 
 def on_a_scene(case: Case, layered: bool) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -138,18 +119,11 @@ def on_scenes(seed: int, scenes: int, layered: bool) -> None:
 def main(argv: Sequence[str] | None = None) -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description="what coarser levels of single settings do to errors and cost")
-    parser.add_argument("--road", help="part of the name of a road of roads.py")
-    parser.add_argument("settings", nargs="*", metavar="ALONG,AROUND,GRID,STEP", help="levels on that road")
     parser.add_argument("--seed", type=int, default=1, help="of scenes that are drawn (default: 1)")
     parser.add_argument("--scenes", type=int, default=10, help="that are drawn (default: 10)")
     parser.add_argument("--layers", action="store_true", help="several layers and bursts, in place of single plates")
     given = parser.parse_args(argv)
-    if given.road is None:
-        return on_scenes(given.seed, given.scenes, given.layers)
-    text = next((text for name, text in ROADS.items() if given.road in name), None)
-    if text is None or not given.settings:
-        parser.error(f"--road: needs settings, and a part of one of {', '.join(ROADS)}")
-    return on_a_road(text, [[int(level) for level in one.split(",")] for one in given.settings])
+    on_scenes(given.seed, given.scenes, given.layers)
 
 
 if __name__ == "__main__":

@@ -45,8 +45,8 @@ from warpimpact.results import posterior_file
 from warpimpact.solver import grid
 from warpimpact.solver.device import cores
 from warpimpact.solver.limit import limits, pilot_of_limits
-from warpimpact.solver.limit_pilot import limits_pilot_size
 from warpimpact.solver.many import simulate_many
+from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
 

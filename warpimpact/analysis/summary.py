@@ -18,7 +18,7 @@ from warpimpact.results import variables as v
 from warpimpact.results.dataset import finer_pair, is_choice, status_codes
 from warpimpact.results.measures import MEASURED, STATUSES, Measure, Tally, dealing, shift_of
 from warpimpact.scene.display import STORED
-from warpimpact.solver.pilot_text import accuracy_text, errors_text
+from warpimpact.solver.findings import accuracy_text, errors_text
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile
 from warpimpact.statistics.shifts import shift_of_mean

@@ -22,9 +22,8 @@ from warpimpact.kernels.status import Status
 from warpimpact.scene import Numerics, Shots
 from warpimpact.scene.model import Model
 from warpimpact.scene.units import Angle, Number, PositiveSpeed
-from warpimpact.solver.pilot import pilot_size
 from warpimpact.solver.prepare import prepare
-from warpimpact.solver.simulate import computed, pilot_of, spread
+from warpimpact.solver.simulate import computed, numerics_for
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.student import student_quantile
@@ -161,7 +160,8 @@ def protect(
     hits = campaign.hits.model_copy(update={"count": directions.max_count})
     sampler = campaign.model_copy(update={"hits": hits}).sampler()
     first = sampler.shots(0, directions.first_count)
-    numerics = _numerics(campaign, Shots.joined([toward(first, directions, cell) for cell in cells]), worker)
+    every = Shots.joined([toward(first, directions, cell) for cell in cells])
+    numerics = numerics_for(campaign.scene, every, campaign.numerics, worker)
     open_, count = list(cells), directions.first_count
     while open_:
         for place, cell in enumerate(open_):
@@ -190,13 +190,6 @@ def toward(shots: Shots, directions: Directions, cell: tuple[int, int]) -> Shots
     return replace(
         shots, obliquity=obliquity(azimuth, elevation) * one, azimuth=impact_azimuth(azimuth, elevation) * one
     )
-
-
-def _numerics(campaign: Campaign, shots: Shots, worker: Worker) -> Numerics:
-    if campaign.numerics.explicit is not None:
-        return campaign.numerics
-    pilot = spread(shots, pilot_size(campaign.numerics.asked))
-    return pilot_of(campaign.scene, pilot, campaign.numerics, worker).numerics
 
 
 def _wanted(campaign: Campaign, passed: Array, directions: Directions) -> bool:

@@ -19,7 +19,7 @@ from warpimpact.solver.limit import (
     pilot_of_limits,
     thickest,
 )
-from warpimpact.solver.limit_pilot import limits_pilot_size
+from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 
 Array = NDArray[np.float64]

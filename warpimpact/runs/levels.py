@@ -46,12 +46,12 @@ def shifts_of(campaign: Campaign, pilot: Shots, found: HitErrors) -> dict[int, t
     that a pilot tried."""
     tilts = [f"mean(tilt@{at!r}m)" for at in campaign.output.standoffs[-1:]]
     measures = [Measure.parse(text) for text in ("mean(residual_velocity)", *tilts)]
-    found_at: dict[int, tuple[float, ...]] = {}
-    for at, *outcomes in found.tried:
-        levels = [_table(campaign, pilot[: len(one)], one) for one in outcomes]
-        assert at.numerics.level is not None
-        found_at[at.numerics.level] = tuple(shift_of(one, (levels[0], levels[1])) or 0.0 for one in measures)
-    return found_at
+    shifts: dict[int, tuple[float, ...]] = {}
+    for errors, *outcomes in found.tried:
+        coarse, fine = (_table(campaign, pilot[: len(each)], each) for each in outcomes)
+        assert errors.numerics.level is not None
+        shifts[errors.numerics.level] = tuple(shift_of(measure, (coarse, fine)) or 0.0 for measure in measures)
+    return shifts
 
 
 def _table(campaign: Campaign, shots: Shots, outcomes: Outcomes) -> Table:

@@ -1,9 +1,10 @@
-"""What changes between two levels of resolution, and what most shots stay within."""
+"""What changes between two levels of resolution, and what that tells of the errors of the coarser one."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from warpimpact.kernels.status import Status
 from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
+from warpimpact.scene import Accuracy, Numerics, Shots
+from warpimpact.solver.findings import HitErrors
 
 Array = NDArray[np.float64]
 
@@ -18,10 +21,85 @@ RISK = 1.0 / 6.0
 """Probability at most that the estimate from the pilot's shots lies below the percentile of all shots that is promised;
 where there are enough shots for that."""
 FEWEST = 1.6
-"""At least so many shots of a pilot lie beyond the promised percentile, in the mean."""
+"""Shots of a pilot that lie beyond the promised percentile, in the mean, at least."""
 SLOW = 0.25
 """Share of the impact velocity below which the error of a speed is weighed as that of the energy, E = m v²/2: in
 proportion to the speed. The energy is computed to some accuracy, so the error of a speed near 0 has no bound."""
+TYPICAL = 0.75
+"""Share of the first shots whose errors tell how errors fall from level to level: the largest few fall by chance."""
+
+
+class Verdict(NamedTuple):
+    """A level by its errors over what is allowed.
+
+    Attributes:
+        kept: whether the level keeps the promise.
+        excess: upper estimate of the largest error over what is allowed.
+        typical: the same of most of the first shots, without a margin for chance: how errors fall from level to level.
+        weighed: the excess by which a level nearly keeps the promise: with the errors of slow cores weighed by their
+            energy, or the median error of limits.
+    """
+
+    kept: bool
+    excess: float
+    typical: float
+    weighed: float
+
+
+def compared(
+    numerics: Numerics,
+    accuracy: Accuracy,
+    outcomes: tuple[Outcomes, Outcomes, Outcomes],
+    margin: float,
+    shots: Shots,
+    free: Sequence[bool],
+) -> tuple[HitErrors, Verdict]:
+    """The errors of numerics, and what they are over what is allowed.
+
+    Args:
+        numerics: of a level, with coarser settings or without.
+        outcomes: of the shots with these numerics; at the level itself, which are the same without coarser settings;
+            and at a finer level.
+        margin: error of the level over its change to the finer one. What it has beyond 1 is what the finer one errs by.
+        free: as in `changes`.
+    """
+    coarse, between, fine = outcomes
+    layered = LAYER_RESIDUAL_VELOCITY in fine
+    relative = _relative(accuracy) if layered else (0.0, 0.0)
+
+    def upper(**how: Any) -> Array:
+        usual: dict[str, Any] = {"at_a_plate": shots.at_a_plate, "share": accuracy.share, "free": free}
+        change = upper_errors(coarse, fine, **usual | how)
+        of_fine = change if coarse is between else upper_errors(between, fine, **usual | how)
+        return change + (margin - 1.0) * of_fine
+
+    excess = _excess(accuracy, upper(relative=relative), layered)
+    typical = _excess(accuracy, upper(relative=relative, share=TYPICAL, risk=0.5), layered)
+    weighed = _excess(accuracy, upper(relative=relative, impact=shots.velocity), layered)
+    status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
+    if status > 1.0 - accuracy.share:
+        typical = math.inf  # shots that end otherwise have no errors, and are those that err most
+    kept = excess <= 1.0 and not status > accuracy.status_share
+    velocity, tilt, depth = (float(error) for error in upper())
+    errors = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
+    return errors, Verdict(kept, excess, typical, weighed)
+
+
+def _relative(accuracy: Accuracy) -> tuple[float, float]:
+    """The relative parts of what is allowed behind layers over the absolute ones."""
+    return accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt
+
+
+def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
+    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers.
+    What is not asked for counts as 0, however large its error is."""
+    velocity, tilt = np.nan_to_num(errors[:2], nan=math.inf)
+    depth = np.nan_to_num(errors[2], nan=0.0) if layered else 0.0
+    allowed = accuracy.residual_velocity, accuracy.tilt, accuracy.depth
+    return max(
+        float(error) / bound if math.isfinite(bound) else 0.0
+        for error, bound in zip((velocity, tilt, depth), allowed, strict=True)
+    )
 
 
 def upper_errors(
@@ -42,11 +120,12 @@ def upper_errors(
 
 
 def upper_error(errors: Array, share: float, plates: NDArray[np.intp] | None = None, risk: float = RISK) -> float:
-    """What a share of the errors, shape [shots], stay within, but for a risk.
+    """The error that a share of the shots stay within, but for a risk.
 
     Args:
-        plates: numbers of the plates that the shots hit, of their shape; None if each has its own. As far as shots at
-            one plate err alike, they count as one in what is known of the percentile.
+        errors: shape [shots].
+        plates: numbers of the plates that the shots hit, shape [shots]; None if each has its own. Shots at one plate
+            count as one as far as they err alike.
     """
     ordered, count = np.sort(errors), float(len(errors))
     if plates is not None:
@@ -57,9 +136,9 @@ def upper_error(errors: Array, share: float, plates: NDArray[np.intp] | None = N
 
 
 def design_effect(values: Array, groups: NDArray[np.intp]) -> float:
-    """How many values tell as much of the mean as one that is independent of the others, where those of a group are
-    alike: the variance of the mean by the sums of groups over that by the values (Kish, Survey Sampling, 1965). By one
-    standard error more than it is found, as there may be few groups, and at least 1; at most the size of a group.
+    """Number of values that tell as much of the mean as an independent one, where values of a group are alike: the
+    variance of the mean by the sums of groups over that by the values (Kish, Survey Sampling, 1965), plus one standard
+    error, as there may be few groups; from 1 to the mean size of a group.
 
     Args:
         values, groups: values and the numbers of their groups, shape [values].
@@ -71,15 +150,14 @@ def design_effect(values: Array, groups: NDArray[np.intp]) -> float:
     if size == 1.0 or number == 1:
         return size
     squares = float(np.square(values - values.mean()).sum())
-    found = float(np.square(sums).sum()) / squares * number / (number - 1) if squares > 0.0 else 1.0
+    effect = float(np.square(sums).sum()) / squares * number / (number - 1) if squares > 0.0 else 1.0
     doubt = math.sqrt(2.0 * (size - 1.0) / (size * (number - 1)))
-    return min(max(1.0, found + doubt), size)
+    return min(max(1.0, effect + doubt), size)
 
 
 def upper_place(count: int, share: float, risk: float = RISK) -> int:
-    """Place of the order statistic of so many shots that lies below the percentile of a share with a probability of at
-    most the risk; the last one, if none does: so many of the shots lie below it, or more, where each does by the
-    share."""
+    """Index, from 1, of the order statistic of `count` shots that exceeds the share's percentile with probability
+    1 − risk (the largest if none does)."""
     below = 0.0
     for place in range(count, 0, -1):
         below += math.comb(count, place) * share**place * (1.0 - share) ** (count - place)
@@ -89,13 +167,13 @@ def upper_place(count: int, share: float, risk: float = RISK) -> int:
 
 
 def fewest(share: float) -> int:
-    """Shots that a pilot needs at least, to tell what a share of all shots stay within."""
+    """Shots that a pilot needs to tell what a share of all shots stay within."""
     return math.ceil(FEWEST / (1.0 - share) - 1e-9)
 
 
 def limit_changes(coarse: Array, fine: Array, share: float) -> tuple[float, float, float]:
-    """The change that a share of the limits stay within, but for RISK; the median change of those that are finite on
-    one level at least; and the median limit."""
+    """The change that a share of the limits stay within, but for RISK; the median change of the limits that are finite
+    at one level at least; and the median limit."""
     same = (coarse == fine) | (np.isnan(coarse) & np.isnan(fine))
     with np.errstate(invalid="ignore"):
         change = np.where(same, 0.0, np.abs(coarse - fine))
@@ -121,17 +199,16 @@ def changes(
     A core that does not leave the target, or a layer, has the speed 0 there; one that comes back has a negative one. A
     tilt that only one of both has counts as half a turn. The first two are infinite where the computation of one alone
     failed. The depth is NaN where the core does not stop in the same layer. At several layers the first two are NaN
-    where the core ends otherwise (`ended_otherwise`), which is an error of its own.
+    where the core ends otherwise (`ended_otherwise`), which is an error by itself.
 
     Args:
         impact: velocities [m/s], shape [shots], to weigh the first two by the energy of slow cores (SLOW).
-        relative: (s/m, 1/rad): an error of a speed v counts as if it were 1 + |v| × the first times smaller, and one of
-            a tilt likewise. So an absolute bound stands for one with a relative part.
+        relative: (s/m, 1/rad): an error of a speed v is divided by 1 + |v| × the first, one of a tilt by 1 + tilt × the
+            second. So an absolute bound stands for one with a relative part.
         free: of each layer, whether residual velocities behind it count; None if all do.
     """
     before, after = _speeds(coarse, free), _speeds(fine, free)
     weight = _weight(before, after, impact)
-    failed = [one.status >= Status.UNFINISHED for one in (coarse, fine)]
     speed = (weight * np.abs(after - before) / (1.0 + relative[0] * np.abs(after))).max(axis=1)
     tilt = np.zeros(len(speed))
     if coarse.tilt.shape[1]:
@@ -143,8 +220,8 @@ def changes(
     if LAYER_RESIDUAL_VELOCITY in coarse:
         other = ended_otherwise(coarse, fine)
         speed, tilt, depth = (np.where(other, math.nan, x) for x in (speed, tilt, np.abs(fine.depth - coarse.depth)))
-    one_failed = failed[0] != failed[1]
-    return np.where(one_failed, math.inf, speed), np.where(one_failed, math.inf, tilt), depth
+    failed = (coarse.status >= Status.UNFINISHED) != (fine.status >= Status.UNFINISHED)
+    return np.where(failed, math.inf, speed), np.where(failed, math.inf, tilt), depth
 
 
 def ended_otherwise(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
@@ -153,8 +230,8 @@ def ended_otherwise(coarse: Outcomes, fine: Outcomes) -> NDArray[np.bool_]:
 
 
 def _speeds(outcomes: Outcomes, free: Sequence[bool] | None) -> Array:
-    """Residual velocities [m/s] behind the target, then behind those of its layers that count; shape [shots, 1 or
-    more]. One that comes back is negative."""
+    """Residual velocities [m/s] behind the target, then behind the layers that count; shape [shots, 1 or more]. One of
+    a core that comes back is negative."""
     back = outcomes.status == Status.RICOCHETED
     speeds = np.where(back, -outcomes.residual_velocity, outcomes.residual_velocity)[:, None]
     if LAYER_RESIDUAL_VELOCITY in outcomes:
@@ -163,8 +240,8 @@ def _speeds(outcomes: Outcomes, free: Sequence[bool] | None) -> Array:
     return np.nan_to_num(speeds)
 
 
-def _weight(one: Array, other: Array, impact: Array | None) -> Array:
-    """What an error between two speeds counts, of their shape."""
+def _weight(before: Array, after: Array, impact: Array | None) -> Array:
+    """Weights of errors between speeds, of their shape."""
     if impact is None:
-        return np.ones_like(one)
-    return np.asarray(np.minimum(1.0, 0.5 * (np.abs(one) + np.abs(other)) / (SLOW * impact[:, None])))
+        return np.ones_like(before)
+    return np.asarray(np.minimum(1.0, 0.5 * (np.abs(before) + np.abs(after)) / (SLOW * impact[:, None])))

@@ -1,16 +1,16 @@
-"""What a pilot finds: a level of resolution, and what its errors are."""
+"""What a pilot finds: the resolution of a run, its errors, and the words for them."""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, Self, TypeAlias
+from decimal import ROUND_CEILING, Context
+from typing import NamedTuple, Self
 
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics
-from warpimpact.solver.pilot_text import errors_text, hits_text, limit_error_text
 
 DEAR = 10.0
 """Times the cost of the first level, from which on the cost of another is announced."""
@@ -21,7 +21,7 @@ class Found:
     """What a pilot found.
 
     Attributes:
-        numerics: the level to compute all shots with.
+        numerics: of the level for all shots, with coarser settings where these do.
         kept: whether the errors are within what was asked for.
         share: of the shots that are within the errors.
         finer: outcomes of the first shots of the pilot at the finer level that it was compared with; None where there
@@ -49,7 +49,7 @@ class Found:
         return f"accuracy {self.errors} for {hits_text(self.share)}{'' if self.kept else ', not as promised'}"
 
 
-class Cost(NamedTuple):
+class LevelCost(NamedTuple):
     """What a shot costs at the level that was found, and at the first one that was tried [s], and the errors there."""
 
     seconds: float
@@ -58,8 +58,7 @@ class Cost(NamedTuple):
     first_errors: str
 
     def announced(self, level: int, shots: int) -> str:
-        """A sentence on the time that some shots will take, where it is DEAR times that of the first level; else
-        empty."""
+        """A sentence on the time that shots will take, where it is DEAR times that of the first level; else empty."""
         times = self.seconds / self.first_seconds
         if times < DEAR:
             return ""
@@ -79,16 +78,16 @@ class HitErrors(Found):
         tilt_error: at the last stand-off [rad].
         depth_error: of the shots that stop in a layer [m]; NaN where none does.
         status_error: share of the shots that end otherwise on a finer level; NaN of a single plate.
-        cost: what the level costs beside the first one that was tried; None if that is not known.
-        shifts: levels that were tried, each with what the numerics may shift the means of a run by.
-        tried: what was found at every level, coarse to fine, with outcomes of shots there and at a finer level.
+        cost: of the level beside the first one that was tried; None if that is not known.
+        shifts: by levels that were tried, what the numerics may shift the means of a run by.
+        tried: levels that were judged, coarse to fine.
     """
 
     residual_velocity_error: float
     tilt_error: float
     depth_error: float = math.nan
     status_error: float = math.nan
-    cost: Cost | None = field(default=None, compare=False)
+    cost: LevelCost | None = field(default=None, compare=False)
     shifts: Mapping[int, tuple[float, ...]] = field(default_factory=dict, compare=False)
     tried: tuple[Tried, ...] = field(default=(), compare=False, repr=False)
 
@@ -101,6 +100,14 @@ class HitErrors(Found):
         return errors_text(
             self.residual_velocity_error, math.degrees(self.tilt_error), self.depth_error, self.status_error
         )
+
+
+class Tried(NamedTuple):
+    """A level that a pilot judged: its errors, and outcomes of the same shots there and at a finer level."""
+
+    errors: HitErrors
+    coarse: Outcomes
+    fine: Outcomes
 
 
 @dataclass(frozen=True)
@@ -122,5 +129,48 @@ class LimitErrors(Found):
         return limit_error_text(self.error, self.quantity)
 
 
-Tried: TypeAlias = tuple[HitErrors, Outcomes, Outcomes]
-"""What was found at a level, and outcomes of shots there and at a finer level."""
+def hits_text(share: float) -> str:
+    """A share of the hits."""
+    return f"{100.0 * share:.3g} % of the hits"
+
+
+def errors_text(velocity: float, tilt: float, depth: float = math.nan, status: float = math.nan) -> str:
+    """Errors of residual velocity [m/s] and tilt [degree]; of depth [m] and of the status, where there is one."""
+    parts = [f"{upper_digits(velocity)} m/s", f"{upper_digits(tilt)} deg"]
+    if not math.isnan(depth):
+        parts.append(f"{upper_digits(1e3 * depth)} mm of depth")
+    if status > 0.0:
+        parts.append(f"the status of {100.0 * status:.2g} % of the hits")
+    return _listed(parts)
+
+
+def limit_error_text(error: float, quantity: str) -> str:
+    """Error of a limit velocity [m/s] or of a limit thickness [m]."""
+    return f"{upper_digits(error)} m/s" if quantity == "velocity" else f"{upper_digits(1e3 * error)} mm"
+
+
+def accuracy_text(asked: Mapping[str, float], *, layered: bool) -> str:
+    """An accuracy, by the names and in the units of `Accuracy`; what it lacks is not asked for."""
+
+    def bound(name: str, unit: str, factor: float = 1.0) -> str:
+        share = asked.get(f"{name}_share", 0.0) if layered else 0.0
+        return f"{factor * asked[name]:g} {unit}" + (f" + {100.0 * share:g} %" if share else "")
+
+    parts = [bound("residual_velocity", "m/s")] if "residual_velocity" in asked else []
+    parts += [bound("tilt", "deg", math.degrees(1.0))] if "tilt" in asked else []
+    if layered and "depth" in asked:
+        parts.append(f"{1e3 * asked['depth']:g} mm of depth")
+    stated = f"{_listed(parts)} for {hits_text(asked['share'])}"
+    if layered and asked.get("status_share", 1.0) < 1.0:
+        stated += f", another status for at most {100.0 * asked['status_share']:g} %"
+    return stated
+
+
+def upper_digits(error: float) -> str:
+    """An error rounded up to two digits, so that one above a bound never reads as if it were at the bound."""
+    up = Context(prec=2, rounding=ROUND_CEILING).create_decimal(f"{error:.9g}")  # nine digits: noise does not count
+    return f"{float(up):g}"
+
+
+def _listed(parts: Sequence[str]) -> str:
+    return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)

@@ -19,9 +19,9 @@ from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Plate, Scene, Shots
 from warpimpact.solver.findings import LimitErrors
 from warpimpact.solver.limit_near import Neighbours
-from warpimpact.solver.limit_pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.limit_search import Guess, Search
 from warpimpact.solver.marching import Progress
+from warpimpact.solver.pilot import limits_pilot_size, pilot_limits
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import at_level, level_of
 from warpimpact.solver.simulate import computed, spread, spread_places

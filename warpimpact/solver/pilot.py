@@ -1,8 +1,15 @@
-"""The coarsest level of resolution that keeps a promised accuracy on a scene.
+"""The resolution that keeps a promised accuracy: every level that the user does not fix is chosen here.
 
-A pilot computes some of the shots on levels of LADDER, coarse to fine. The error of a level is estimated by its change
-to a finer one. The coarsest level whose error is within the promise is taken for all shots. The estimate is an upper
-one: a high order statistic of the pilot's shots, times a margin for the error of the finer level itself.
+A pilot computes 64 of a run's shots on levels of LADDER, coarse to fine, and takes the coarsest level whose error is
+within the promise. The error of a level is its change to the level two finer, because neighbours err alike, times
+MARGIN for what the finer one errs by. Of the shots an order statistic counts that rarely lies below the promised
+percentile (changes.py). Where 64 shots leave the choice open, 128 and 256 are computed. Where the error is far beyond
+the promise, the next level is left out. The search ends where errors stall, where a level costs more than it is worth,
+and one level behind the first that nearly keeps the promise: with errors of slow cores weighed by their energy, because
+near the limit velocity those of speeds have no bound. If no level keeps the promise, the run takes the first that
+nearly does, else the coarsest whose errors are about the smallest, and tells its change to the finest level computed. A
+long run then takes coarser levels of single settings that keep the promise, too. Limits, of which a pilot has 16, and
+the measure of a stop rule choose their level in the same way, by errors of their own.
 """
 
 from __future__ import annotations
@@ -11,88 +18,124 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from warpimpact.records.layers import LAYER_RESIDUAL_VELOCITY
 from warpimpact.records.outcomes import Outcomes
-from warpimpact.scene import Accuracy, Numerics, Shots
-from warpimpact.solver.changes import ended_otherwise, fewest, upper_errors
-from warpimpact.solver.climb import MARGIN, Verdict, coarsest
-from warpimpact.solver.findings import HitErrors, Tried
-from warpimpact.solver.purse import Computed, Purse
+from warpimpact.scene import PRESETS, Accuracy, Numerics, Shots
+from warpimpact.solver.changes import Verdict, compared, fewest, limit_changes
+from warpimpact.solver.findings import HitErrors, LimitErrors, Tried
 from warpimpact.solver.resolution import LADDER, at_level, coarsest_level
 
 Array = NDArray[np.float64]
+Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
+"""Error of a measure over what is allowed, from outcomes of the same shots at a level and at a finer one."""
 
 _logger = logging.getLogger(__name__)
 
-SHOTS, SHOTS_OF_FINE = 64, 32
-"""Shots of a pilot, and of one that begins at FINE or beyond, where they are dear. More shots make a lower estimate
-safe."""
-MORE, PART = 256, 16
-"""Shots of a pilot where SHOTS leave the choice between two levels open, and one of so many shots of a run at most."""
-OPEN = (0.7, 1.5)
-"""Upper estimates over what is allowed, between which more shots may choose another level."""
-OPEN_MEASURE = (0.7, 3.0)
-"""Likewise of what a measure shifts by: mostly the noise of few shots, of which four times as many leave half."""
-TYPICAL = 0.75
-"""Share of the first shots whose errors tell how those fall from level to level: the largest few fall by chance."""
-FEW = 2
-"""Shots that end otherwise, as few as which say little of their share; likewise."""
-FINE = 4
-FURTHER = 5
-"""Levels behind the first one on which a promise is looked for: 105 random scenes of single plates needed no finer one
-for draft and standard, but one. Who asks for a draft waits for no level that costs fifty times as much."""
-FURTHER_LAYERED = 3
-"""Likewise behind several layers, where a shot costs more: eight to ten times the first level's cost."""
-BEYOND = 1
-"""Levels behind the first one that nearly keeps the promise, on which one is looked for that does; it costs about twice
-the one before. Nearly does a level whose weighed errors are within the promise."""
+SHOTS, SHOTS_OF_FINE, FINE = 64, 32, 4
+"""First shots of a pilot; and of one that begins at level FINE, where shots are dear."""
+MOST, PART = 256, 16
+"""Shots of a pilot at most; and the run's shots for each of them, also where single settings are tried."""
+LIMITS, FINEST_LIMIT = 16, 6
+"""Limits of a pilot; and the last level that is taken for limits. A finer one is only compared with."""
+OPEN, OPEN_MEASURE = (0.7, 1.5), (0.7, 3.0)
+"""Errors over what is allowed, between which more shots may choose another level. Those of a measure are mostly noise,
+of which four times as many shots leave half."""
+OPEN_STATUS = 2
+"""Shots that end otherwise, up to which their share is too uncertain to break the promise."""
+MARGIN = {1: 2.0, 2: 1.4}
+"""Error of a level over its change, by the number of levels to the finer one. In 40 random scenes 83 to 98 % of the
+estimates are then at least the 90th percentile that other hits show (tests/benchmarks/random_scenes.py)."""
+FAR = 4.0
+"""Errors over what is allowed, above which the next level is left out: errors about halve from level to level."""
+STALLED = 0.7
+"""Share of an error left two levels on, above which finer levels are of little use: a quarter is left where it
+converges, but not where cores barely pass or tumble. Errors that differ by less count as equal."""
+FURTHER, FURTHER_LAYERED = 5, 3
+"""Levels behind the first one on which a promise is looked for, at a single plate and at several layers: 105 random
+scenes of single plates needed no finer one for draft and standard, but one. Layers take eight to ten times as long."""
+PATIENCE, WORTH = 10.0, 1600
+"""What a pilot may take: these seconds of a core, or the time of these shots at the level that it looks at: a tenth of
+a run of 16,384 hits. Within these seconds it looks at levels beyond FURTHER, too. Times are those that are foreseen
+(`Prepared.seconds`), so that a level does not depend on the machine."""
+SETTINGS, ROOM = ("step", "grid", "around", "along"), 0.9
+"""Settings that may have coarser levels, the one that saves most first; and errors over what is allowed, up to which
+one is taken. The rest makes up for the choice: trials pass whose errors on the pilot's shots happen to be small."""
+
+
+def climb(
+    judge: Callable[[int, int], Verdict],
+    levels: range,
+    beyond: int,
+    worth: Callable[[int, int], bool] = lambda level, finer: True,
+) -> int | None:
+    """The level that is taken of those that are tried, coarse to fine; None if not even the first one fits the memory.
+
+    Args:
+        judge: the verdict on a level by comparing it with a finer one.
+        levels: that may be taken. The level behind the last of them is compared with, no finer one.
+        beyond: levels that are tried behind one that nearly keeps the promise.
+        worth: whether a level, compared with a finer one, is worth its cost.
+    """
+    tried: dict[int, Verdict] = {}
+    enough: int | None = None
+    level, last = levels[0], levels[-1]
+
+    def finer(level: int) -> int:
+        return min(level + 2, levels.stop)
+
+    while level <= last and worth(level, finer(level)):
+        try:
+            verdict = tried[level] = judge(level, finer(level))
+        except MemoryError:  # the plate's period does not fit at that grid spacing
+            break
+        if verdict.kept:
+            return level
+        if enough is None and verdict.weighed <= 1.0:
+            enough, last = level, min(last, level + beyond)
+        if any(verdict.typical > STALLED * tried[coarser].typical for coarser in tried if coarser <= level - 2):
+            last = level
+        far = verdict.excess > FAR and enough is None and level + 2 <= last and worth(level + 2, finer(level + 2))
+        level += 2 if far else 1
+    smallest = min((verdict.excess for verdict in tried.values()), default=math.inf)
+    alike = (level for level, verdict in tried.items() if STALLED * verdict.excess <= smallest)
+    return next(alike, None) if enough is None else enough
 
 
 def pilot_size(accuracy: Accuracy, hits: int = 0) -> int:
-    """Shots of a pilot, at most; of a run of so many hits."""
-    return max(_first(accuracy), min(MORE, hits // PART))
+    """Shots of a pilot at most, for a run of some hits."""
+    return max(_first_shots(accuracy), min(MOST, hits // PART))
 
 
-def _first(accuracy: Accuracy) -> int:
-    """Shots that a pilot begins with."""
+def _first_shots(accuracy: Accuracy) -> int:
     usual = SHOTS if coarsest_level(accuracy.strictness) < FINE else SHOTS_OF_FINE
     return max(usual, fewest(accuracy.share))
 
 
-Excess: TypeAlias = Callable[[Outcomes, Outcomes, Shots], float]
-"""What outcomes of some shots at a level are off by over what is allowed, from those at a finer level."""
-
-
 def pilot_hits(
-    outcomes_at: Callable[[int, Shots], Outcomes],
-    pilot: Shots,
+    outcomes_at: Callable[[Numerics, Shots], Outcomes],
+    shots: Shots,
     numerics: Numerics,
+    price: Callable[[int], float],
     free: Sequence[bool] = (True,),
     excess_of: Excess | None = None,
-    purse: Purse | None = None,
+    hits: int = 0,
 ) -> HitErrors:
-    """Find the coarsest level whose outcomes have the accuracy that is asked for.
+    """Find the resolution whose outcomes have the accuracy that is asked for.
 
     Args:
-        outcomes_at: computes some of the pilot's shots on a level of LADDER.
-        pilot: shots like those that are to be computed, some `pilot_size` of them, the first of which are like all. The
-            rest is computed where the first leave the choice between two levels open.
-        numerics: their accuracy, precision and layout count; other settings would promise nothing.
+        outcomes_at: computes shots with numerics of a level.
+        shots: of the pilot, at most `pilot_size` of them; the first of them are spread like all.
+        numerics: the accuracy, precision and layout; other settings would promise nothing.
+        price: seconds that a shot takes at a level.
         free: of each layer of the target, whether a core flies free behind it (`Scene.free_behind`). Residual
-            velocities behind others count in no error.
-        excess_of: in place of the accuracy, from the coarsest level on.
-        purse: what it may take; None if that does not matter.
-
-    Returns:
-        The level that keeps the promise. If none does: the coarsest one that keeps it with errors weighed by the energy
-        of slow cores, where finer ones would be of little use. Else the coarsest one whose errors are about the
-        smallest of all. Its errors are then those to the finest level that as many shots were computed at.
+            velocities behind other layers count in no error.
+        excess_of: measures errors in place of the accuracy, from level 0 on.
+        hits: of the run, which may have coarser settings where it is long; 0 if that is not known.
 
     Raises:
         ValueError: the accuracy says nothing of outcomes.
@@ -100,160 +143,178 @@ def pilot_hits(
     accuracy = numerics.asked
     if math.isinf(accuracy.residual_velocity) and math.isinf(accuracy.tilt):
         raise ValueError("accuracy: needs residual_velocity or tilt; a limit alone is for a search of limits")
-    search = _Search(Computed(outcomes_at, pilot, purse), pilot, numerics, free, excess_of)
-    found = coarsest(search.judge, range(search.first, len(LADDER) - 1), len(LADDER) - 1, BEYOND, search.allowed)
-    if found is None:
-        return HitErrors(at_level(search.first, numerics), False, accuracy.share, math.inf, math.inf)
-    tried = search.tried
-    if not found.kept:
-        index, coarse = next((at, coarse) for at, (one, coarse, _) in tried.items() if one is found)
-        finest, fine = search.computed.finest(len(coarse))
-        tried[index] = _to_finer(found, coarse, fine, finest - index, pilot, accuracy, free)
-        found = tried[index][0]
-    return replace(found, tried=tuple(tried[index] for index in sorted(tried)))
+    first = coarsest_level(accuracy.strictness) if excess_of is None else 0
+    pilot = _Pilot(outcomes_at, shots, numerics, price, free, excess_of)
+    level = climb(pilot.judge, range(first, len(LADDER) - 1), 1, pilot.worth)
+    if level is None:
+        return HitErrors(at_level(first, numerics), False, accuracy.share, math.inf, math.inf)
+    if not pilot.tried[level].errors.kept:
+        pilot.tell_to_finest(level)
+    if excess_of is None and hits >= PART * len(pilot.tried[level].coarse):
+        pilot.ease(level)
+    tried = tuple(pilot.tried[each] for each in sorted(pilot.tried))
+    return replace(pilot.tried[level].errors, tried=tried)
 
 
 @dataclass(frozen=True)
-class _Search:
-    """What a pilot asks of a level; some attributes are arguments of `pilot_hits`.
+class _Pilot:
+    """What a pilot of hits has computed; the arguments are those of `pilot_hits`.
 
     Attributes:
-        computed: its outcomes so far.
-        tried: what was found at every level that was tried.
+        known: outcomes of the first shots at levels.
+        tried: levels that were judged.
     """
 
-    computed: Computed
-    pilot: Shots
+    outcomes_at: Callable[[Numerics, Shots], Outcomes]
+    shots: Shots
     numerics: Numerics
+    price: Callable[[int], float]
     free: Sequence[bool]
     excess_of: Excess | None
+    known: dict[int, Outcomes] = field(default_factory=dict)
     tried: dict[int, Tried] = field(default_factory=dict)
 
     @property
-    def first(self) -> int:
-        """The level from which on it is looked for."""
-        return coarsest_level(self.numerics.asked.strictness) if self.excess_of is None else 0
+    def counts(self) -> list[int]:
+        """Numbers of shots that may judge a level: twice as many each time, of whole plates."""
+        most, at_a_plate = len(self.shots), self.shots.at_a_plate
+        counts = [min(most, -(-_first_shots(self.numerics.asked) // at_a_plate) * at_a_plate)]
+        while counts[-1] < most:
+            counts.append(min(most, 2 * counts[-1]))
+        return counts
 
-    @cached_property
-    def sizes(self) -> list[int]:
-        """Numbers of shots: twice as many each time, of whole plates."""
-        most, at_a_plate = len(self.pilot), self.pilot.at_a_plate
-        sizes = [min(most, -(-_first(self.numerics.asked) // at_a_plate) * at_a_plate)]
-        while sizes[-1] < most:
-            sizes.append(min(most, 2 * sizes[-1]))
-        return sizes
+    def missing(self, level: int, count: int) -> int:
+        """Shots of the first `count` that are not computed at a level."""
+        return max(0, count - len(self.known[level])) if level in self.known else count
 
-    def allowed(self, index: int, finer: int, count: int | None = None) -> bool:
-        """Whether a level is worth so many shots there and at a finer one."""
+    def worth(self, level: int, finer: int, count: int | None = None) -> bool:
+        """Whether a level and a finer one are worth computing the first `count` shots at (PATIENCE, WORTH)."""
+        if not self.tried:
+            return True
         further = FURTHER if len(self.free) == 1 else FURTHER_LAYERED
-        usual = index <= coarsest_level(self.numerics.asked.strictness) + further
-        return self.computed.worth(index, finer, count or self.sizes[0], usual) if self.tried else usual
+        usual = level <= coarsest_level(self.numerics.asked.strictness) + further
+        count = count or self.counts[0]
+        try:
+            spent = sum(len(outcomes) * self.price(at) for at, outcomes in self.known.items())
+            spent += sum(self.missing(at, count) * self.price(at) for at in (level, finer))
+            return spent <= PATIENCE or (usual and spent <= WORTH * self.price(level))
+        except MemoryError:  # the plate's period does not fit at that grid spacing
+            return False
 
-    def judge(self, index: int, finer: int, margin: float) -> Verdict[HitErrors]:
-        """A level by its change to a finer one, from as many shots as tell whether it keeps the promise."""
-        verdict = self._by(self.sizes[0], index, finer, margin)
-        typical = self._typical(index, finer, margin) if self.excess_of is None else verdict.excess
-        for count in self.sizes[1:]:
-            if self._decided(verdict, len(self.tried[index][1])) or not self.allowed(index, finer, count):
+    def at(self, level: int, count: int) -> Outcomes:
+        """Outcomes of the first `count` shots at a level."""
+        if new := self.missing(level, count):
+            some = self.outcomes_at(at_level(level, self.numerics), self.shots[count - new : count])
+            self.known[level] = Outcomes.joined([self.known[level], some]) if level in self.known else some
+        return self.known[level][:count]
+
+    def judge(self, level: int, finer: int) -> Verdict:
+        """A level by its change to a finer one, of as many shots as tell whether it keeps the promise."""
+        first = verdict = self.judged(level, finer, self.counts[0])
+        for count in self.counts[1:]:
+            if self.decided(level, verdict) or not self.worth(level, finer, count):
                 break
-            verdict = self._by(count, index, finer, margin)
-        return verdict._replace(typical=typical)
+            verdict = self.judged(level, finer, count)
+        return verdict._replace(typical=first.typical)
 
-    def _by(self, count: int, index: int, finer: int, margin: float) -> Verdict[HitErrors]:
-        """A level by so many shots."""
-        shots, accuracy = self.pilot[:count], self.numerics.asked
-        pair = self.computed.at(index, count), self.computed.at(finer, count)
-        found, excess, weighed = judged(*pair, shots, at_level(index, self.numerics), accuracy, margin, self.free)
-        # What more shots told of a coarser level holds, as finer ones err no more.
-        status = [one.status_error for at, (one, coarse, _) in self.tried.items() if at < index and len(coarse) > count]
-        if found.status_error > min(status, default=1.0):
-            kept = excess <= 1.0 and min(status) <= accuracy.status_share
-            found = replace(found, kept=kept, status_error=min(status))
-        if self.excess_of is not None:
-            excess, weighed = self.excess_of(*pair, shots), math.inf
-            found = replace(found, kept=excess <= 1.0)
-        _logger.info(
-            "pilot of %d hits at level %d: errors of %s, the promise is %skept",
-            count, index, found.errors, "" if found.kept else "not ",
-        )  # fmt: skip
-        self.tried[index] = found, *pair
-        return Verdict(found, excess, math.nan, weighed <= 1.0)
-
-    def _typical(self, index: int, finer: int, margin: float) -> float:
-        """Errors over what is allowed of most of the first shots, as likely to be too small as too large."""
-        found, coarse, fine = self.tried[index]
-        if found.status_error > 1.0 - self.numerics.asked.share:
-            return math.inf  # the shots that end otherwise are those that err most
-        accuracy, layered = self.numerics.asked, LAYER_RESIDUAL_VELOCITY in coarse
-        each = (self.pilot.at_a_plate, TYPICAL, None, _relative(accuracy, layered), self.free, 0.5)
-        return _excess(accuracy, margin * upper_errors(coarse, fine, *each), layered)
-
-    def _decided(self, verdict: Verdict[HitErrors], count: int) -> bool:
+    def decided(self, level: int, verdict: Verdict) -> bool:
         """Whether more shots would hardly tell otherwise."""
-        low, high = OPEN if self.excess_of is None else OPEN_MEASURE
-        few = self.numerics.asked.status_share < verdict.found.status_error <= FEW / count
+        (low, high), (errors, coarse, _) = OPEN if self.excess_of is None else OPEN_MEASURE, self.tried[level]
+        few = self.numerics.asked.status_share < errors.status_error <= OPEN_STATUS / len(coarse)
         return not low < verdict.excess < high and not (few and verdict.excess <= low)
 
+    def judged(self, level: int, finer: int, count: int) -> Verdict:
+        """A level by its change to a finer one, of the first `count` shots."""
+        coarse, fine = self.at(level, count), self.at(finer, count)
+        errors, verdict = self.compared(at_level(level, self.numerics), coarse, fine, coarse)
+        # Finer levels end no more shots otherwise than a coarser one, of which more shots tell.
+        coarser = [each.errors.status_error for at, each in self.tried.items() if at < level and len(each.fine) > count]
+        if errors.status_error > min(coarser, default=1.0):
+            kept = verdict.excess <= 1.0 and min(coarser) <= self.numerics.asked.status_share
+            errors = replace(errors, status_error=min(coarser), kept=kept)
+        if self.excess_of is not None:
+            excess = self.excess_of(coarse, fine, self.shots[:count])
+            errors, verdict = replace(errors, kept=excess <= 1.0), Verdict(excess <= 1.0, excess, excess, math.inf)
+        _logger.info("pilot: %d shots at level %d err by %s, kept: %s", count, level, errors.errors, errors.kept)
+        self.tried[level] = Tried(errors, coarse, fine)
+        return verdict._replace(kept=errors.kept)
 
-def _to_finer(
-    found: HitErrors, coarse: Outcomes, fine: Outcomes, on: int, pilot: Shots, accuracy: Accuracy, free: Sequence[bool]
-) -> Tried:
-    """A level that breaks the promise, with its errors to one so many levels on: where they stall, two tell too
-    little."""
-    told, *_ = judged(coarse, fine, pilot[: len(fine)], found.numerics, accuracy, MARGIN[min(2, on)], free)
-    return replace(told, kept=False), coarse, fine
+    def compared(
+        self, numerics: Numerics, coarse: Outcomes, fine: Outcomes, between: Outcomes
+    ) -> tuple[HitErrors, Verdict]:
+        """`changes.compared` of this pilot's shots, with numerics of a level."""
+        assert numerics.level is not None
+        margin, shots = MARGIN[min(2, len(LADDER) - 1 - numerics.level)], self.shots[: len(fine)]
+        return compared(numerics, self.numerics.asked, (coarse, between, fine), margin, shots, self.free)
+
+    def tell_to_finest(self, level: int) -> None:
+        """Tell the errors of a level that breaks the promise by its change to the finest level that as many shots are
+        known at: where errors stall, a change over two levels tells too little."""
+        coarse = self.tried[level].coarse
+        finest = max(at for at, outcomes in self.known.items() if len(outcomes) >= len(coarse))
+        fine = self.known[finest][: len(coarse)]
+        errors, _ = self.compared(at_level(level, self.numerics), coarse, fine, coarse)
+        self.tried[level] = Tried(replace(errors, kept=False), coarse, fine)
+
+    def ease(self, level: int) -> None:
+        """Take coarser levels of single settings where these leave a tenth of what is allowed, by plain errors or by
+        weighed ones, as the level itself keeps the promise, and end no more shots otherwise."""
+        errors, coarse, fine = self.tried[level]
+        settings = dict[str, int]()
+        plain, verdict = self.compared(errors.numerics, coarse, fine, coarse)
+
+        def excess(verdict: Verdict) -> float:
+            return verdict.excess if errors.kept else verdict.weighed
+
+        for name in SETTINGS:
+            for down in (2, 1) if excess(verdict) < 0.5 else (1,):
+                if excess(verdict) >= ROOM or down > level:
+                    continue
+                at = at_level(level, self.numerics, **settings, **{name: level - down})
+                outcomes = self.outcomes_at(at, self.shots[: len(fine)])
+                eased, told = self.compared(at, outcomes, fine, coarse)
+                _logger.info("pilot: level %d with %s errs by %s", level, at.coarser, eased.errors)
+                if excess(told) <= ROOM and not eased.status_error > plain.status_error:
+                    settings[name], verdict = level - down, told
+                    eased = replace(eased, kept=errors.kept, status_error=errors.status_error)
+                    self.tried[level] = Tried(eased, outcomes, fine)
+                    break
 
 
-def judged(
-    coarse: Outcomes,
-    fine: Outcomes,
-    shots: Shots,
-    numerics: Numerics,
-    accuracy: Accuracy,
-    margin: float,
-    free: Sequence[bool],
-    between: Outcomes | None = None,
-) -> tuple[HitErrors, float, float]:
-    """What is known of a resolution from some shots: the finding, its errors over what is allowed, and the same with
-    errors weighed by the energy of slow cores.
+def limits_pilot_size(accuracy: Accuracy) -> int:
+    """Limits of a pilot."""
+    return max(LIMITS, fewest(accuracy.share))
+
+
+def pilot_limits(limits_at: Callable[[int], Array], numerics: Numerics, quantity: str) -> LimitErrors:
+    """Find the level whose limits have the accuracy that is asked for.
+
+    Errors about halve from level to level, so limits half of which are within the promise are tried two levels on. Some
+    limits, such as those at which the outcome jumps, or that come and go, have no bounded error.
 
     Args:
-        margin: how many times the change to the fine outcomes the error is at most.
-        between: outcomes at a level between, if the margin is that level's. What it has beyond 1 is then the error of
-            the fine outcomes, over the change from there.
+        limits_at: computes the limits of a pilot's shots on a level of LADDER.
+        numerics: as in `pilot_hits`.
+        quantity: "velocity", or "thickness", which goes with the square of the velocity.
+
+    Raises:
+        ValueError: the accuracy says nothing of limits.
     """
+    asked, usual = numerics.asked, PRESETS["draft"].limit
+    if asked.limit is None or usual is None:
+        raise ValueError("accuracy: needs limit, the error of a limit as a share of the median limit")
+    limit = (1.0 if quantity == "velocity" else 2.0) * asked.limit
+    limits, tried = cache(limits_at), dict[int, LimitErrors]()
 
-    def upper(impact: Array | None, relative: tuple[float, float]) -> Array:
-        told = (shots.at_a_plate, accuracy.share, impact, relative, free)
-        if between is None:
-            return margin * upper_errors(coarse, fine, *told)
-        return upper_errors(coarse, fine, *told) + (margin - 1.0) * upper_errors(between, fine, *told)
+    def judge(level: int, finer: int) -> Verdict:
+        change, half, typical = limit_changes(limits(level), limits(finer), asked.share)
+        margin, allowed = MARGIN[finer - level], limit * typical
+        kept, excess = margin * change <= allowed, margin * half / max(allowed, 1e-30)
+        tried[level] = LimitErrors(at_level(level, numerics), kept, asked.share, margin * change, quantity, finer)
+        return Verdict(kept, excess, excess, excess)
 
-    layered = LAYER_RESIDUAL_VELOCITY in coarse
-    relative = _relative(accuracy, layered)
-    told, counted, weighed = upper(None, (0.0, 0.0)), upper(None, relative), upper(shots.velocity, relative)
-    status = float(ended_otherwise(coarse, fine).mean()) if layered else math.nan
-    excess = _excess(accuracy, counted, layered)
-    kept = excess <= 1.0 and not status > accuracy.status_share
-    velocity, tilt, depth = (float(error) for error in told)
-    found = HitErrors(numerics, kept, accuracy.share, velocity, tilt, depth, status, finer=fine)
-    return found, excess, _excess(accuracy, weighed, layered)
-
-
-def _relative(accuracy: Accuracy, layered: bool) -> tuple[float, float]:
-    """The relative parts of what is allowed over the absolute ones; of single plates none."""
-    if not layered:
-        return 0.0, 0.0
-    return accuracy.residual_velocity_share / accuracy.residual_velocity, accuracy.tilt_share / accuracy.tilt
-
-
-def _excess(accuracy: Accuracy, errors: Array, layered: bool) -> float:
-    """The largest of the errors over what is allowed; infinite if no shot has a speed. A depth counts behind layers.
-    What is not asked for counts as 0, however large its error is."""
-    velocity, tilt = np.nan_to_num(errors[:2], nan=math.inf)
-    depth = np.nan_to_num(errors[2], nan=0.0) if layered else 0.0
-    allowed = accuracy.residual_velocity, accuracy.tilt, accuracy.depth
-    return max(
-        float(error) / bound if math.isfinite(bound) else 0.0
-        for error, bound in zip((velocity, tilt, depth), allowed, strict=True)
-    )
+    first = min(coarsest_level(usual / asked.limit), FINEST_LIMIT)
+    level = climb(judge, range(first, FINEST_LIMIT + 1), 2)
+    if level is None:
+        return LimitErrors(at_level(first, numerics), False, asked.share, math.inf, quantity)
+    return tried[level]

@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import Numerics, Scene, Shots
 from warpimpact.solver.device import find_device
-from warpimpact.solver.easing import eased, worth_easing
-from warpimpact.solver.findings import Cost, HitErrors
+from warpimpact.solver.findings import HitErrors, LevelCost
 from warpimpact.solver.marching import March, Progress
 from warpimpact.solver.memory import Memory
 from warpimpact.solver.pilot import Excess, pilot_hits, pilot_size
 from warpimpact.solver.prepare import Prepared, prepare
-from warpimpact.solver.purse import Purse
 from warpimpact.solver.resolution import at_level
 from warpimpact.solver.worker import NEVER, Cancel, Worker
 
@@ -53,15 +51,9 @@ def simulate(
         DeviceError: the device is absent.
         ValueError, MemoryError: as in `prepare`.
     """
-    numerics, worker = numerics or Numerics(), Worker(device, threads, cancel)
-
-    def outcomes(some: Shots, at: Numerics, progress: Progress | None = None) -> Outcomes:
-        return computed(prepare(scene, some, at), worker, progress)
-
-    if numerics.explicit is None:
-        pilot = spread(shots, pilot_size(numerics.asked, len(shots)))
-        numerics = pilot_of(scene, pilot, numerics, worker, hits=len(shots)).numerics
-    return outcomes(shots, numerics, progress)
+    worker = Worker(device, threads, cancel)
+    fixed = numerics_for(scene, shots, numerics or Numerics(), worker, len(shots))
+    return computed(prepare(scene, shots, fixed), worker, progress)
 
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
@@ -76,6 +68,14 @@ def marched(memory: Memory, worker: Worker, progress: Progress | None = None) ->
     return outcomes_of(march.memory, contact)
 
 
+def numerics_for(scene: Scene, shots: Shots, numerics: Numerics, worker: Worker, hits: int = 0) -> Numerics:
+    """Numerics that fix the resolution: those given, or what a pilot of some of the shots finds for a run of some
+    hits."""
+    if numerics.explicit is not None:
+        return numerics
+    return pilot_of(scene, spread(shots, pilot_size(numerics.asked, hits)), numerics, worker, hits=hits).numerics
+
+
 def pilot_of(
     scene: Scene,
     pilot: Shots,
@@ -85,16 +85,13 @@ def pilot_of(
     excess_of: Excess | None = None,
     hits: int = 0,
 ) -> HitErrors:
-    """Find the resolution for an accuracy: the level (solver/pilot.py), and for a long run coarser levels of single
-    settings (solver/easing.py).
+    """Find the resolution for an accuracy (solver/pilot.py).
 
     Args:
         pilot: some of the shots.
         trying: called with every level that is computed.
-        excess_of: as in `pilot_hits`.
-        hits: of the run that the resolution is for; 0 if that is not known.
+        excess_of, hits: as in `pilot_hits`.
     """
-
     seconds: dict[Numerics, float] = {}
 
     def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
@@ -107,21 +104,17 @@ def pilot_of(
         seconds[at] = (time.perf_counter() - begin) / len(some)
         return outcomes
 
-    def at_one(level: int, some: Shots) -> Outcomes:
-        return outcomes_at(at_level(level, numerics), some)
-
+    @cache
     def price(level: int) -> float:
         return prepare(scene, pilot[: pilot.at_a_plate], at_level(level, numerics)).seconds
 
-    found = pilot_hits(at_one, pilot, numerics, scene.free_behind, excess_of, Purse(cache(price)))
-    if not found.tried:
-        return found
-    first = found.tried[0][0]
-    if excess_of is None and worth_easing(found, hits):
-        found = eased(found, outcomes_at, pilot, numerics, scene.free_behind)
+    errors = pilot_hits(outcomes_at, pilot, numerics, price, scene.free_behind, excess_of, hits)
+    if not errors.tried:
+        return errors
+    first = errors.tried[0].errors
     assert first.numerics.level is not None
-    cost = Cost(seconds[found.numerics], seconds[first.numerics], first.numerics.level, first.errors)
-    return replace(found, cost=cost)
+    cost = LevelCost(seconds[errors.numerics], seconds[first.numerics], first.numerics.level, first.errors)
+    return replace(errors, cost=cost)
 
 
 def spread(shots: Shots, most: int) -> Shots:
@@ -133,7 +126,7 @@ def spread(shots: Shots, most: int) -> Shots:
 
 
 def spread_places(places: int, count: int) -> NDArray[np.int64]:
-    """So many of some places at even distances; the first of them lie all over, too."""
+    """Numbers of `count` of some places at even distances; the first of them lie all over, too."""
     digits = max(1, (count - 1).bit_length())
     order = np.array([int(f"{k:0{digits}b}"[::-1], 2) for k in range(2**digits)])
     return np.asarray(np.linspace(0, places, count, endpoint=False).astype(np.int64)[order[order < count]])

@@ -13,7 +13,7 @@ import numpy as np
 
 from warpimpact.statistics.intervals import Array, Estimate, Estimating, estimate_of
 
-BEYOND = 2.0
+SHIFT_MARGIN = 2.0
 """Factor for the error of the finer level itself, two levels on: the errors of means about halve over two levels, where
 those of single hits fall to a quarter. With 1.4, which is enough for single hits, 7 of 44 means of random scenes
 shift by more (tests/benchmarks/random_shifts.py)."""
@@ -89,4 +89,4 @@ def shift_of_yes(coarse: Array, fine: Array, **dealt: Unpack[Estimating]) -> flo
 
 def _most(change: Estimate) -> float:
     """The farther end of the interval of a shift, and what the finer level is off by."""
-    return BEYOND * (abs(change.value) + change.half_width)
+    return SHIFT_MARGIN * (abs(change.value) + change.half_width)

@@ -40,8 +40,8 @@ from warpimpact.solver.limit import (
     with_thickness,
     with_velocity,
 )
-from warpimpact.solver.limit_pilot import limits_pilot_size
 from warpimpact.solver.marching import Progress
+from warpimpact.solver.pilot import limits_pilot_size
 from warpimpact.solver.worker import Worker
 from warpimpact.statistics.intervals import Estimate, estimate_of
 from warpimpact.statistics.of_groups import of_quantile

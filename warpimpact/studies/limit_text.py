@@ -16,8 +16,8 @@ from warpimpact.results import variables as v
 from warpimpact.results.limits import solid_limits
 from warpimpact.scene.quantities import QUANTITIES
 from warpimpact.scene.units import quantity as reader_of
+from warpimpact.solver.findings import hits_text, limit_error_text
 from warpimpact.solver.limit_search import MOST_RUNS
-from warpimpact.solver.pilot_text import hits_text, limit_error_text
 from warpimpact.studies.limit import QUANTILES, quantiles
 from warpimpact.studies.published import published_lines
 

@@ -1,54 +1,43 @@
-"""The promise of a named fidelity: the level that a pilot chooses keeps it on hits that were not in the pilot."""
+"""The resolution that a pilot chooses keeps its promise on hits that were not in the pilot."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike, NDArray
 
 from warpimpact import Campaign, run
 from warpimpact.kernels.status import Status
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.runs.compute import HitMap
 from warpimpact.runs.replay import replay
-from warpimpact.scene import (
-    PRESETS,
-    Accuracy,
-    CirclePattern,
-    Hits,
-    Impact,
-    Layer,
-    Numerics,
-    OgiveCore,
-    Plate,
-    Record,
-    Scene,
-    Shots,
-    Target,
-    make_shots,
+from warpimpact.scene import PRESETS, Accuracy, Hits, Impact, Numerics, Record, Scene, Shots, make_shots
+from warpimpact.solver import pilot
+from warpimpact.solver.changes import Verdict, changes, ended_otherwise
+from warpimpact.solver.findings import HitErrors, LimitErrors, errors_text, upper_digits
+from warpimpact.solver.pilot import (
+    FINEST_LIMIT,
+    LIMITS,
+    MARGIN,
+    PART,
+    ROOM,
+    climb,
+    limits_pilot_size,
+    pilot_hits,
+    pilot_limits,
+    pilot_size,
 )
-from warpimpact.solver import climb, pilot, purse
-from warpimpact.solver.changes import RISK, SLOW, changes, design_effect, ended_otherwise, upper_error, upper_place
-from warpimpact.solver.climb import MARGIN
-from warpimpact.solver.pilot import HitErrors, pilot_hits, pilot_size
-from warpimpact.solver.pilot_text import errors_text, upper_digits
-from warpimpact.solver.purse import Purse
 from warpimpact.solver.simulate import pilot_of, simulate
 from warpimpact.solver.worker import Worker
 
-CORE = OgiveCore(diameter=6.17e-3, crh=3, length=27e-3, mass=5.25e-3)
-PLATE = Plate(
-    thickness=6e-3,
-    resistance=2e9,
-    shear_coefficient=0.08,
-    degradation=0.85,
-    pattern=CirclePattern(diameter=7e-3, spacing=(10e-3, 17.3e-3), staggered=True),
-)
-SCENE = Scene(core=CORE, target=PLATE, record=Record(standoffs=(0.05, 0.13)))
-IMPACT = Impact(velocity="820 m/s", obliquity="12 deg", yaw="1 deg")
-PILOT = make_shots(IMPACT, Hits(count=32, seed=5), PLATE)
-OTHERS = make_shots(IMPACT, Hits(count=96, seed=6), PLATE)
+from ...verification.scenes import PAPER_CORE, paper_plate
+from .shanked import IMPACT, OTHERS, PILOT, PLATE, SCENE, STOPPING
+
+NOTHING = Numerics(accuracy={"residual_velocity": 1e-9})
+BOTH = Shots.joined([PILOT, PILOT])
 
 
 @pytest.fixture(scope="module")
@@ -57,14 +46,38 @@ def limit() -> Outcomes:
     return simulate(SCENE, OTHERS, numerics=Numerics(level=7), device="cpu")
 
 
+@pytest.fixture(scope="module")
+def known() -> Outcomes:
+    return simulate(SCENE, BOTH, numerics=Numerics(level=0), device="cpu")
+
+
+@pytest.fixture(scope="module")
+def stopping() -> Outcomes:
+    return simulate(STOPPING, PILOT, numerics=Numerics(level=0), device="cpu")
+
+
 def found_for(numerics: Numerics, shots: Shots = PILOT, scene: Scene = SCENE) -> HitErrors:
     return pilot_of(scene, shots, numerics, Worker("cpu"))
 
 
-def errors(numerics: Numerics, limit: Outcomes) -> tuple[float, float]:
-    """90th percentiles of the errors in residual velocity [m/s] and in tilt at the last stand-off [rad]."""
-    velocity, tilt, _ = changes(simulate(SCENE, OTHERS, numerics=numerics, device="cpu"), limit)
-    return float(np.quantile(velocity, 0.9)), float(np.quantile(tilt, 0.9))
+def cheap(level: int) -> float:
+    return 1e-6
+
+
+def dear(level: int) -> float:
+    return 1.0
+
+
+@pytest.fixture
+def from_level(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Lets a pilot begin at a level, with other settings of its rule."""
+
+    def begin(level: int = 0, **settings: Any) -> None:
+        monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: level)
+        for name, value in settings.items():
+            monkeypatch.setattr(pilot, name, value)
+
+    return begin
 
 
 @pytest.mark.parametrize("name", ["draft", "standard"])
@@ -73,12 +86,31 @@ def test_a_shanked_core_gets_the_accuracy_that_the_name_promises(name: str, limi
     found, accuracy = found_for(Numerics(fidelity=name), many), PRESETS[name]
     assert found.kept
     assert found.numerics.level <= 4
-    velocity, tilt = errors(found.numerics, limit)
+    each = changes(simulate(SCENE, OTHERS, numerics=found.numerics, device="cpu"), limit)
+    velocity, tilt = (float(np.quantile(errors, 0.9)) for errors in each[:2])
     assert velocity <= accuracy.residual_velocity
     assert tilt <= accuracy.tilt
     # The errors that are told are upper estimates of the true ones; one in six may lie below (RISK).
     assert velocity / 1.3 <= found.residual_velocity_error <= accuracy.residual_velocity
     assert tilt / 1.3 <= found.tilt_error <= accuracy.tilt
+
+
+def test_draft_tells_errors_that_other_hits_keep_where_a_base_stops_some_of_them() -> None:
+    some, others = (make_shots(IMPACT, Hits(count=64, seed=seed), PLATE) for seed in (5, 6))
+    found = found_for(Numerics(fidelity="draft"), some, STOPPING)
+    coarse, fine = (
+        simulate(STOPPING, others, numerics=one, device="cpu") for one in (found.numerics, Numerics(level=7))
+    )
+    assert 0.2 < (fine.status == Status.ARRESTED).mean() < 0.8
+    velocity, tilt, depth = changes(coarse, fine)
+    assert found.numerics.level <= 5
+    assert np.nanquantile(velocity, 0.9) <= found.residual_velocity_error
+    assert np.nanquantile(tilt, 0.9) <= found.tilt_error
+    assert np.nanquantile(depth, 0.9) <= found.depth_error < 5e-3
+    other = ended_otherwise(coarse, fine)
+    assert (np.isnan(velocity) == other).all()
+    assert other.mean() <= found.status_error + 3.0 / 64.0
+    assert "mm of depth" in found.phrase
 
 
 def test_an_accuracy_in_numbers_is_what_its_name_is() -> None:
@@ -114,35 +146,23 @@ def test_a_stricter_name_takes_a_finer_level_in_the_precision_asked_for() -> Non
     assert all(one.precision == "double" for one in levels)
 
 
-NOTHING = Numerics(accuracy={"residual_velocity": 1e-9})
-
-
-def test_what_cannot_be_kept_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    # With a ladder of two levels and a promise of nothing, the finest level that can be judged is taken.
-    monkeypatch.setattr(pilot, "LADDER", pilot.LADDER[:2])
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
-    found = found_for(NOTHING, PILOT[:8])
-    assert not found.kept
-    assert found.numerics == Numerics(level=0)
-    coarse, fine = (simulate(SCENE, PILOT[:8], numerics=Numerics(level=k), device="cpu") for k in (0, 1))
-    largest = np.abs(coarse.residual_velocity - fine.residual_velocity).max()
-    assert found.residual_velocity_error == pytest.approx(MARGIN[1] * largest)
-
-
-def test_a_promise_ends_at_its_finest_level(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pilot, "FURTHER", 1)
-    monkeypatch.setattr(purse, "PATIENCE", 0.0)
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+@pytest.mark.parametrize(("ladder", "further", "level", "finer"), [(2, 5, 0, 1), (10, 1, 1, 3)])
+def test_a_promise_that_cannot_be_kept_ends_at_the_finest_level_that_may_be_taken(
+    ladder: int, further: int, level: int, finer: int, from_level: Callable[..., None]
+) -> None:
+    from_level(0, LADDER=pilot.LADDER[:ladder], FURTHER=further, PATIENCE=0.0)
     found = found_for(NOTHING, PILOT[:4])
-    assert not found.kept
-    assert found.numerics == Numerics(level=1)
+    assert (found.kept, found.numerics) == (False, Numerics(level=level))
+    coarse, fine = (simulate(SCENE, PILOT[:4], numerics=Numerics(level=k), device="cpu") for k in (level, finer))
+    largest = np.abs(coarse.residual_velocity - fine.residual_velocity).max()
+    assert found.residual_velocity_error == pytest.approx(MARGIN[finer - level] * largest)
 
 
 def test_levels_that_do_not_fit_the_memory_end_the_search() -> None:
-    def full(level: int, some: Shots) -> Outcomes:
+    def full(at: Numerics, some: Shots) -> Outcomes:
         raise MemoryError
 
-    found = pilot_hits(full, PILOT[:4], Numerics())
+    found = pilot_hits(full, PILOT[:4], Numerics(), cheap)
     assert not found.kept
     assert math.isinf(found.tilt_error)
     assert found.numerics == Numerics(level=2)
@@ -180,8 +200,7 @@ fidelity = "draft"
 def test_a_result_tells_its_promise_and_replays_on_its_level(hits: str) -> None:
     campaign = Campaign.from_text(CAMPAIGN.replace("count = 12", hits), name="t", folder=Path())
     result = run(campaign, device="cpu")
-    found = HitMap().found_in(result)
-    assert found is not None
+    assert HitMap().found_in(result) is not None
     assert result.attrs["promise_kept"] == 1
     assert 0.0 < result.attrs["residual_velocity_error"] <= 5.0
     assert 0.0 < result.attrs["tilt_error"] <= 5.0
@@ -193,250 +212,160 @@ def test_a_single_setting_promises_nothing() -> None:
     assert not {"promise_kept", "resolution", "tilt_error"} & run(campaign, device="cpu").attrs.keys()
 
 
-# Stops some of the cores, and lets others go on slowly.
-BASE = Layer(thickness=6.6e-3, resistance=5e9, gap=40e-3, shear_coefficient=0.08)
-STOPPING = SCENE.model_copy(update={"target": Target(layers=(PLATE, BASE))})
-
-
-def test_draft_tells_errors_that_other_hits_keep_where_a_base_stops_some_of_them() -> None:
-    some, others = (make_shots(IMPACT, Hits(count=64, seed=seed), PLATE) for seed in (5, 6))
-    found = found_for(Numerics(fidelity="draft"), some, STOPPING)
-    coarse, fine = (
-        simulate(STOPPING, others, numerics=one, device="cpu") for one in (found.numerics, Numerics(level=7))
-    )
-    assert 0.2 < (fine.status == Status.ARRESTED).mean() < 0.8
-    velocity, tilt, depth = changes(coarse, fine)
-    assert found.numerics.level <= 5
-    assert np.nanquantile(velocity, 0.9) <= found.residual_velocity_error
-    assert np.nanquantile(tilt, 0.9) <= found.tilt_error
-    assert np.nanquantile(depth, 0.9) <= found.depth_error < 5e-3
-    other = ended_otherwise(coarse, fine)
-    assert (np.isnan(velocity) == other).all()
-    assert other.mean() <= found.status_error + 3.0 / 64.0
-    assert "mm of depth" in found.phrase
-
-
-def test_errors_behind_layers_may_have_a_relative_part() -> None:
-    some = make_shots(IMPACT, Hits(count=16, seed=5), PLATE)
-    coarse, fine = (simulate(STOPPING, some, numerics=Numerics(level=k), device="cpu") for k in (0, 2))
-    plain, relative = changes(coarse, fine), changes(coarse, fine, None, (0.01, 2.0))
-    last = np.nan_to_num(fine.tilt[:, -1])
-    np.testing.assert_allclose(relative[1], plain[1] / (1.0 + 2.0 * last), rtol=1e-12)
-    behind = np.nan_to_num(fine.layer_residual_velocity).max(axis=1)
-    assert (relative[0] <= plain[0])[~np.isnan(plain[0])].all()
-    assert (relative[0] >= plain[0] / (1.0 + 0.01 * behind) - 1e-9)[~np.isnan(plain[0])].all()
-
-
-@pytest.mark.parametrize(("gap", "free"), [(0.0, False), (20e-3, False), (40e-3, True)])
-def test_the_velocity_within_a_laminate_counts_in_no_error(gap: float, free: bool) -> None:
-    layers = (PLATE, BASE.model_copy(update={"gap": gap}))
-    assert SCENE.model_copy(update={"target": Target(layers=layers)}).free_behind == (free, True)
-    zero = np.zeros((4, 2))
-    coarse = simulate(STOPPING, make_shots(IMPACT, Hits(count=4, seed=5), PLATE), numerics=Numerics(level=0))
-    still = {"status": np.zeros(4, int), "stopped_in": np.full(4, -1), "residual_velocity": zero[:, 0]}
-    coarse = coarse.assign(layer_residual_velocity=zero, **still)
-    fine = coarse.assign(layer_residual_velocity=np.array([[9.0, 0.0]] * 4))
-    np.testing.assert_array_equal(changes(coarse, fine)[0], 9.0)
-    np.testing.assert_array_equal(changes(coarse, fine, free=(free, True))[0], 9.0 * free)
-
-
 @pytest.mark.parametrize(
-    ("excess", "tried", "taken"),
+    ("excess", "typical", "tried", "taken"),
     [
-        ([1.9, 0.9], [0, 1], 1),
-        ([9.0, 5.0, 2.5, 1.2, 0.6], [0, 2, 3, 4], 4),  # the level behind one that is far off is not tried
-        ([9.0, 8.9, 8.8, 0.5], [0, 2], 0),  # no finer level where errors do not fall
-        ([3.0, 2.8, 1.7, 1.4, 1.5], [0, 1, 2, 3, 4], 2),  # the coarsest of those that err alike
+        ([1.9, 0.9], None, [0, 1], 1),
+        # The level behind one that is far off is not tried.
+        ([9.0, 5.0, 2.5, 1.2, 0.6], None, [0, 2, 3, 4], 4),
+        # No finer level where errors do not fall: those of shots that all levels have, no upper estimates.
+        ([9.0, 8.9, 8.8, 0.5], None, [0, 2], 0),
+        ([2.0, 2.5, 3.0, 0.9], [3.0, 2.5, 2.0, 0.5], [0, 1, 2, 3], 3),
+        ([2.0, 2.5, 3.0, 0.9], [3.0, 2.5, 2.2, 0.5], [0, 1, 2], 0),
+        # The coarsest of the levels that err alike.
+        ([3.0, 2.8, 1.7, 1.4, 1.5], None, [0, 1, 2, 3, 4], 2),
     ],
 )
-def test_levels_that_a_pilot_tries(excess: list[float], tried: list[int], taken: int) -> None:
+def test_levels_that_a_pilot_tries(
+    excess: list[float], typical: list[float] | None, tried: list[int], taken: int
+) -> None:
     seen = []
 
-    def judge(index: int, finer: int, margin: float) -> climb.Verdict[HitErrors]:
-        seen.append(index)
-        found = HitErrors(Numerics(level=index), excess[index] <= 1.0, 0.9, 0.0, 0.0)
-        return climb.Verdict(found, excess[index], excess[index], False)
+    def judge(level: int, finer: int) -> Verdict:
+        seen.append(level)
+        return Verdict(excess[level] <= 1.0, excess[level], (typical or excess)[level], math.inf)
 
-    found = climb.coarsest(judge, range(5), 9, 1)
-    assert found is not None
-    assert (seen, found.numerics.level) == (tried, taken)
-
-
-@pytest.mark.parametrize(("typical", "tried"), [([3.0, 2.5, 2.0, 0.5], 4), ([3.0, 2.5, 2.2, 0.5], 3)])
-def test_how_errors_fall_is_told_by_shots_that_all_levels_have(typical: list[float], tried: int) -> None:
-    seen = []
-
-    def judge(index: int, finer: int, margin: float) -> climb.Verdict[HitErrors]:
-        seen.append(index)  # the upper estimates are of other numbers of shots
-        excess = [2.0, 2.5, 3.0, 0.9][index]
-        return climb.Verdict(
-            HitErrors(Numerics(level=index), excess <= 1.0, 0.9, 0.0, 0.0), excess, typical[index], False
-        )
-
-    found = climb.coarsest(judge, range(4), 9, 1)
-    assert found is not None
-    assert (len(seen), found.kept) == (tried, tried == 4)
+    assert climb(judge, range(min(5, len(excess))), 1) == taken
+    assert seen == tried
 
 
 @pytest.mark.parametrize(("otherwise", "levels"), [(0, [0, 1, 2]), (4, [0, 1, 2, 3])])
 def test_errors_do_not_stall_where_it_is_the_status_that_gets_better(
-    otherwise: int, levels: list[int], monkeypatch: pytest.MonkeyPatch
+    otherwise: int, levels: list[int], stopping: Outcomes, from_level: Callable[..., None]
 ) -> None:
-    one, seen = simulate(STOPPING, PILOT, numerics=Numerics(level=0), device="cpu"), []
-    ends = np.where(np.arange(32) < otherwise, Status.RICOCHETED, one.status)
+    ends, seen = np.where(np.arange(32) < otherwise, Status.RICOCHETED, stopping.status), []
 
-    def outcomes_at(level: int, some: Shots) -> Outcomes:  # which err by as much at every level
-        seen.append(level)
-        speed = one.layer_residual_velocity + 100.0 * (level % 4 < 2)
-        return one.assign(layer_residual_velocity=speed, status=ends if level == 0 else one.status)
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:  # which err by as much at every level
+        seen.append(at.level)
+        speed = stopping.layer_residual_velocity + 100.0 * (at.level % 4 < 2)
+        return stopping.assign(layer_residual_velocity=speed, status=ends if at.level == 0 else stopping.status)
 
-    monkeypatch.setattr(pilot, "SHOTS", 32)
-    monkeypatch.setattr(climb, "FAR", math.inf)
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
-    pilot_hits(outcomes_at, PILOT, Numerics(), (True, True))
+    from_level(0, SHOTS=32, FAR=math.inf)
+    pilot_hits(outcomes_at, PILOT, Numerics(), dear, (True, True))
     assert [level for level in sorted(set(seen)) if level + 2 in seen] == levels
 
 
 @pytest.mark.parametrize(
     ("price", "tried"),
     [
-        (lambda level: 1e-6, [0, 1, 2, 3, 4]),  # takes no time: beyond the usual levels, as long as one is to be found
-        (lambda level: 1.0, [0, 1, 2]),  # the last of the usual levels
+        (cheap, [0, 1, 2, 3, 4]),  # takes no time: beyond the usual levels, as long as one is to be found
+        (dear, [0, 1, 2]),  # the last of the usual levels
         # To look at the third level takes 16 hits at the fifth: as long as WORTH at the third, or longer.
         (lambda level: {2: 3.0, 4: 290.0}.get(level, 1.0), [0, 1, 2]),
         (lambda level: {2: 3.0, 4: 300.0}.get(level, 1.0), [0, 1]),
     ],
 )
 def test_a_pilot_looks_at_levels_that_are_worth_their_time(
-    price: Callable[[int], float], tried: list[int], monkeypatch: pytest.MonkeyPatch
+    price: Callable[[int], float], tried: list[int], known: Outcomes, from_level: Callable[..., None]
 ) -> None:
-    known = simulate(SCENE, PILOT[:16], numerics=Numerics(level=0), device="cpu")
     seen = []
 
-    def outcomes_at(level: int, some: Shots) -> Outcomes:
-        seen.append(level)  # errors fall to half from level to level, and the fifth keeps the promise
-        return known.assign(residual_velocity=known.residual_velocity + 40.0 * 0.5**level)
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        seen.append(at.level)  # errors fall to half from level to level, and the fifth keeps the promise
+        return known[:16].assign(residual_velocity=known[:16].residual_velocity + 40.0 * 0.5**at.level)
 
-    monkeypatch.setattr(pilot, "SHOTS", 16)
-    monkeypatch.setattr(pilot, "FURTHER", 2)
-    monkeypatch.setattr(climb, "FAR", math.inf)
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
-    asked = Numerics(accuracy={"residual_velocity": 3.0})
-    found = pilot_hits(outcomes_at, PILOT[:16], asked, purse=Purse(price))
+    from_level(0, SHOTS=16, FURTHER=2, FAR=math.inf)
+    found = pilot_hits(outcomes_at, PILOT[:16], Numerics(accuracy={"residual_velocity": 3.0}), price)
     assert sorted(level for level in set(seen) if level + 2 in seen) == tried
     assert found.kept == (tried[-1] == 4)
 
 
 @pytest.mark.parametrize(("whole", "to"), [(False, 4), (True, 2)])
 def test_errors_of_a_promise_that_is_not_kept_are_those_to_the_finest_level(
-    whole: bool, to: int, monkeypatch: pytest.MonkeyPatch
+    whole: bool, to: int, known: Outcomes, from_level: Callable[..., None]
 ) -> None:
     # That of as many shots as are known of the level itself: what a measure shifts by needs them.
-    known = simulate(SCENE, PILOT, numerics=Numerics(level=0), device="cpu")
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:  # which creep to no end
+        return known[: len(some)].assign(residual_velocity=known[: len(some)].residual_velocity + 10.0 * at.level)
 
-    def outcomes_at(level: int, some: Shots) -> Outcomes:  # which creep to no end
-        one = known[: len(some)]
-        return one.assign(residual_velocity=one.residual_velocity + 10.0 * level)
-
-    monkeypatch.setattr(pilot, "SHOTS", 16)
-    monkeypatch.setattr(pilot, "FURTHER", 3)
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
-    monkeypatch.setattr(pilot, "OPEN", (0.0, math.inf) if whole else (2.0, 2.0))
-    price = {2: 30.0, 4: 2e3}  # so that 16 more hits at the fifth level are not worth their time
-    limited = Purse(lambda level: price.get(level, 1.0)) if whole else None
-    found = pilot_hits(
-        outcomes_at, PILOT[: 32 if whole else 16], Numerics(accuracy={"residual_velocity": 1.0}), purse=limited
-    )
+    from_level(0, SHOTS=16, FURTHER=3, OPEN=(0.0, math.inf) if whole else (2.0, 2.0))
+    price = {2: 30.0, 4: 2e3 if whole else 1.0}  # so that 16 more hits at the fifth level are not worth their time
+    count = 32 if whole else 16
+    asked = Numerics(accuracy={"residual_velocity": 1.0})
+    found = pilot_hits(outcomes_at, PILOT[:count], asked, lambda level: price.get(level, 1.0))
     assert (found.kept, found.numerics.level) == (False, 0)
     assert found.residual_velocity_error == pytest.approx(MARGIN[2] * 10.0 * to)
-    assert found.tried[0][0] == found
-    assert [len(one) for one in found.tried[0][1:]] == [32 if whole else 16] * 2
+    assert found.tried[0].errors == found
+    assert len(found.tried[0].coarse) == len(found.tried[0].fine) == count
 
 
 @pytest.mark.parametrize(("otherwise", "parts"), [(0, [32, 32]), (1, [32, 32, 32, 32]), (3, [32, 32])])
 def test_more_hits_tell_the_share_that_ends_otherwise(
-    otherwise: int, parts: list[int], monkeypatch: pytest.MonkeyPatch
+    otherwise: int, parts: list[int], stopping: Outcomes, from_level: Callable[..., None]
 ) -> None:
-    one = simulate(STOPPING, PILOT, numerics=Numerics(level=0), device="cpu")
-    ends, counts = one.status.copy(), []
+    ends, counts = stopping.status.copy(), []
     ends[:otherwise] = np.where(ends[:otherwise] == Status.ARRESTED, Status.PERFORATED, Status.ARRESTED)
 
-    def outcomes_at(level: int, some: Shots) -> Outcomes:
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
         counts.append(len(some))
-        return one.assign(status=ends if level == 2 and len(counts) < 3 else one.status)
+        return stopping.assign(status=ends if at.level == 2 and len(counts) < 3 else stopping.status)
 
-    monkeypatch.setattr(pilot, "SHOTS", 32)
-    monkeypatch.setattr(pilot, "FURTHER_LAYERED", 0)
-    found = pilot_hits(outcomes_at, Shots.joined([PILOT, PILOT]), Numerics(), (True, True))
+    from_level(2, SHOTS=32, FURTHER_LAYERED=0)
+    found = pilot_hits(outcomes_at, BOTH, Numerics(), dear, (True, True))
     assert counts == parts
     assert found.kept == (otherwise == 0)
 
 
 def test_more_hits_of_a_coarser_level_tell_the_share_that_ends_otherwise_at_a_finer_one(
-    monkeypatch: pytest.MonkeyPatch,
+    stopping: Outcomes, from_level: Callable[..., None]
 ) -> None:
-    one, computed = simulate(STOPPING, PILOT, numerics=Numerics(level=0), device="cpu"), []
-    other = np.where(one.status == Status.ARRESTED, Status.PERFORATED, Status.ARRESTED)
+    other, computed = np.where(stopping.status == Status.ARRESTED, Status.PERFORATED, Status.ARRESTED), []
 
-    def outcomes_at(level: int, some: Shots) -> Outcomes:
-        computed.append((level, len(some)))
-        first = (level, 32) not in computed[:-1]  # of which one ends otherwise, but at the finest two levels
-        status = np.where((np.arange(32) == 0) & first & (level < 2), other, one.status)
-        behind = one.layer_residual_velocity + (0.9 if level == 0 else 0.0)
-        return one.assign(layer_residual_velocity=behind, status=status)
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        computed.append((at.level, len(some)))
+        first = (at.level, 32) not in computed[:-1]  # of which one ends otherwise, but at the finest two levels
+        status = np.where((np.arange(32) == 0) & first & (at.level < 2), other, stopping.status)
+        behind = stopping.layer_residual_velocity + (0.9 if at.level == 0 else 0.0)
+        return stopping.assign(layer_residual_velocity=behind, status=status)
 
-    monkeypatch.setattr(pilot, "SHOTS", 32)
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
+    from_level(0, SHOTS=32)
     asked = Numerics(accuracy={"residual_velocity": 1.0, "tilt": 1.0, "depth": "1 mm", "status_share": 0.02})
-    found = pilot_hits(outcomes_at, Shots.joined([PILOT, PILOT]), asked, (True, True))
+    found = pilot_hits(outcomes_at, BOTH, asked, dear, (True, True))
     assert computed == [(0, 32), (2, 32), (0, 32), (2, 32), (1, 32), (3, 32)]
     assert (found.kept, found.numerics.level, found.status_error) == (True, 1, 1.0 / 64.0)
 
 
-@pytest.mark.parametrize("error", [math.inf, math.nan, 1e300])
-@pytest.mark.parametrize(
-    ("asked", "place"), [({"tilt": 0.02}, 0), ({"residual_velocity": 1.0}, 1), ({"residual_velocity": 1.0}, 2)]
-)
-def test_what_an_accuracy_does_not_ask_for_counts_nothing(asked: dict[str, float], place: int, error: float) -> None:
-    errors = np.array([0.5, math.radians(0.01), 0.0])
-    errors[place] = error
-    assert pilot._excess(Accuracy(**asked), errors, layered=True) == 0.5
+def test_as_many_hits_of_a_coarser_level_do_not_tell_the_share_that_ends_otherwise_at_a_finer_one(
+    stopping: Outcomes, from_level: Callable[..., None]
+) -> None:
+    other = np.where(stopping.status == Status.ARRESTED, Status.PERFORATED, Status.ARRESTED)
+
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        behind = stopping.layer_residual_velocity + (9.0 if at.level == 0 else 0.0)
+        status = np.where((np.arange(32) == 0) & (at.level == 1), other, stopping.status)
+        return stopping.assign(layer_residual_velocity=behind, status=status)
+
+    from_level(0, SHOTS=32, FAR=math.inf)
+    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, (True, True))
+    assert [each.errors.status_error for each in found.tried] == [0.0, 1.0 / 32.0, 0.0]
+    assert (found.kept, found.numerics.level) == (True, 2)
 
 
-@pytest.mark.parametrize(("share_of_allowed", "parts"), [(0.5, [16, 16]), (1.1, [16, 16, 16, 16])])
-def test_more_hits_are_computed_where_the_first_leave_the_level_open(
-    share_of_allowed: float, parts: list[int], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("error", "parts"), [(0.5, [16, 16]), (1.1, [16] * 4 + [32] * 2), (1.6, [16, 16])])
+def test_a_pilot_doubles_its_hits_until_they_tell_enough(
+    error: float, parts: list[int], known: Outcomes, from_level: Callable[..., None]
 ) -> None:
     counts = []
 
-    def outcomes_at(level: int, some: Shots) -> Outcomes:
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
         counts.append(len(some))
-        return simulate(SCENE, some, numerics=Numerics(level=level), device="cpu")
+        one = known[: len(some)]
+        return one.assign(residual_velocity=one.residual_velocity + error / MARGIN[2] * (at.level == 0))
 
-    monkeypatch.setattr(pilot, "SHOTS", 16)
-    monkeypatch.setattr(pilot, "FURTHER", 0)
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 0)
-    told = pilot_hits(outcomes_at, PILOT[:16], Numerics(fidelity="draft")).tilt_error
-    counts.clear()
-    asked = Numerics(accuracy={"residual_velocity": 1e3, "tilt": math.degrees(told / share_of_allowed)})
-    pilot_hits(outcomes_at, PILOT, asked)
+    from_level(0, SHOTS=16, FURTHER=0)
+    found = pilot_hits(outcomes_at, BOTH, Numerics(accuracy={"residual_velocity": 1.0}), dear)
     assert counts == parts
-
-
-def test_a_pilot_doubles_its_hits_until_they_tell_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    one, counts = simulate(SCENE, PILOT, numerics=Numerics(level=0), device="cpu"), []
-    excess = {16: 1.2, 32: 0.6, 64: 0.6}
-
-    def outcomes_at(at: int, some: Shots) -> Outcomes:
-        counts.append(len(some))
-        return one[: len(some)]
-
-    monkeypatch.setattr(pilot, "SHOTS", 16)
-    monkeypatch.setattr(pilot, "FURTHER", 0)
-    shots = Shots.joined([PILOT, PILOT])
-    found = pilot_hits(outcomes_at, shots, Numerics(), excess_of=lambda coarse, fine, some: excess[len(some)])
-    assert counts == [16, 16, 16, 16]
-    assert found.kept
+    assert found.kept == (error < 1.0)
 
 
 @pytest.mark.parametrize(
@@ -449,100 +378,180 @@ def test_a_pilot_doubles_its_hits_until_they_tell_enough(monkeypatch: pytest.Mon
     ],
 )
 def test_more_hits_tell_more_of_what_a_measure_shifts_by(
-    excess: list[float], computed: int, kept: bool, monkeypatch: pytest.MonkeyPatch
+    excess: list[float], computed: int, kept: bool, known: Outcomes, from_level: Callable[..., None]
 ) -> None:
-    one, counts = simulate(SCENE, PILOT[:32], numerics=Numerics(level=0), device="cpu"), []
+    counts = []
 
-    def outcomes_at(at: int, some: Shots) -> Outcomes:
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
         counts.append(len(some))
-        return one[: len(some)]
+        return known[: len(some)]
 
-    monkeypatch.setattr(pilot, "SHOTS", 16)
-    monkeypatch.setattr(pilot, "FURTHER", 0)
-    monkeypatch.setattr(pilot, "coarsest_level", lambda strictness: 1)
-    found = pilot_hits(
-        outcomes_at, PILOT[:32], Numerics(), excess_of=lambda coarse, fine, shots: excess[len(shots) // 32]
-    )
+    def excess_of(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
+        return excess[len(shots) // 32]
+
+    from_level(1, SHOTS=16, FURTHER=0)
+    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, excess_of=excess_of)
     assert (counts, found.numerics.level, found.kept) == ([16] * computed, 0, kept)
 
 
-def test_errors_of_slow_cores_are_those_of_their_energy(limit: Outcomes) -> None:
-    one, impact = limit[np.arange(3)], np.full(3, 800.0)
-    speeds, back = np.array([600.0, 20.0, 20.0]), [Status.PERFORATED, Status.PERFORATED, Status.ARRESTED]
-    passed = one.assign(residual_velocity=speeds, status=np.zeros(3, dtype=np.int8))
-    stopped = np.where(np.array(back) == Status.ARRESTED, np.nan, one.tilt[:, -1])
-    slower = passed.assign(
-        residual_velocity=np.array([599.0, 18.0, 0.0]),
-        tilt=np.stack([stopped + 0.01] * 2, axis=1),
-        status=np.array(back, dtype=np.int8),
-    )
-    velocity, tilt, depth = changes(passed.assign(tilt=np.stack([one.tilt[:, -1]] * 2, axis=1)), slower, impact)
-    energy = (speeds**2 - slower.residual_velocity**2)[1:] / (2.0 * SLOW * 800.0)
-    assert velocity == pytest.approx([1.0, *energy])
-    assert tilt == pytest.approx([0.01, 0.01 * 19.0 / 200.0, math.pi * 10.0 / 200.0])
-    assert np.isnan(depth).all()
-
-
-def test_fast_cores_count_as_they_are(limit: Outcomes) -> None:
-    coarse = simulate(SCENE, OTHERS, numerics=Numerics(level=1), device="cpu")
-    velocity, tilt, _ = changes(coarse, limit, OTHERS.velocity)
-    plain = changes(coarse, limit)
-    assert limit.residual_velocity.min() > SLOW * 820.0
-    np.testing.assert_array_equal(velocity, plain[0])
-    np.testing.assert_array_equal(tilt, plain[1])
-
-
-def test_shots_at_one_plate_count_as_one_where_they_err_alike() -> None:
-    errors = np.arange(60.0)
-    assert upper_error(errors, 0.9) == upper_error(errors, 0.9, np.arange(60)) == upper_place(60, 0.9) - 1 < 58
-    assert upper_error(errors, 0.9, risk=0.5) == 54  # of as many as lie beyond 90 %
-    assert upper_error(errors, 0.9, np.arange(60) // 3) == 59  # of 20 plates the last one
-    assert upper_error(errors, 0.9, np.zeros(60, dtype=int)) == 59  # one plate tells of no other
-    assert upper_error(errors, 0.9, np.arange(60) % 20) < 59  # the largest errors are those of other plates
-
-
-@pytest.mark.parametrize("alike", [0.0, 0.3, 0.7, 1.0])
-@pytest.mark.parametrize(("plates", "at_a_plate"), [(22, 3), (85, 3), (32, 2), (16, 8)])
-def test_an_estimate_is_rarely_below_the_percentile_however_alike_shots_at_a_plate_err(
-    plates: int, at_a_plate: int, alike: float
+def test_errors_of_the_first_hits_tell_how_they_fall_from_level_to_level(
+    known: Outcomes, from_level: Callable[..., None]
 ) -> None:
-    rng, numbers = np.random.default_rng(8), np.repeat(np.arange(plates), at_a_plate)
-    below = 0
-    for _ in range(1000):
-        own, shared = rng.normal(size=plates * at_a_plate), rng.normal(size=plates)[numbers]
-        below += upper_error(math.sqrt(alike) * shared + math.sqrt(1.0 - alike) * own, 0.9, numbers) < 1.2816
-    enough = 0.9**plates < RISK  # for the largest of errors that are wholly alike
-    assert below < 1000 * (RISK + 0.04 if enough or alike < 1.0 else 0.9**plates + 0.04)
+    excess = {0: (2.9, 1.2), 1: (2.9, 1.2), 2: (2.0, 1.1), 3: (0.5, 0.5)}  # of 16 and of 32 hits
+
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        return known[: len(some)].assign(residual_velocity=np.full(len(some), float(at.level or 0)))
+
+    def excess_of(coarse: Outcomes, fine: Outcomes, shots: Shots) -> float:
+        return excess[int(coarse.residual_velocity[0])][len(shots) // 32]
+
+    from_level(0, SHOTS=16)
+    found = pilot_hits(outcomes_at, PILOT, Numerics(), dear, excess_of=excess_of)
+    assert (found.kept, found.numerics.level) == (True, 3)
 
 
-def test_design_effect_of_groups_of_several_sizes() -> None:
-    # An analysis of variance, of groups of one size: between them over within, F, gives (m - 1) correlation + 1.
-    rng = np.random.default_rng(2)
-    values = rng.normal(size=(400, 5)) + rng.normal(size=(400, 1))
-    within = values.var(axis=1, ddof=1).mean()
-    between = 5.0 * values.mean(axis=1).var(ddof=1)
-    correlation = (between - within) / (between + 4.0 * within)
-    groups = np.repeat(np.arange(400), 5)
-    doubt = math.sqrt(2.0 * 4.0 / (5.0 * 399.0))
-    assert design_effect(values.ravel(), groups) == pytest.approx(1.0 + 4.0 * correlation + doubt, rel=3e-3)
-    some = rng.random(2000) < 0.7  # as where some shots have no depth
-    assert design_effect(values.ravel()[some], groups[some]) == pytest.approx(1.0 + 2.5 * correlation, rel=0.15)
+@pytest.mark.parametrize(("keeps", "level"), [(1, 1), (2, 0)])
+def test_one_level_is_tried_behind_one_that_nearly_keeps_the_promise(
+    keeps: int, level: int, known: Outcomes, from_level: Callable[..., None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def compared(at: Numerics, *rest: Any) -> tuple[HitErrors, Verdict]:
+        kept = at.level >= keeps
+        return HitErrors(at, kept, 0.9, 0.0, 0.0), Verdict(kept, 0.5 if kept else 4.0, 0.5**at.level, 0.9)
+
+    from_level(0)
+    monkeypatch.setattr(pilot, "compared", compared)
+    found = pilot_hits(lambda at, some: known[:4], PILOT[:4], Numerics(), dear)
+    assert (found.kept, found.numerics.level) == (level == keeps, level)
 
 
-def test_a_failed_computation_has_no_bound(limit: Outcomes) -> None:
-    one = limit[np.arange(2)]
-    failed = one.assign(status=np.array([Status.UNFINISHED, one.status[1]], dtype=np.int8))
-    velocity, tilt, _ = changes(one, failed, np.full(2, 820.0))
-    assert np.isinf([velocity[0], tilt[0]]).all()
-    assert velocity[1] == tilt[1] == 0.0
+@pytest.mark.parametrize("allowed", [0.7, 2.0])
+def test_a_long_run_has_coarser_settings_that_keep_the_promise_on_other_hits(allowed: float) -> None:
+    plate = paper_plate()
+    scene = Scene(core=PAPER_CORE, target=plate, record=Record(standoffs=(0.13,)))
+    shots, others = (make_shots(Impact(velocity=825.0), Hits(count=64, seed=seed), plate) for seed in (1, 2))
+    asked = Numerics(accuracy=Accuracy(residual_velocity=allowed, tilt=allowed), precision="double")
+    short, long = (pilot_of(scene, shots, asked, Worker("cpu"), hits=PART * len(shots) - less) for less in (1, 0))
+    assert short.numerics.coarser is None
+    assert (long.kept, long.numerics.level, long.numerics.precision) == (True, short.numerics.level, "double")
+    assert long.numerics.coarser is not None
+    taken = next(each.coarse for each in long.tried if each.errors.numerics == long.numerics)
+    again = simulate(scene, shots, numerics=long.numerics, device="cpu")
+    np.testing.assert_array_equal(taken.residual_velocity, again.residual_velocity)
+    coarse, fine = (simulate(scene, others, numerics=at, device="cpu") for at in (long.numerics, Numerics(level=6)))
+    velocity, tilt, _ = (np.quantile(errors, 0.9) for errors in changes(coarse, fine))
+    assert velocity <= long.residual_velocity_error <= allowed
+    assert tilt <= long.tilt_error <= math.radians(allowed)
 
 
-@pytest.mark.parametrize(("share", "shots"), [(0.5, 64), (0.9, 64), (0.99, 200)])
-def test_an_estimate_is_rarely_below_the_percentile_that_it_stands_for(share: float, shots: int) -> None:
-    assert [upper_place(count, 0.9) for count in (1, 16, 32, 64)] == [1, 16, 31, 61]
-    errors = np.random.default_rng(3).exponential(size=(20000, shots))
-    below = np.sort(errors)[:, upper_place(shots, share) - 1] < -np.log(1.0 - share)
-    assert 0.08 < below.mean() < RISK
+@pytest.mark.parametrize("kept", [True, False])  # or kept nearly, with weighed errors
+@pytest.mark.parametrize(
+    ("level", "excess", "status", "coarser"),
+    [
+        (4, {"": ROOM}, {}, ""),
+        (4, {"": 0.5, "step 3": ROOM + 0.01, "grid 3": ROOM}, {}, "grid 3"),
+        (4, {"": 0.4, "step 2": 1.1, "step 3": 0.8, "grid 3, step 3": ROOM}, {}, "grid 3, step 3"),
+        (4, {"": 0.4, "step 2": 0.8, "grid 3, step 2": ROOM}, {}, "grid 3, step 2"),
+        (1, {"": 0.3, "step 0": ROOM}, {}, "step 0"),
+        (8, {"": 0.3, "step 6": ROOM}, {}, "step 6"),
+        # No more shots end otherwise than at the level itself.
+        (4, {"": 0.5, "step 3": 0.5, "grid 3": ROOM}, {"step 3": 0.01}, "grid 3"),
+        (4, {"": 0.5, "step 3": ROOM}, {"": 0.01, "step 3": 0.01}, "step 3"),
+        (4, {"": 0.5, "step 3": ROOM}, {"": math.nan, "step 3": math.nan}, "step 3"),
+    ],
+)
+def test_coarser_settings_are_tried_as_far_as_there_is_room(
+    level: int,
+    excess: dict[str, float],
+    status: dict[str, float],
+    coarser: str,
+    kept: bool,
+    known: Outcomes,
+    from_level: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried, velocities = list[str](), dict[str, NDArray[np.float64]]()
+
+    def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
+        tried.append(str(at.coarser or f"level {at.level}"))
+        velocities[tried[-1]] = known.residual_velocity[:4] + len(tried)
+        return known[:4].assign(residual_velocity=velocities[tried[-1]])
+
+    def compared(at: Numerics, asked: Accuracy, given: Any, margin: float, *rest: Any) -> tuple[HitErrors, Verdict]:
+        name, finer = str(at.coarser or ""), min(level + 2, 9)
+        assert margin == MARGIN[finer - level]
+        for outcomes, of in zip(given, (name or f"level {level}", f"level {level}", f"level {finer}"), strict=True):
+            np.testing.assert_array_equal(outcomes.residual_velocity, velocities[of])
+        over = excess.get(name, 2.0)
+        errors = HitErrors(at, kept, 0.9, over, 0.0, status_error=status.get(name, 0.0))
+        return errors, Verdict(kept, over if kept else 9.0, 1.0, math.inf if kept else over)
+
+    from_level(level, FURTHER=0)
+    monkeypatch.setattr(pilot, "compared", compared)
+    found = pilot_hits(outcomes_at, PILOT[:4], Numerics(), dear, hits=PART * 4)
+    assert tried[2:] == list(excess)[1:]
+    assert (found.kept, str(found.numerics.coarser or "")) == (kept, coarser)
+    assert found.residual_velocity_error == excess[coarser]
+    np.testing.assert_array_equal(found.tried[0].coarse.residual_velocity, velocities[coarser or f"level {level}"])
+
+
+DRAFT = Numerics(fidelity="draft")
+SHARE = PRESETS["draft"].limit
+
+
+def limits_found(values: Mapping[int, ArrayLike], asked: Numerics = DRAFT) -> tuple[LimitErrors, list[int]]:
+    """What a pilot of limits [m/s] finds that are the same for all hits of a level, or one for each; and its levels."""
+    levels = []
+
+    def limits_at(level: int) -> NDArray[np.float64]:
+        levels.append(level)
+        return np.full(LIMITS, values[level])
+
+    return pilot_limits(limits_at, asked, "velocity"), levels
+
+
+def few(times: float) -> NDArray[np.float64]:
+    """Of a pilot's limits, one in eight many times as large as the others."""
+    return np.where(np.arange(LIMITS) < 2, times, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("limit_at", "kept", "level", "error"),
+    [
+        # Neighbours agree, and the limit lies 4 % away from the first ones.
+        (lambda k: 104.0 if k < 2 else 100.0, True, 2, 0.0),
+        (lambda k: 100.0 + 1.0 / 2**k, True, 0, MARGIN[2] * 0.75),
+        # The finest level that is taken has one finer beside it.
+        (lambda k: 100.0 + 90.0 * 0.6**k, False, FINEST_LIMIT, MARGIN[1] * 90.0 * 0.4 * 0.6**FINEST_LIMIT),
+        # Half are within the promise from the first level on. One in eight errs four times as much: these are within it
+        # two levels on; with eight times as much they are not.
+        (lambda k: 100.0 + 90.0 * few(4.0) * SHARE / 2**k, True, 2, MARGIN[2] * 90.0 * 4.0 * SHARE * 0.75 / 4.0),
+        (lambda k: 100.0 + 90.0 * few(8.0) * SHARE / 2**k, False, 0, MARGIN[2] * 90.0 * 8.0 * SHARE * 0.75),
+    ],
+)
+def test_the_level_of_limits(limit_at: Callable[[int], ArrayLike], kept: bool, level: int, error: float) -> None:
+    found, _ = limits_found({k: limit_at(k) for k in range(FINEST_LIMIT + 2)})
+    assert (found.kept, found.numerics) == (kept, Numerics(level=level))
+    assert found.error == pytest.approx(error)
+
+
+def test_limits_that_come_and_go_end_the_climb() -> None:
+    # Most limits err by less than the promise; one in eight exists on every second pair of levels.
+    values = {k: np.full(LIMITS, 100.0 + 1.0 / 2**k) for k in range(FINEST_LIMIT + 2)}
+    for level, value in values.items():
+        value[:2] = np.inf if level // 2 % 2 else 100.0
+    found, levels = limits_found(values)
+    assert (found.kept, found.error, found.numerics) == (False, np.inf, Numerics(level=0))
+    assert FINEST_LIMIT not in levels
+
+
+def test_an_accuracy_of_limits_in_numbers_is_that_of_the_name() -> None:
+    values = {k: 100.0 * (1.0 + 3.0 * SHARE / 2**k) for k in range(FINEST_LIMIT + 2)}
+    asked = Numerics(accuracy={"limit": SHARE})
+    assert limits_found(values, asked) == limits_found(values)
+    assert limits_pilot_size(asked.asked) == LIMITS
+    assert limits_pilot_size(Numerics(accuracy={"limit": SHARE, "share": 0.99}).asked) == 160
+    with pytest.raises(ValueError, match="needs limit"):
+        limits_found(values, Numerics(accuracy={"tilt": "1 deg"}))
 
 
 @pytest.mark.parametrize("bound", [5.0, 1.0, 0.2])

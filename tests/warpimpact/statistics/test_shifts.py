@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from warpimpact.statistics.shifts import BEYOND, shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
+from warpimpact.statistics.shifts import SHIFT_MARGIN, shift_of_mean, shift_of_quantile, shift_of_share, shift_of_yes
 
 Array = np.ndarray
 TRIALS, SHOTS = 400, 64
@@ -37,7 +37,7 @@ def held(shift: Callable[[Array, Array], float], true: float, *, bias: float, no
 def test_the_true_shift_lies_within(shift: Callable[[Array, Array], float], widest: float, bias: float) -> None:
     held_in, median = held(shift, abs(bias), bias=bias, noise=0.01)
     assert held_in >= LEAST
-    assert median <= BEYOND * (abs(bias) + widest)
+    assert median <= SHIFT_MARGIN * (abs(bias) + widest)
 
 
 def test_a_share_is_known_far_better_than_from_the_shots_that_changed_sides() -> None:

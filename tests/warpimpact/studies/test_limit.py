@@ -24,8 +24,8 @@ from warpimpact.runs.task import Task
 from warpimpact.runs.team import local_team
 from warpimpact.scene import Numerics, make_shots
 from warpimpact.solver.limit import limit_velocity
-from warpimpact.solver.limit_pilot import LIMITS
 from warpimpact.solver.limit_search import MOST_RUNS
+from warpimpact.solver.pilot import LIMITS
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap, quantiles, warning_of
 from warpimpact.studies.limit_text import limits_text
