@@ -23,7 +23,7 @@ def message_of(error: Exception) -> str | None:
         return f"not enough memory: {error}" if str(error) else "not enough memory"
     if isinstance(error, OSError):  # of the system: a name that is too long, a disk that is full
         name = f"{os.fsdecode(error.filename)[:200]}: " if isinstance(error.filename, str | bytes) else ""
-        return f"{name}{error.strerror or error}"
+        return f"{name}{error.strerror or str(error) or type(error).__name__}"
     return None
 
 

@@ -8,8 +8,8 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError
-from contextlib import ExitStack, contextmanager
-from typing import Any, NamedTuple
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
+from typing import Any, NamedTuple, TypeVar
 
 from warpimpact.campaign.campaign import Campaign
 from warpimpact.results.table import Table
@@ -24,6 +24,9 @@ LONELY = 120.0
 """Seconds for which a scheduler may be without workers."""
 LISTEN_EVERY = 0.2
 """Seconds between two looks for a signal while a worker prepares."""
+
+
+Entered = TypeVar("Entered")
 
 
 class _How(NamedTuple):
@@ -106,15 +109,16 @@ def connected(address: str | None, workers: int | None) -> Iterator[tuple[Reache
                     dashboard_address="127.0.0.1:0",
                     silence_logs=logging.CRITICAL,
                 )
-                address = stack.enter_context(cluster).scheduler_address
+                address = stack.enter_context(_ended(cluster)).scheduler_address
         with _starting():
             try:
                 # Not the default of its process, of which xarray takes the locks of the files that are written here.
-                client = stack.enter_context(Client(address, timeout="20s", set_as_default=False))
+                client = stack.enter_context(_ended(Client(address, timeout="20s", set_as_default=False)))
             except (OSError, ValueError) as error:
                 raise ClusterError(f'scheduler: got "{address}", which cannot be reached ({error})') from None
         if threads is not None:
-            client.register_plugin(_ignoring_interrupts(WorkerPlugin))
+            with _starting():
+                client.register_plugin(_ignoring_interrupts(WorkerPlugin))
         executor = client.get_executor(pure=False)
         reached = Reached(client, address)
         try:
@@ -123,6 +127,18 @@ def connected(address: str | None, workers: int | None) -> Iterator[tuple[Reache
             raise _lost(address, error) from None
         except KilledWorker as error:
             raise ClusterError(f"some shots ended one worker after another, perhaps out of memory: {error}") from None
+
+
+@contextmanager
+def _ended(part: AbstractContextManager[Entered]) -> Iterator[Entered]:
+    """A part of Dask that does not end in time, on a busy machine, must not hide how the computation ended. Its
+    processes end with this one."""
+    entered = part.__enter__()
+    try:
+        yield entered
+    finally:
+        with suppress(OSError):  # TimeoutError among them
+            part.__exit__(None, None, None)
 
 
 @contextmanager

@@ -104,6 +104,19 @@ def test_settings_with_which_dask_does_not_start_are_named(campaign: Campaign, m
         pass
 
 
+def test_workers_that_do_not_end_in_time_hide_no_interrupt(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    close = distributed.Client.__exit__
+
+    def slow(*arguments: object) -> None:
+        close(*arguments)
+        raise TimeoutError
+
+    monkeypatch.setattr(distributed.Client, "__exit__", slow)
+    with pytest.raises(KeyboardInterrupt), cluster_team(campaign, workers=1, device="cpu"):
+        raise KeyboardInterrupt
+
+
 def test_the_command_starts_workers_and_a_local_run_resumes_them(
     campaign: Campaign, tmp_path: Path, assert_same_bits: Callable[[Path, Path], None]
 ) -> None:
