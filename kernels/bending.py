@@ -10,66 +10,27 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, damping, footprint, rigid_body
+from . import core_surface, damping, rigid_body, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the bending for one variant."""
+    struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(core_surface, rigid_body, damping, contact, footprint)
-    Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
-    Body, State, Load = use.rigid_body.Body, use.rigid_body.State, use.rigid_body.Load
-    Change = use.rigid_body.Change
-    Touches, Footprint, Sums = use.contact.Touches, use.footprint.Footprint, use.damping.Sums
-
-    @wp.struct
-    class Sections:
-        """The sections behind the rings; arrays of shape [rings]. `station` is the distance behind the nose [m],
-        `ahead` the distance ahead of the centre of mass [m]. `stress` is the stress per bending moment, 4/(π r³)
-        [1/m³]; it is 0 where no stress is computed.
-
-        ξ is the distance of a slice ahead of the centre of mass, x that of the section. The integrals run over all
-        slices ahead of the section, per mass of the core: first = ∫ (ξ − x) dm [m], second = ∫ (ξ − x) ξ dm [m²] and
-        rotary = ∫ r²/4 dm [m²].
-        """
-
-        station: wp.array(dtype=real)
-        ahead: wp.array(dtype=real)
-        stress: wp.array(dtype=real)
-        first: wp.array(dtype=real)
-        second: wp.array(dtype=real)
-        rotary: wp.array(dtype=real)
-
-    @wp.struct
-    class Bending:
-        """The largest bending moment [N m] and nominal stress [Pa] so far, and where behind the nose [m].
-
-        A core is broken from the first step on in which the stress is above its `strength` [Pa]: the middle of that
-        step [s], the most stressed section then behind the nose [m], and that section ahead of the hit point along x.
-        """
-
-        moment: real
-        moment_station: real
-        stress: real
-        stress_station: real
-        strength: real
-        broken: wp.int32
-        broken_time: real
-        broken_station: real
-        broken_x: real
+    use = variant.use(core_surface, damping, rigid_body)
 
     @wp.func
-    def mean_force(sums: Sums, dv: vec3, dw: vec3):
+    def mean_force(sums: struct.Sums, dv: vec3, dw: vec3):
         """Force on a ring [N], mean over the step, if the velocities change by (dv, dw) more than foreseen."""
         slopes = sums.slopes
         return sums.force - half * (use.damping.damping_vv(slopes) * dv + use.damping.damping_vw(slopes) * dw)
 
     @wp.func
-    def mean_moment(sums: Sums, dv: vec3, dw: vec3):
-        """Moment of a ring about the centre of mass [N m], likewise."""
+    def mean_moment(sums: struct.Sums, dv: vec3, dw: vec3):
+        """Moment of a ring about the centre of mass [N m], with the same mean."""
         slopes = sums.slopes
         coupled = wp.transpose(use.damping.damping_vw(slopes)) * dv
         return sums.moment - half * (coupled + use.damping.damping_ww(slopes) * dw)
@@ -81,27 +42,25 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def bent(
-        before: Bending,
-        surface: Surface,
-        sections: Sections,
-        body: Body,
-        touches: Touches,
-        slot: wp.int32,
-        found: Footprint,
-        pose: Pose,
-        state: State,
-        load: Load,
-        foreseen: Change,
+        before: struct.Bending,
+        context: struct.Context,
+        sections: struct.Sections,
+        footprint: struct.Footprint,
+        pose: struct.Pose,
+        state: struct.State,
+        load: struct.Load,
+        foreseen: struct.Change,
         dt: real,
-        time: real,
+        now: real,
     ):
         """The larger of `before` and the bending in one step, whose load changes the velocities in `state`. The loads
-        on the rings are those at half of the foreseen change. `time` is that of the middle of the step.
+        on the rings are those at half of the foreseen change. `now` is the time at the middle of the step [s].
 
         A slice at ξ ahead of the centre of mass accelerates across the axis by a + (α + ω_x J ω) × ξ. Its moment per
         rotary inertia is α − ω_x J ω. Here J ω = axis × ω. The terms with ω_x come from the spin: Euler's equations for
         a disc, whose axial moment of inertia is twice the transverse one.
         """
+        surface, body, touches = context.surface, context.body, context.touches
         worst = before
         dv, dw, felt_v, felt_w = use.rigid_body.velocity_change(body, load, dt)
         share = use.rigid_body.restraint_of(body, state, dv, dw)
@@ -112,9 +71,9 @@ def build(variant: Variant) -> SimpleNamespace:
         force, moment = vec3(), vec3()
         ahead = zero
         for index in range(surface.rings):
-            here = use.core_surface.rings_before(surface, slot) + index
+            here = use.core_surface.rings_before(surface, context.slot) + index
             area = zero
-            if index >= found.first_ring and index <= found.last_ring:
+            if index >= footprint.first_ring and index <= footprint.last_ring:
                 area = touches.total_area[here]
             if area > zero:
                 sums = touches.sums[here]
@@ -136,7 +95,7 @@ def build(variant: Variant) -> SimpleNamespace:
                 ahead = sections.ahead[index]
         if worst.broken == 0 and worst.stress > worst.strength:
             worst.broken = 1
-            worst.broken_time = time
+            worst.broken_time = now
             worst.broken_station = worst.stress_station
             worst.broken_x = state.position[0] + ahead * pose.axis[0]
         return worst

@@ -14,7 +14,8 @@ Where the barriers stand, and what would go wrong without each of them (E is the
 1. After the deposits: a lane converts nodes of G that all lanes add to.
 2. After the conversion: the filter reads nodes of G that other lanes have converted.
 3. Between the filter's directions, in `exposure.spread`: the second one reads what other lanes have filtered, and
-   overwrites G, which they read in the first one. Likewise before what spreads over planes overwrites the filtered.
+   overwrites G, which they read in the first one. The same holds before what spreads over planes overwrites what was
+   filtered.
 4. Before the second pass: a patch reads nodes of E that other lanes have raised to mid-step.
 5. After the second pass: `settle` raises nodes of E that other lanes read as they are at mid-step.
 6. After `settle`: the next step adds to nodes of G that other lanes clear.
@@ -44,83 +45,77 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import (
-    contact,
-    core_surface,
-    damping,
-    exposure,
-    fixed_point,
-    footprint,
-    interaction,
-    lanes,
-    memory,
-    plate_grid,
-    rigid_body,
-)
+from . import channel, contact, core_surface, exposure, fixed_point, lanes, memory, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load in the block layout for one variant, in float32."""
-    real = variant.real
-    zero, half = real(0.0), real(0.5)
-    use = variant.use(
-        contact, core_surface, damping, exposure, fixed_point, footprint, interaction, lanes, plate_grid, rigid_body
-    )
-    Surface, Pose, Plate = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Plate
-    Window = use.plate_grid.Window
-    Law, Load, Slopes = use.interaction.Law, use.rigid_body.Load, use.damping.Slopes
-    Footprint = use.footprint.Footprint
-    Fields, Touches = use.exposure.Fields, use.contact.Touches
+    struct, real = structs.build(variant), variant.real
+    zero = real(0.0)
+    use = variant.use(channel, contact, core_surface, exposure, fixed_point, lanes)
     read, part_of, read_index = memory.build(real).read, memory.build(real).part_of, memory.build(wp.int32).read
 
     @wp.func
-    def in_front(fields: Fields):
+    def in_front(fields: struct.Fields):
         """The fields of a slot that has layers, with exposure and gain of the front window in shared memory."""
-        own = fields
+        front = fields
         if wp.static(variant.degrades):
-            own.exposure = use.lanes.own_exposure(fields.exposure, 0)
-            own.gain = use.lanes.own_gain(fields.gain, 0)
-        return own
+            front.exposure = use.lanes.shared_exposure(fields.exposure, 0)
+            front.gain = use.lanes.shared_gain(fields.gain, 0)
+        return front
 
     @wp.func
-    def own_fields(fields: Fields, slot: wp.int32):
-        """The fields of a block alone: those of its slot, and of a single plate in shared memory."""
-        own = fields
+    def fields_of_slot(fields: struct.Fields, slot: wp.int32):
+        """The fields of one block: those of its slot, and of a single plate in shared memory."""
+        part = fields
         if wp.static(variant.layered or variant.deep):
-            own = use.exposure.own_fields(fields, slot)
+            part = use.exposure.fields_of_slot(fields, slot)
         else:
             if wp.static(variant.degrades):
-                own.exposure = use.lanes.own_exposure(fields.exposure, slot * fields.nodes)
-                own.gain = use.lanes.own_gain(fields.gain, slot * fields.nodes)
-                own.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
+                part.exposure = use.lanes.shared_exposure(fields.exposure, slot * fields.nodes)
+                part.gain = use.lanes.shared_gain(fields.gain, slot * fields.nodes)
+                part.filtered = part_of(fields.filtered, slot * fields.nodes, fields.nodes)
             if wp.static(variant.burst):
-                own.channel = part_of(fields.channel, slot * fields.channel_nodes, fields.channel_nodes)
-        return own
+                part.channel = part_of(fields.channel, slot * fields.channel_nodes, fields.channel_nodes)
+        return part
 
     @wp.func
-    def fields_of(fields: Fields, first: wp.int32):
-        """The fields of a window that begins at a node of its slot; the front window is the first."""
-        own = fields
+    def fields_of_window(fields: struct.Fields, first: wp.int32):
+        """The fields of a window that begins at node `first` of its slot; the front window is the first."""
+        part = fields
         if wp.static(variant.layered and not variant.deep):
             if first == 0:
-                own = in_front(fields)
-        return own
+                part = in_front(fields)
+        return part
 
     @wp.func
     def open_window(
-        plate: Plate, thickness: real, fields: Fields, layer: wp.int32, hit_y: wp.float64, hit_z: wp.float64
+        plate: struct.Plate,
+        thickness: real,
+        fields: struct.Fields,
+        layer: wp.int32,
+        hit_y: wp.float64,
+        hit_z: wp.float64,
     ):
-        """The window of a layer about a hit, on an untouched plate; `fields` are the block's own."""
-        window = use.exposure.open_window(plate, thickness, fields_of(fields, fields.first[layer]), layer, hit_y, hit_z)
+        """The window of a layer about a hit, on an untouched plate; `fields` are those of the block."""
+        window = use.exposure.open_window(
+            plate, thickness, fields_of_window(fields, fields.first[layer]), layer, hit_y, hit_z
+        )
         if wp.static(variant.degrades):
             use.lanes.barrier()
         return window
 
     @wp.func
     def expose(
-        fields: Fields, window: Window, touches: Touches, base: wp.int32, begin: wp.int32, end: wp.int32, units: real
+        fields: struct.Fields,
+        window: struct.Window,
+        touches: struct.Touches,
+        base: wp.int32,
+        begin: wp.int32,
+        end: wp.int32,
+        units: real,
     ):
         """Add the exposure of this lane's patches, of those with begin ≤ j < end, to the plate."""
         j = begin + use.lanes.lane()
@@ -139,91 +134,85 @@ def build(variant: Variant) -> SimpleNamespace:
             j += use.lanes.count()
 
     @wp.func
-    def total_slopes(slopes: Slopes):
+    def total_of(sums: struct.Sums):
         """Sum over the lanes."""
-        total = Slopes()
-        total.aa = use.lanes.total(slopes.aa)
-        total.ar = use.lanes.total_pair(slopes.ar)
-        total.rr = use.lanes.total_triple(slopes.rr)
-        total.al = use.lanes.total_pair(slopes.al)
-        total.rl = use.lanes.total_triple(slopes.rl)
-        total.ll = use.lanes.total_triple(slopes.ll)
+        total = struct.Sums()
+        total.force = use.lanes.total_triple(sums.force)
+        total.moment = use.lanes.total_triple(sums.moment)
+        total.slopes.aa = use.lanes.total(sums.slopes.aa)
+        total.slopes.ar = use.lanes.total_pair(sums.slopes.ar)
+        total.slopes.rr = use.lanes.total_triple(sums.slopes.rr)
+        total.slopes.al = use.lanes.total_pair(sums.slopes.al)
+        total.slopes.rl = use.lanes.total_triple(sums.slopes.rl)
+        total.slopes.ll = use.lanes.total_triple(sums.slopes.ll)
         return total
 
     @wp.func
     def load_in(
-        surface: Surface,
-        plate: Plate,
-        law: Law,
-        fields: Fields,
-        window: Window,
-        touches: Touches,
+        surface: struct.Surface,
+        plate: struct.Plate,
+        law: struct.Law,
+        fields: struct.Fields,
+        window: struct.Window,
+        touches: struct.Touches,
         slot: wp.int32,
-        found: Footprint,
-        pose: Pose,
+        footprint: struct.Footprint,
+        pose: struct.Pose,
         dt: real,
     ):
         """`load_on` where the fields of the window are known to be in shared or in global memory."""
-        load = Load()
-        box = found.box
-        begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
+        load = struct.Load()
+        box = footprint.box
+        first, last = footprint.first_closing, footprint.last_closing
+        begin, end = first * surface.around, (last + 1) * surface.around
         base = use.core_surface.patches_before(surface, slot) - begin
         use.contact.find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
         if wp.static(variant.burst):
             if window.pierced:
-                use.contact.spare(fields, window, touches, base + begin, end - begin)
-        load.touching = use.lanes.any_of(use.contact.meet(plate, touches, base + begin, end - begin) > zero)
-        if load.touching:
+                use.channel.spare(fields, window, touches, base + begin, end - begin)
+        if use.lanes.any_of(use.contact.meet(plate, touches, base + begin, end - begin) > zero):
+            weakened = bool(False)
             if wp.static(variant.degrades):
                 if use.contact.weakens(window):
                     coarsest = zero
-                    for index in range(found.first_closing, found.last_closing + 1):
+                    for index in range(first, last + 1):
                         coarsest = wp.max(coarsest, read(surface.area, index))
                     units = use.fixed_point.units(law, window, coarsest, wp.length(pose.velocity), dt)
-                    box = use.contact.gained_box(touches, found.box, base + begin, end - begin)
-                    if box.y_high > box.y_low:
+                    box = use.contact.gained_box(touches, footprint.box, base + begin, end - begin)
+                    weakened = box.y_high > box.y_low
+                    if weakened:
                         expose(fields, window, touches, base, begin, end, units)
                         use.lanes.barrier()
                         use.fixed_point.measure(fields.gain, window, box, units)
                         use.lanes.barrier()
                         use.exposure.spread(plate, fields, window, box)
                         use.lanes.barrier()
-            sums = use.contact.summed(
-                surface, law, fields, window, touches, pose, base, found.first_closing, found.last_closing
-            )
-            load.force = use.lanes.total_triple(sums.force)
-            load.moment = use.lanes.total_triple(sums.moment)
-            slopes = total_slopes(sums.slopes)
-            load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
-            load.damping_vv = half * use.damping.damping_vv(slopes)
-            load.damping_vw = half * use.damping.damping_vw(slopes)
-            load.damping_ww = half * use.damping.damping_ww(slopes)
+            sums = use.contact.summed(surface, law, fields, window, touches, pose, base, first, last)
+            load = use.contact.load_of(total_of(sums))
             if wp.static(variant.degrades):
-                if use.contact.weakens(window):
-                    if box.y_high > box.y_low:
-                        use.lanes.barrier()
-                        use.exposure.settle(plate, fields, window, box)
-                        use.lanes.barrier()
+                if weakened:
+                    use.lanes.barrier()
+                    use.exposure.settle(plate, fields, window, box)
+                    use.lanes.barrier()
         return load
 
     @wp.func
     def load_on(
-        surface: Surface,
-        plate: Plate,
-        law: Law,
-        fields: Fields,
-        window: Window,
-        touches: Touches,
+        surface: struct.Surface,
+        plate: struct.Plate,
+        law: struct.Law,
+        fields: struct.Fields,
+        window: struct.Window,
+        touches: struct.Touches,
         slot: wp.int32,
-        found: Footprint,
-        pose: Pose,
+        footprint: struct.Footprint,
+        pose: struct.Pose,
         dt: real,
     ):
-        """As in the simple layout (kernels/contact.py), by all lanes of a block."""
+        """The load of one step by all lanes of a block (kernels/contracts.py)."""
         if wp.static(variant.layered and not variant.deep):  # two calls, so that none goes through generic addresses
-            if window.first > 0:
-                return load_in(surface, plate, law, fields, window, touches, slot, found, pose, dt)
-            return load_in(surface, plate, law, in_front(fields), window, touches, slot, found, pose, dt)
-        return load_in(surface, plate, law, fields, window, touches, slot, found, pose, dt)
+            if window.first == 0:
+                return load_in(surface, plate, law, in_front(fields), window, touches, slot, footprint, pose, dt)
+        return load_in(surface, plate, law, fields, window, touches, slot, footprint, pose, dt)
 
     return SimpleNamespace(**locals())

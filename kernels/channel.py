@@ -9,122 +9,87 @@ Long because functions in native code take every length and place by itself.
 
 from functools import cache
 from types import SimpleNamespace
+from typing import Any
 
 import warp as wp
 
-from . import core_surface, exposure, lanes, memory, plate_grid
+from . import constants, exposure, lanes, memory, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the channels for one variant."""
-    real, vec3 = variant.real, variant.vec3
+    struct, real, vec3 = structs.build(variant), variant.real, variant.vec3
     zero, one = real(0.0), real(1.0)
-    outside = real(-1.0)  # [m]: no channel is near
-    steepest = real(0.5)  # least cosine of a core's angle with the normal for which its sections are compared
-    spared = real(0.1)  # cells: what a section adds beyond the last one by no more is not drawn
-    wall = real(20.0)  # the share of material goes from 0 to 1 over a cell divided by this
-    use, split = variant.use(core_surface, exposure, lanes, plate_grid), lanes.split(variant)
+    outside, wall = real(constants.NO_CHANNEL.value), real(constants.WALL.value)
+    steepest, spared = real(constants.STEEPEST.value), real(constants.SPARED.value)
+    use, share = variant.use(exposure, lanes), lanes.share(variant)
     read, write = memory.build(real).read, memory.build(real).write
-    Surface, Pose, Fields = use.core_surface.Surface, use.core_surface.Pose, use.exposure.Fields
-    Window, Box = use.plate_grid.Window, use.plate_grid.Box
 
-    @wp.struct
-    class Section:
-        """A core at a plane: its axis, and where this crosses the plane, with what radius [m]; the radius is 0 if it
-        does not."""
+    def shifted(combined: str) -> Any:
+        """The function that combines the value `held` by each node of a window with the `value` that another window
+        has there."""
 
-        axis: vec3
-        y: real
-        z: real
-        radius: real
-
-    @wp.struct
-    class Channels:
-        """Scratch of all slots: the channels of the shots at a slot's plate.
-
-        `inside` has the `nodes` of all layers of every shot, how deep each lies in its channel [m], negative outside;
-        shape [slots × count × nodes]. `box` has all of them that a channel may hold, and `through` says whether the
-        shot has left the layer through its rear face; shape [slots × count × layers]. `sections` are those of the shot
-        under way that are not drawn yet, shape [slots × planes]. `first` and `first_plane` are the first node and plane
-        of every layer, and `apart` is the largest distance of its planes [m]; shape [layers].
-        """
-
-        count: wp.int32
-        nodes: wp.int32
-        planes: wp.int32
-        inside: wp.array(dtype=real)
-        box: wp.array(dtype=Box)
-        sections: wp.array(dtype=Section)
-        through: wp.array(dtype=wp.bool)
-        first: wp.array(dtype=wp.int32)
-        first_plane: wp.array(dtype=wp.int32)
-        apart: wp.array(dtype=wp.float64)
-
-    # Native, because a compiler vectorises these loops only if the pointers do not alias.
-    @wp.func_native(
-        split("""
-    assert(start >= 0 && start + count <= field.shape[0]);
-    auto* __restrict__ into = field.data + start;
-    for (int j = 0; j < count; ++j) into[j] = value;
-    """)
-    )
-    def fill(field: wp.array(dtype=real), start: wp.int32, count: wp.int32, value: real):
-        """field[start + j] = value for j < count."""
-        ...
-
-    @wp.func_native(
-        split("""
-    const auto least = [](int a, int b) { return a < b ? a : b; };
-    const auto most = [](int a, int b) { return a > b ? a : b; };
-    const int row_low = most(most(0, -row), box.y_low - 1 - row);
-    const int low = most(most(0, -column), box.z_low - 1 - column);
-    const int row_high = least(row < 0 ? rows : rows - 1 - row, box.y_high + 1 - row);
-    const int high = least(column < 0 ? columns : columns - 1 - column, box.z_high + 1 - column);
-    const auto far_far = y * z, far_near = y - far_far, near_far = z - far_far, near_near = 1 - y - near_far;
-    assert(target >= 0 && target + rows * columns <= field.shape[0]);
-    assert(source >= 0 && source + rows * columns <= inside.shape[0]);
-    for (int i = row_low; i < row_high; ++i) {
-        auto* __restrict__ into = field.data + target + i * columns;
-        const auto* __restrict__ near = inside.data + source + (i + row) * columns + column;
-        const auto* __restrict__ far = near + columns;
-        for (int j = low; j < high; ++j) {
-            const auto found = near_near * near[j] + near_far * near[j + 1] + far_near * far[j] + far_far * far[j + 1];
-            into[j] = found > into[j] ? found : into[j];
+        # Native, because a compiler vectorises these loops only if the pointers do not alias.
+        @wp.func_native(
+            share
+            + f"const auto combine = [](auto held, auto value) {{ return {combined}; }};"
+            + """
+        const auto least = [](int a, int b) { return a < b ? a : b; };
+        const auto most = [](int a, int b) { return a > b ? a : b; };
+        const int row_low = most(most(0, -row), box.y_low - 1 - row);
+        const int low = most(most(0, -column), box.z_low - 1 - column) + lane;
+        const int row_high = least(row < 0 ? rows : rows - 1 - row, box.y_high + 1 - row);
+        const int high = least(column < 0 ? columns : columns - 1 - column, box.z_high + 1 - column);
+        const auto far_far = y * z, far_near = y - far_far, near_far = z - far_far, near_near = 1 - y - near_far;
+        assert(start >= 0 && start + rows * columns <= target.shape[0]);
+        assert(first >= 0 && first + rows * columns <= source.shape[0]);
+        for (int i = row_low; i < row_high; ++i) {
+            auto* __restrict__ into = target.data + start + i * columns;
+            const auto* __restrict__ near = source.data + first + (i + row) * columns + column;
+            const auto* __restrict__ far = near + columns;
+            for (int j = low; j < high; j += lanes)
+                into[j] = combine(into[j], near_near * near[j] + near_far * near[j + 1]
+                                  + far_near * far[j] + far_far * far[j + 1]);
         }
-    }
-    """)
-    )
-    def join_shifted(
-        field: wp.array(dtype=real),
-        target: wp.int32,
-        inside: wp.array(dtype=real),
-        source: wp.int32,
-        rows: wp.int32,
-        columns: wp.int32,
-        box: Box,
-        row: wp.int32,
-        column: wp.int32,
-        y: real,
-        z: real,
-    ):
-        """Join the channel of a window from index `source` on to those from `target` on, where the first is shifted as
-        in `earlier.add_shifted`. It holds no node outside a box."""
-        ...
+        """
+        )
+        def combine(
+            target: wp.array(dtype=real),
+            start: wp.int32,
+            source: wp.array(dtype=real),
+            first: wp.int32,
+            rows: wp.int32,
+            columns: wp.int32,
+            box: struct.Box,
+            row: wp.int32,
+            column: wp.int32,
+            y: real,
+            z: real,
+        ):
+            """The window has rows × columns nodes from index `start` on, the other one from `first` on. Node (i, j) of
+            the window lies behind node (i + row, j + column) of the other one by the shares y and z of a cell. The
+            other one holds nothing outside a box, and nothing on its outermost nodes."""
+            ...
+
+        return combine
+
+    add_shifted, join_shifted = shifted("held + value"), shifted("value > held ? value : held")
 
     # (r² − d²) / 2r in the place of the distance r − d: the same at the wall, and without a root.
     @wp.func_native(
-        split("""
+        share
+        + """
     using Real = decltype(0 * y);
     assert(start >= 0 && (rows <= 0 || columns <= 0 || start + (rows - 1) * stride + columns <= field.shape[0]));
     const Real per = -(Real)0.5 / radius, most = (Real)0.5 * (radius - cell * cell * per);
     const Real straight = per * (1 - turn_z * turn_z);
     const auto join = [=](Real* __restrict__ into, Real constant, Real linear) {
-        for (int j = 0; j < columns; ++j) {
+        for (int j = lane; j < columns; j += lanes) {
             const Real w = z + j * cell;
-            const Real found = constant + w * (linear + straight * w);
-            into[j] = found > into[j] ? found : into[j];
+            const Real depth = constant + w * (linear + straight * w);
+            into[j] = depth > into[j] ? depth : into[j];
         }
     };
     for (int i = 0; i < rows; ++i) {
@@ -132,7 +97,7 @@ def build(variant: Variant) -> SimpleNamespace:
         const Real level = most + per * v * v * (1 - turn_y * turn_y);
         join(field.data + start + i * stride, level, -2 * per * v * turn_y * turn_z);
     }
-    """)
+    """
     )
     def cut(
         field: wp.array(dtype=real),
@@ -153,7 +118,7 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func
-    def radius_at(surface: Surface, station: real):
+    def radius_at(surface: struct.Surface, station: real):
         """Radius of the core at a station [m]; 0 before its nose and behind its base."""
         radius = zero
         place, last = (station - surface.base) * surface.per_station, surface.profile.shape[0] - 2
@@ -164,15 +129,15 @@ def build(variant: Variant) -> SimpleNamespace:
         return radius
 
     @wp.func
-    def plane_at(window: Window, plane: wp.int32):
+    def depth_of_plane(window: struct.Window, plane: wp.int32):
         """Depth of a plane behind the front face [m]."""
         return real(plane) / window.per_channel_plane
 
     @wp.func
-    def box_about(window: Window, y: real, z: real, reach: real):
+    def box_about(window: struct.Window, y: real, z: real, reach: real):
         """The nodes of a window about a place, as far as some reach [m]."""
         home_y, home_z = window.home_y, window.home_z
-        box = Box()
+        box = struct.Box()
         box.y_low = wp.max(0, home_y - 1 + wp.int32(wp.floor((y - reach) * window.per_cell)))
         box.z_low = wp.max(0, home_z - 1 + wp.int32(wp.floor((z - reach) * window.per_cell)))
         box.y_high = wp.min(window.cells_y - 1, home_y + 1 + wp.int32(wp.ceil((y + reach) * window.per_cell)))
@@ -180,28 +145,35 @@ def build(variant: Variant) -> SimpleNamespace:
         return box
 
     @wp.func
-    def widen(channels: Channels, mine: wp.int32, box: Box):
+    def widen(earlier: struct.Earlier, index: wp.int32, box: struct.Box):
         """A channel may hold the nodes of a box, too."""
-        whole = channels.box[mine]
+        whole = earlier.box[index]
         whole.y_low = wp.min(whole.y_low, box.y_low)
         whole.z_low = wp.min(whole.z_low, box.z_low)
         whole.y_high = wp.max(whole.y_high, box.y_high)
         whole.z_high = wp.max(whole.z_high, box.z_high)
         use.lanes.barrier()
-        channels.box[mine] = whole
+        earlier.box[index] = whole
 
     @wp.func
-    def draw(channels: Channels, surface: Surface, window: Window, mine: wp.int32, start: wp.int32, core: Section):
-        """Join a section of a core to the channel on a plane, from node `start` on: at its own nodes, and around them
-        as far as it moves to the next plane."""
+    def draw(
+        earlier: struct.Earlier,
+        surface: struct.Surface,
+        window: struct.Window,
+        place: struct.Place,
+        plane: wp.int32,
+        core: struct.Section,
+    ):
+        """Join a section of a core to the channel on a plane: at its own nodes, and around them as far as it moves to
+        the next plane."""
         steep = wp.abs(core.axis[0])
         slope = wp.sqrt(wp.max(zero, one - steep * steep)) / steep
         reach = surface.max_radius * wp.sqrt(one + slope * slope) + slope / window.per_channel_plane
         box, cell = box_about(window, core.y, core.z, reach), one / window.per_cell
-        widen(channels, mine, box)
+        widen(earlier, place.index, box)
         cut(
-            channels.inside,
-            start + box.y_low * window.cells_z + box.z_low,
+            earlier.inside,
+            place.channel + plane * window.nodes + box.y_low * window.cells_z + box.z_low,
             box.y_high - box.y_low + 1,
             box.z_high - box.z_low + 1,
             window.cells_z,
@@ -215,11 +187,17 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def draw_steep(
-        channels: Channels, surface: Surface, window: Window, mine: wp.int32, start: wp.int32, x: real, pose: Pose
+        earlier: struct.Earlier,
+        surface: struct.Surface,
+        window: struct.Window,
+        place: struct.Place,
+        plane: wp.int32,
+        pose: struct.Pose,
     ):
-        """The same of a core that lies across the plane at a depth x, node by node."""
+        """Join a core that lies across a plane to the channel there, node by node."""
         box = box_about(window, pose.position[1], pose.position[2], surface.bounding_radius)
-        widen(channels, mine, box)
+        widen(earlier, place.index, box)
+        x, start = depth_of_plane(window, plane), place.channel + plane * window.nodes
         for i in range(box.y_low, box.y_high + 1):
             for j in range(box.z_low, box.z_high + 1):
                 y, z = real(i - window.home_y), real(j - window.home_z)
@@ -228,21 +206,21 @@ def build(variant: Variant) -> SimpleNamespace:
                 radius, node = radius_at(surface, station), start + i * window.cells_z + j
                 if radius > zero and use.lanes.has(j):
                     inside = radius - wp.sqrt(wp.max(zero, wp.dot(arm, arm) - station * station))
-                    write(channels.inside, node, wp.max(inside, read(channels.inside, node)))
+                    write(earlier.inside, node, wp.max(inside, read(earlier.inside, node)))
 
     @wp.func
-    def section_of(surface: Surface, pose: Pose, x: real):
-        """The core at a plane."""
-        found = Section()
+    def section_of(surface: struct.Surface, pose: struct.Pose, x: real):
+        """The core at the plane at a depth x [m]."""
+        section = struct.Section()
         station = (x - pose.position[0]) / pose.axis[0]
-        found.axis = pose.axis
-        found.radius = radius_at(surface, station)
-        found.y = pose.position[1] + station * pose.axis[1]
-        found.z = pose.position[2] + station * pose.axis[2]
-        return found
+        section.axis = pose.axis
+        section.radius = radius_at(surface, station)
+        section.y = pose.position[1] + station * pose.axis[1]
+        section.z = pose.position[2] + station * pose.axis[2]
+        return section
 
     @wp.func
-    def holds(outer: Section, inner: Section, slack: real):
+    def holds(outer: struct.Section, inner: struct.Section, slack: real):
         """Whether a section holds another one, up to some slack [m]. Both are ellipses, alike where the axes are."""
         spare = outer.radius + slack - inner.radius
         held = bool(False)
@@ -256,113 +234,89 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def follow(
-        channels: Channels,
-        surface: Surface,
-        window: Window,
-        slot: wp.int32,
-        layer: wp.int32,
-        shot: wp.int32,
-        mine: wp.int32,
-        pose: Pose,
+        earlier: struct.Earlier,
+        surface: struct.Surface,
+        window: struct.Window,
+        place: struct.Place,
+        pose: struct.Pose,
     ):
-        """Take note of where the core of a shot is in a layer, number `mine` of all. No later shot follows the last."""
-        order = shot % channels.count
-        if order + 1 == channels.count:
+        """Take note of where the core of a shot is in a layer, unless no later shot follows. A section is drawn only
+        when the next one does not hold it."""
+        if place.last:
             return
-        start = (slot * channels.count + order) * channels.nodes + channels.first[layer]
-        first = slot * channels.planes + channels.first_plane[layer]
         slack = spared / window.per_cell
         for plane in range(window.channel_planes):
-            x, node = plane_at(window, plane), start + plane * window.nodes
             if wp.abs(pose.axis[0]) <= steepest:
-                draw_steep(channels, surface, window, mine, node, x, pose)
+                draw_steep(earlier, surface, window, place, plane, pose)
             else:
-                core = section_of(surface, pose, x)
+                core = section_of(surface, pose, depth_of_plane(window, plane))
                 if core.radius > zero:
-                    before = channels.sections[first + plane]
+                    before = earlier.sections[place.section + plane]
                     if not holds(before, core, slack):
                         if before.radius > zero and not holds(core, before, zero):
-                            draw(channels, surface, window, mine, node, before)
+                            draw(earlier, surface, window, place, plane, before)
                         use.lanes.barrier()
-                        channels.sections[first + plane] = core
+                        earlier.sections[place.section + plane] = core
 
     @wp.func
-    def conclude(
-        channels: Channels,
-        surface: Surface,
-        window: Window,
-        slot: wp.int32,
-        layer: wp.int32,
-        shot: wp.int32,
-        mine: wp.int32,
-    ):
+    def conclude(earlier: struct.Earlier, surface: struct.Surface, window: struct.Window, place: struct.Place):
         """Leave the channel of a shot, whose core went through, to later ones."""
-        order = shot % channels.count
-        if order + 1 < channels.count:
-            start = (slot * channels.count + order) * channels.nodes + channels.first[layer]
-            first = slot * channels.planes + channels.first_plane[layer]
+        if not place.last:
             for plane in range(window.channel_planes):
-                before = channels.sections[first + plane]
+                before = earlier.sections[place.section + plane]
                 if before.radius > zero:
-                    draw(channels, surface, window, mine, start + plane * window.nodes, before)
-            channels.through[mine] = True
+                    draw(earlier, surface, window, place, plane, before)
+            earlier.through[place.index] = True
 
     @wp.func
-    def open_window(window: Window, channels: Channels, thickness: wp.float64, layer: wp.int32):
-        """The planes of a layer in a window."""
+    def open_window(earlier: struct.Earlier, window: struct.Window, thickness: wp.float64, layer: wp.int32):
+        """A window with the planes of the channels through its layer."""
         opened = window
-        planes = 1 + wp.int32(wp.ceil(thickness / channels.apart[layer]))
-        opened.channel = channels.first[layer]
+        planes = 1 + wp.int32(wp.ceil(thickness / earlier.apart[layer]))
+        opened.channel = earlier.first[layer]
         opened.channel_planes = planes
         opened.per_channel_plane = real(wp.float64(planes - 1) / thickness)
         return opened
 
     @wp.func
-    def clear(fields: Fields, window: Window):
+    def clear(fields: struct.Fields, window: struct.Window):
         """A window knows of no channels."""
-        fill(fields.channel, window.channel, window.channel_planes * window.nodes, outside)
+        use.exposure.fill(fields.channel, window.channel, window.channel_planes * window.nodes, outside)
 
     @wp.func
-    def begin(channels: Channels, window: Window, slot: wp.int32, layer: wp.int32, shot: wp.int32, mine: wp.int32):
+    def begin(earlier: struct.Earlier, window: struct.Window, place: struct.Place):
         """A shot has made no channel yet in its window."""
-        order = shot % channels.count
-        if order + 1 < channels.count:
-            start = (slot * channels.count + order) * channels.nodes + channels.first[layer]
-            fill(channels.inside, start, window.channel_planes * window.nodes, outside)
-            nothing = Box()
+        if not place.last:
+            use.exposure.fill(earlier.inside, place.channel, window.channel_planes * window.nodes, outside)
+            nothing = struct.Box()
             nothing.y_low = window.cells_y
             nothing.z_low = window.cells_z
-            channels.box[mine] = nothing
-            first = slot * channels.planes + channels.first_plane[layer]
+            earlier.box[place.index] = nothing
             for plane in range(window.channel_planes):
-                channels.sections[first + plane] = Section()
+                earlier.sections[place.section + plane] = struct.Section()
 
     @wp.func
     def join(
-        channels: Channels,
-        fields: Fields,
-        window: Window,
-        slot: wp.int32,
-        layer: wp.int32,
-        before: wp.int32,
-        other: wp.int32,
+        earlier: struct.Earlier,
+        fields: struct.Fields,
+        window: struct.Window,
+        other: struct.Place,
         row: wp.int32,
         column: wp.int32,
         y: real,
         z: real,
     ):
-        """Join the channel of an earlier shot, number `other` of all, to what a window knows of channels."""
-        start = (slot * channels.count + before) * channels.nodes + channels.first[layer]
+        """Join the channel of an earlier shot to what a window knows of channels; it is shifted as in `shifted`."""
         for plane in range(window.channel_planes):
             ahead = plane * window.nodes
             join_shifted(
                 fields.channel,
                 window.channel + ahead,
-                channels.inside,
-                start + ahead,
+                earlier.inside,
+                other.channel + ahead,
                 window.cells_y,
                 window.cells_z,
-                channels.box[other],
+                earlier.box[other.index],
                 row,
                 column,
                 y,
@@ -370,7 +324,7 @@ def build(variant: Variant) -> SimpleNamespace:
             )
 
     @wp.func
-    def place_of(window: Window, x: real, index: wp.int32):
+    def node_at(window: struct.Window, x: real, index: wp.int32):
         """Where a depth x [m] lies in a cell of the window: the first node of its channel there, and how far it is on
         the way to the next plane, 0 to 1."""
         depth = wp.clamp(x, zero, window.thickness) * window.per_channel_plane
@@ -379,28 +333,19 @@ def build(variant: Variant) -> SimpleNamespace:
 
     # Native, because a compiler reads several nodes at once only if the pointers do not alias.
     @wp.func_native(
-        split("""
+        share
+        + memory.ACROSS
+        + """
     using Real = decltype(0 * per_wall);
     assert(start >= 0 && start + count <= area.shape[0]);
     const auto spare = [=](Real* __restrict__ area, Real* __restrict__ slope, Real* __restrict__ gain,
                            const int* __restrict__ at, const Real* __restrict__ x, const Real* __restrict__ y,
                            const Real* __restrict__ z, const Real* __restrict__ field, int size) {
-        for (int j = 0; j < count; ++j) {
+        for (int j = lane; j < count; j += lanes) {
             assert(at[j] >= 0 && at[j] + nodes + stride + 1 < size);
-            const auto across = [=](const Real* from) {
-    #if !defined(__CUDA_ARCH__)
-                if constexpr (sizeof(Real) == 4) {  // a CPU reads two neighbours at once in half the time
-                    unsigned long long both;
-                    memcpy(&both, from, sizeof(both));
-                    const float first = __builtin_bit_cast(float, (unsigned)both);
-                    return first + z[j] * (__builtin_bit_cast(float, (unsigned)(both >> 32)) - first);
-                }
-    #endif
-                return from[0] + z[j] * (from[1] - from[0]);
-            };
             const Real* from = field + at[j];
-            const Real a = across(from), b = across(from + nodes);
-            const Real c = across(from + stride), d = across(from + nodes + stride);
+            const Real a = across(from, z[j]), b = across(from + nodes, z[j]);
+            const Real c = across(from + stride, z[j]), d = across(from + nodes + stride, z[j]);
             const Real low = a + x[j] * (b - a), high = c + x[j] * (d - c);
             const Real outside = -per_wall * (low + y[j] * (high - low));
             const Real share = outside < 0 ? (Real)0 : (outside > 1 ? (Real)1 : outside);
@@ -411,7 +356,7 @@ def build(variant: Variant) -> SimpleNamespace:
     };
     spare(area.data + start, slope.data + start, gain.data + start, at.data + start, x.data + start, y.data + start,
           z.data + start, field.data, field.shape[0]);
-    """)
+    """
     )
     def spare_channels(
         area: wp.array(dtype=real),
@@ -429,12 +374,27 @@ def build(variant: Variant) -> SimpleNamespace:
         per_wall: real,
     ):
         """Multiply three lists, from `start` on, by the share of material that earlier cores have left at places of the
-        channel: between the nodes from `at` on, on this plane and the next, `nodes` later."""
+        channel: between the nodes from `at` on, on this plane and the next, `nodes` later. The share goes from 0 to 1
+        by `per_wall` per depth outside a channel [1/m]."""
         ...
 
     @wp.func
-    def per_wall(window: Window):
-        """What the share of material gains per depth outside a channel [1/m]."""
-        return wall * window.per_cell
+    def spare(fields: struct.Fields, window: struct.Window, touches: struct.Touches, first: wp.int32, count: wp.int32):
+        """Restrict touches, from index `first` on, to what the channels of earlier hits leave."""
+        spare_channels(
+            touches.area,
+            touches.slope,
+            touches.gain,
+            touches.place,
+            touches.ahead,
+            touches.y,
+            touches.z,
+            first,
+            count,
+            fields.channel,
+            window.nodes,
+            window.cells_z,
+            wall * window.per_cell,
+        )
 
     return SimpleNamespace(**locals())

@@ -15,16 +15,16 @@ import warp as wp
 
 from . import (
     channel,
+    constants,
     core_surface,
     damping,
     exposure,
-    footprint,
     grip,
     interaction,
     lanes,
     memory,
     plate_grid,
-    rigid_body,
+    structs,
 )
 from .variant import Variant
 
@@ -32,61 +32,24 @@ from .variant import Variant
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a step's load for one variant."""
+    struct = structs.build(variant)
     real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(
-        channel, core_surface, damping, exposure, footprint, grip, interaction, lanes, plate_grid, rigid_body
-    )
-    split = lanes.split(variant)
-    Footprint, Sums = use.footprint.Footprint, use.damping.Sums
-    Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
-    Plate, Fields, Window = use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
-    Box, far = use.plate_grid.Box, 2**20  # nodes away: beyond any window
-    Law, Load = use.interaction.Law, use.rigid_body.Load
+    use = variant.use(channel, core_surface, damping, exposure, grip, interaction, lanes, plate_grid)
+    far = constants.FAR_NODES.value
     ring_of, patch_at = use.core_surface.ring_of, use.core_surface.patch_at
     read, write = memory.build(real).read, memory.build(real).write
     read_index, write_index = memory.build(wp.int32).read, memory.build(wp.int32).write
 
-    @wp.struct
-    class Touches:
-        """What the first pass finds for every patch of every slot, from the first ring on that may close in.
-
-        `area` is the area that presses on material [m²], `slope` its derivative by the closing speed [m s], and `shift`
-        that of the grip. `gain` is the exposure that the patch gives to its nodes [s]. `tile` and `cell` are its cells
-        of the tile and of the grid; `x`, `y` and `z` are its place in the grid's cell, `x` only where a window has
-        planes. There `row`, `column` and `plane` are those of the cell, too. `ring_area` is the area of all patches of
-        a ring. `sums` is what the second pass sums over a ring, if the bending moment is recorded. Then
-        `total_area` is the area of a ring in all layers of the target. `place` and `ahead` are the patch's place in the
-        channels of earlier hits (kernels/channel.py).
-        """
-
-        area: wp.array(dtype=real)
-        slope: wp.array(dtype=real)
-        shift: wp.array(dtype=real)
-        gain: wp.array(dtype=real)
-        tile: wp.array(dtype=wp.int32)
-        cell: wp.array(dtype=wp.int32)
-        x: wp.array(dtype=real)
-        y: wp.array(dtype=real)
-        z: wp.array(dtype=real)
-        ring_area: wp.array(dtype=real)
-        sums: wp.array(dtype=Sums)
-        total_area: wp.array(dtype=real)
-        row: wp.array(dtype=wp.int32)
-        column: wp.array(dtype=wp.int32)
-        plane: wp.array(dtype=wp.int32)
-        place: wp.array(dtype=wp.int32)
-        ahead: wp.array(dtype=real)
-
     @wp.func
     def find_touches(
-        surface: Surface,
-        plate: Plate,
-        law: Law,
-        fields: Fields,
-        window: Window,
-        touches: Touches,
-        pose: Pose,
+        surface: struct.Surface,
+        plate: struct.Plate,
+        law: struct.Law,
+        fields: struct.Fields,
+        window: struct.Window,
+        touches: struct.Touches,
+        pose: struct.Pose,
         base: wp.int32,
         begin: wp.int32,
         end: wp.int32,
@@ -97,9 +60,7 @@ def build(variant: Variant) -> SimpleNamespace:
         per_node = use.interaction.exposure_in(law, dt, wp.length(pose.velocity)) * window.per_cell * window.per_cell
         # A ring outside the slab, between others, may be outside the window, too. It touches nothing.
         last_cell = window.first + (window.cells_y - 1) * window.cells_z - 2
-        j = begin
-        if wp.static(variant.window > 0):
-            j += use.lanes.lane()
+        j = begin + use.lanes.lane()
         while j < end:
             ring = ring_of(surface, pose, j)
             patch = patch_at(pose, ring, read(surface.cosine, j), read(surface.sine, j))
@@ -128,40 +89,20 @@ def build(variant: Variant) -> SimpleNamespace:
             write(touches.y, base + j, cell.y)
             write(touches.z, base + j, cell.z)
             if wp.static(variant.burst):
-                place, ahead = use.channel.place_of(window, patch.x, wp.clamp(cell.index, window.first, last_cell))
+                place, ahead = use.channel.node_at(window, patch.x, wp.clamp(cell.index, window.first, last_cell))
                 write_index(touches.place, base + j, place)
                 write(touches.ahead, base + j, ahead)
-            if wp.static(variant.window > 0):
-                j += use.lanes.count()
-            else:
-                j += 1
+            j += use.lanes.count()
 
     @wp.func
-    def spare(fields: Fields, window: Window, touches: Touches, first: wp.int32, count: wp.int32):
-        """Restrict touches, from index `first` on, to what the channels of earlier hits leave."""
-        use.channel.spare_channels(
-            touches.area,
-            touches.slope,
-            touches.gain,
-            touches.place,
-            touches.ahead,
-            touches.y,
-            touches.z,
-            first,
-            count,
-            fields.channel,
-            window.nodes,
-            window.cells_z,
-            use.channel.per_wall(window),
-        )
-
-    @wp.func
-    def meet(plate: Plate, touches: Touches, first: wp.int32, count: wp.int32):
+    def meet(plate: struct.Plate, touches: struct.Touches, first: wp.int32, count: wp.int32):
         """Restrict touches to material, from index `first` on; return the area that presses on it [m²]."""
         return use.plate_grid.meet(touches.area, touches.slope, touches.gain, touches.tile, plate.tile, first, count)
 
     @wp.func
-    def expose(surface: Surface, fields: Fields, window: Window, touches: Touches, first: wp.int32):
+    def expose(
+        surface: struct.Surface, fields: struct.Fields, window: struct.Window, touches: struct.Touches, first: wp.int32
+    ):
         """Add the exposure of a ring's patches to the plate, one patch of each quarter in turn. Neighbours share nodes,
         so a CPU would have to wait between them. A patch that does not touch adds zero, which is faster than a
         branch."""
@@ -179,52 +120,54 @@ def build(variant: Variant) -> SimpleNamespace:
                 use.exposure.scatter(fields.gain, window.cells_z, cell, y, z, gain)
             j += 1
 
-    def extreme(sign: str, least: int) -> Any:
+    # Native, because a compiler vectorises it only so.
+    @wp.func_native(
+        lanes.share(variant)
+        + """
+    assert(start >= 0 && start + count <= gain.shape[0] && start + count <= place.shape[0]);
+    const auto* __restrict__ given = gain.data + start;
+    const int* __restrict__ at = place.data + start;
+    int largest = least;
+    for (int j = lane; j < count; j += lanes) {
+        const int here = given[j] > 0 ? sign * at[j] : least;
+        largest = here > largest ? here : largest;
+    }
+    return largest;
+    """
+    )
+    def largest_of(
+        sign: wp.int32,
+        least: wp.int32,
+        gain: wp.array(dtype=real),
+        place: wp.array(dtype=wp.int32),
+        start: wp.int32,
+        count: wp.int32,
+    ) -> wp.int32:
         """The largest sign × place of the patches that give exposure to their nodes, at least `least`."""
-
-        # Native, because a compiler vectorises it only so.
-        @wp.func_native(
-            split("""
-        assert(start >= 0 && start + count <= gain.shape[0] && start + count <= place.shape[0]);
-        const auto* __restrict__ given = gain.data + start;
-        const int* __restrict__ at = place.data + start;
-        int found = LEAST;
-        for (int j = 0; j < count; ++j) {
-            const int here = given[j] > 0 ? SIGN at[j] : LEAST;
-            found = here > found ? here : found;
-        }
-        return found;
-        """)
-            .replace("SIGN", sign)
-            .replace("LEAST", str(least))
-        )
-        def extreme_of(
-            gain: wp.array(dtype=real), place: wp.array(dtype=wp.int32), start: wp.int32, count: wp.int32
-        ) -> wp.int32: ...
-
-        return extreme_of
-
-    farthest_up, farthest_down = extreme("+", -far), extreme("-", -far)
+        ...
 
     @wp.func
-    def gained_box(touches: Touches, whole: Box, start: wp.int32, count: wp.int32):
+    def ends_of(touches: struct.Touches, place: wp.array(dtype=wp.int32), start: wp.int32, count: wp.int32):
+        """The first and the last place of the patches that give exposure to their nodes, on all lanes."""
+        low = -largest_of(-1, -far, touches.gain, place, start, count)
+        high = largest_of(1, -far, touches.gain, place, start, count)
+        return use.lanes.least(low), use.lanes.most(high + 1)
+
+    @wp.func
+    def gained_box(touches: struct.Touches, whole: struct.Box, start: wp.int32, count: wp.int32):
         """The nodes to which patches give exposure, of the nodes that a step can touch. What spreads over several
         planes costs more than to look at the patches."""
         box = whole
         if wp.static(variant.deep):
-            box.y_low = -farthest_down(touches.gain, touches.row, start, count)
-            box.y_high = farthest_up(touches.gain, touches.row, start, count) + 1
-            box.z_low = -farthest_down(touches.gain, touches.column, start, count)
-            box.z_high = farthest_up(touches.gain, touches.column, start, count) + 1
-            box.plane_low = -farthest_down(touches.gain, touches.plane, start, count)
-            box.plane_high = farthest_up(touches.gain, touches.plane, start, count) + 1
-            if wp.static(variant.window > 0):
-                box.y_low = use.lanes.least(box.y_low)
-                box.y_high = use.lanes.most(box.y_high)
-                box.z_low = use.lanes.least(box.z_low)
-                box.z_high = use.lanes.most(box.z_high)
-                box.plane_low = use.lanes.least(box.plane_low)
-                box.plane_high = use.lanes.most(box.plane_high)
+            y_low, y_high = ends_of(touches, touches.row, start, count)
+            z_low, z_high = ends_of(touches, touches.column, start, count)
+            plane_low, plane_high = ends_of(touches, touches.plane, start, count)
+            box.y_low = y_low
+            box.y_high = y_high
+            box.z_low = z_low
+            box.z_high = z_high
+            box.plane_low = plane_low
+            box.plane_high = plane_high
         return box
 
     def summing(weakened: bool) -> Any:
@@ -232,12 +175,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
         @wp.func(name="sum_weakened" if weakened else "sum_sound")
         def sum_patches(
-            surface: Surface,
-            law: Law,
-            fields: Fields,
-            window: Window,
-            touches: Touches,
-            pose: Pose,
+            surface: struct.Surface,
+            law: struct.Law,
+            fields: struct.Fields,
+            window: struct.Window,
+            touches: struct.Touches,
+            pose: struct.Pose,
             base: wp.int32,
             begin: wp.int32,
             end: wp.int32,
@@ -250,9 +193,7 @@ def build(variant: Variant) -> SimpleNamespace:
             lc, ls = real(0.0), real(0.0)
             lcc, lcs, lss = real(0.0), real(0.0), real(0.0)
             llcc, llcs, llss = real(0.0), real(0.0), real(0.0)
-            j = begin
-            if wp.static(variant.window > 0):
-                j += use.lanes.lane()
+            j = begin + use.lanes.lane()
             while j < end:
                 ring = ring_of(surface, pose, j)
                 cosine, sine = read(surface.cosine, j), read(surface.sine, j)
@@ -311,11 +252,8 @@ def build(variant: Variant) -> SimpleNamespace:
                 llcc += turn * kc * cosine
                 llcs += turn * kc * sine
                 llss += turn * ks * sine
-                if wp.static(variant.window > 0):
-                    j += use.lanes.count()
-                else:
-                    j += 1
-            sums = Sums()
+                j += use.lanes.count()
+            sums = struct.Sums()
             sums.force = vec3(axial, right, up)
             sums.moment = vec3(roll, pitch, yaw)
             sums.slopes.aa = aa
@@ -332,7 +270,7 @@ def build(variant: Variant) -> SimpleNamespace:
     mixed = variant.layered and variant.degrades  # layers that weaken beside layers that do not
 
     @wp.func
-    def weakens(window: Window):
+    def weakens(window: struct.Window):
         """Whether a plate, or this layer of a target, weakens."""
         kept = wp.static(variant.degrades)
         if wp.static(mixed):
@@ -340,28 +278,27 @@ def build(variant: Variant) -> SimpleNamespace:
         return kept
 
     @wp.func
-    def clear_sums(surface: Surface, touches: Touches, slot: wp.int32):
+    def clear_sums(surface: struct.Surface, touches: struct.Touches, slot: wp.int32):
         """No layer has touched yet."""
-        for index in range(
-            use.core_surface.rings_before(surface, slot), use.core_surface.rings_before(surface, slot) + surface.rings
-        ):
+        first = use.core_surface.rings_before(surface, slot)
+        for index in range(first, first + surface.rings):
             touches.total_area[index] = zero
-            touches.sums[index] = Sums()
+            touches.sums[index] = struct.Sums()
 
     @wp.func
-    def keep_sums(touches: Touches, index: wp.int32, sums: Sums):
+    def keep_sums(touches: struct.Touches, index: wp.int32, sums: struct.Sums):
         """Keep what the second pass sums over a ring, of all layers together."""
         touches.total_area[index] = touches.total_area[index] + touches.ring_area[index]
         touches.sums[index] = use.damping.joined(touches.sums[index], sums)
 
     @wp.func
     def summed(
-        surface: Surface,
-        law: Law,
-        fields: Fields,
-        window: Window,
-        touches: Touches,
-        pose: Pose,
+        surface: struct.Surface,
+        law: struct.Law,
+        fields: struct.Fields,
+        window: struct.Window,
+        touches: struct.Touches,
+        pose: struct.Pose,
         base: wp.int32,
         first: wp.int32,
         last: wp.int32,
@@ -374,76 +311,80 @@ def build(variant: Variant) -> SimpleNamespace:
         return sum_patches(surface, law, fields, window, touches, pose, base, begin, end)
 
     @wp.func
+    def load_of(sums: struct.Sums):
+        """The load of what touches. Its damping is half of the slope of the traction. So the step is of second order
+        where the stress depends on the rate, and stable where a wall lies on the steep ramp of the contact."""
+        load, slopes = struct.Load(), sums.slopes
+        load.touching = True
+        load.force = sums.force
+        load.moment = sums.moment
+        load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
+        load.damping_vv = half * use.damping.damping_vv(slopes)
+        load.damping_vw = half * use.damping.damping_vw(slopes)
+        load.damping_ww = half * use.damping.damping_ww(slopes)
+        return load
+
+    @wp.func
     def load_on(
-        surface: Surface,
-        plate: Plate,
-        law: Law,
-        fields: Fields,
-        window: Window,
-        touches: Touches,
+        surface: struct.Surface,
+        plate: struct.Plate,
+        law: struct.Law,
+        fields: struct.Fields,
+        window: struct.Window,
+        touches: struct.Touches,
         slot: wp.int32,
-        found: Footprint,
-        pose: Pose,
+        footprint: struct.Footprint,
+        pose: struct.Pose,
         dt: real,
     ):
-        """The load over one step; adds the exposure of the step to the plate.
-
-        The damping of the load is half of the slope of the traction. The step is then of second order where the
-        stress depends on the rate, and stable where a wall lies on the steep ramp of the contact.
-        """
-        load = Load()
-        box = found.box
-        begin, end = found.first_closing * surface.around, (found.last_closing + 1) * surface.around
+        """The load of one step by one thread (kernels/contracts.py)."""
+        load = struct.Load()
+        box = footprint.box
+        begin, end = footprint.first_closing * surface.around, (footprint.last_closing + 1) * surface.around
         base = use.core_surface.patches_before(surface, slot) - begin  # what a step touches stays in the fastest cache
+        rings = use.core_surface.rings_before(surface, slot)
         find_touches(surface, plate, law, fields, window, touches, pose, base, begin, end, dt)
         if wp.static(variant.burst):
             if window.pierced:
-                spare(fields, window, touches, base + begin, end - begin)
+                use.channel.spare(fields, window, touches, base + begin, end - begin)
         first, last = int(surface.rings), int(-1)  # of the rings that touch
-        for index in range(found.first_ring, found.last_ring + 1):
+        for index in range(footprint.first_ring, footprint.last_ring + 1):
             area = zero
-            if index >= found.first_closing and index <= found.last_closing:
+            if index >= footprint.first_closing and index <= footprint.last_closing:
                 area = meet(plate, touches, base + index * surface.around, surface.around)
-            touches.ring_area[use.core_surface.rings_before(surface, slot) + index] = area
+            touches.ring_area[rings + index] = area
             if area > zero:
                 first, last = wp.min(first, index), index
         if last >= 0:
-            load.touching = True
+            weakened = bool(False)
             if wp.static(variant.degrades):
                 if weakens(window):
                     # After all rings are found: a CPU has to wait before it reads single values that it has just
                     # stored as vectors.
                     for index in range(first, last + 1):
-                        if touches.ring_area[use.core_surface.rings_before(surface, slot) + index] > zero:
+                        if touches.ring_area[rings + index] > zero:
                             expose(surface, fields, window, touches, base + index * surface.around)
                     box = gained_box(
-                        touches, found.box, base + first * surface.around, (last + 1 - first) * surface.around
+                        touches, footprint.box, base + first * surface.around, (last + 1 - first) * surface.around
                     )
-                    if box.y_high > box.y_low:
+                    weakened = box.y_high > box.y_low
+                    if weakened:
                         use.exposure.spread(plate, fields, window, box)
-            sums = Sums()
+            sums = struct.Sums()
             if wp.static(variant.bends):
                 for index in range(first, last + 1):
-                    if touches.ring_area[use.core_surface.rings_before(surface, slot) + index] > zero:
+                    if touches.ring_area[rings + index] > zero:
                         part = summed(surface, law, fields, window, touches, pose, base, index, index)
-                        keep_sums(touches, use.core_surface.rings_before(surface, slot) + index, part)
+                        keep_sums(touches, rings + index, part)
                         sums = use.damping.joined(sums, part)
             else:
                 sums = summed(surface, law, fields, window, touches, pose, base, first, last)
-            load.force = sums.force
-            load.moment = sums.moment
-            slopes = sums.slopes
-            load.damped = slopes.aa + slopes.rr[0] + slopes.rr[2] > zero
-            load.damping_vv = half * use.damping.damping_vv(slopes)
-            load.damping_vw = half * use.damping.damping_vw(slopes)
-            load.damping_ww = half * use.damping.damping_ww(slopes)
+            load = load_of(sums)
             if wp.static(variant.degrades):
-                if weakens(window):
-                    if box.y_high > box.y_low:
-                        use.exposure.settle(plate, fields, window, box)
+                if weakened:
+                    use.exposure.settle(plate, fields, window, box)
         return load
 
-    own_fields = use.exposure.own_fields
+    fields_of_slot, fields_of_window = use.exposure.fields_of_slot, use.exposure.fields_of_window
     open_window = use.exposure.open_window
-    slide_nodes = use.exposure.slide_nodes
     return SimpleNamespace(**locals())

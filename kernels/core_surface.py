@@ -6,122 +6,34 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import lanes, memory
+from . import constants, lanes, memory, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the surface for one variant."""
+    struct = structs.build(variant)
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
     read, use = memory.build(real).read, variant.use(lanes)
     quarter, half_turn = real(0.25), real(math.pi)
-    widest_ratio, flattest = real(0.02), real(1.0e-3)  # floors that keep the convolution's quotient finite
-
-    @wp.struct
-    class Surface:
-        """Rings from nose to base, the discs that close them included.
-
-        Per ring: station ahead of the centre of mass and radius [m], area of one patch [m²], its normal along
-        the axis and outwards, half of the ring's extent along the meridian, axially and radially [m], and half of
-        the change of the normal over it.
-        `cosine` and `sine` are those of the azimuths of all patches, ring by ring. Odd rings are turned by half a
-        patch, so neighbouring rings do not all miss the same edge. The number of patches around a ring is a multiple of
-        4. `profile` has radii [m] at even stations, `per_station` of them per metre, from the base's station `base` [m]
-        on. `patches` repeats the members of a ring for each of its patches, one array behind the other: a CPU then goes
-        through the patches of all rings in one loop. A slot has room for `most_rings` and `most_patches`: those of the
-        largest surface of a launch.
-        """
-
-        station: wp.array(dtype=real)
-        radius: wp.array(dtype=real)
-        area: wp.array(dtype=real)
-        normal_axial: wp.array(dtype=real)
-        normal_radial: wp.array(dtype=real)
-        half_axial: wp.array(dtype=real)
-        half_radial: wp.array(dtype=real)
-        turn_axial: wp.array(dtype=real)
-        turn_radial: wp.array(dtype=real)
-        cosine: wp.array(dtype=real)
-        sine: wp.array(dtype=real)
-        patches: wp.array(dtype=real)
-        profile: wp.array(dtype=real)
-        base: real
-        per_station: real
-        rings: wp.int32
-        around: wp.int32
-        most_rings: wp.int32
-        most_patches: wp.int32
-        max_radius: real
-        bounding_radius: real
+    narrowest, flattest = real(constants.NARROWEST.value), real(constants.FLATTEST.value)
+    far = constants.FAR_AWAY.value
 
     @wp.func
-    def rings_before(surface: Surface, slot: wp.int32):
+    def rings_before(surface: struct.Surface, slot: wp.int32):
         """Rings of all slots before one."""
-        before = slot * surface.rings
-        if wp.static(variant.tabled):
-            before = slot * surface.most_rings
-        return before
+        return slot * (surface.most_rings if wp.static(variant.tabled) else surface.rings)
 
     @wp.func
-    def patches_before(surface: Surface, slot: wp.int32):
+    def patches_before(surface: struct.Surface, slot: wp.int32):
         """Patches of all slots before one."""
-        before = slot * surface.rings * surface.around
-        if wp.static(variant.tabled):
-            before = slot * surface.most_patches
-        return before
-
-    @wp.struct
-    class Pose:
-        """Position and motion of the core: body axes and centre of mass in the plate frame; velocity and angular
-        velocity along the body axes (axis, right, up). No point of the core is faster than `speed`."""
-
-        position: vec3
-        axis: vec3
-        right: vec3
-        up: vec3
-        velocity: vec3
-        omega: vec3
-        speed: real
-
-    @wp.struct
-    class Ring:
-        """One ring in a pose; `first` is the index of its first azimuth, `sector` half the angle of a patch."""
-
-        centre: vec3
-        station: real
-        radius: real
-        area: real
-        normal_axial: real
-        normal_radial: real
-        half_axial: real
-        half_radial: real
-        turn_axial: real
-        turn_radial: real
-        sector: real
-        first: wp.int32
-
-    @wp.struct
-    class Patch:
-        """The centre of one patch: position in the plate frame [m], components along x of the directions outwards and
-        around, velocity along the axis, outwards and around [m/s]. `swing` is the rate at which the axis turns towards
-        the direction outwards [rad/s]. `closing` is the velocity along the outward normal [m/s]."""
-
-        x: real
-        y: real
-        z: real
-        outward_x: real
-        around_x: real
-        velocity_axial: real
-        velocity_outward: real
-        velocity_around: real
-        swing: real
-        closing: real
+        return slot * (surface.most_patches if wp.static(variant.tabled) else surface.rings * surface.around)
 
     @wp.func
-    def pose_of(surface: Surface, position: vec3, attitude: quat, velocity: vec3, omega: vec3):
-        pose = Pose()
+    def pose_of(surface: struct.Surface, position: vec3, attitude: quat, velocity: vec3, omega: vec3):
+        pose = struct.Pose()
         pose.position = position
         pose.axis = wp.quat_rotate(attitude, vec3(one, zero, zero))
         pose.right = wp.quat_rotate(attitude, vec3(zero, one, zero))
@@ -132,8 +44,8 @@ def build(variant: Variant) -> SimpleNamespace:
         return pose
 
     @wp.func
-    def ring_at(surface: Surface, pose: Pose, index: wp.int32):
-        ring = Ring()
+    def ring_at(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
+        ring = struct.Ring()
         ring.station = read(surface.station, index)
         ring.radius = read(surface.radius, index)
         ring.area = read(surface.area, index)
@@ -149,10 +61,10 @@ def build(variant: Variant) -> SimpleNamespace:
         return ring
 
     @wp.func
-    def ring_of(surface: Surface, pose: Pose, patch: wp.int32):
+    def ring_of(surface: struct.Surface, pose: struct.Pose, patch: wp.int32):
         """The ring of a patch; the same as `ring_at`, but neighbours in memory belong to neighbouring patches."""
         apart = surface.rings * surface.around
-        ring = Ring()
+        ring = struct.Ring()
         ring.station = read(surface.patches, patch)
         ring.radius = read(surface.patches, patch + apart)
         ring.area = read(surface.patches, patch + 2 * apart)
@@ -167,33 +79,26 @@ def build(variant: Variant) -> SimpleNamespace:
         return ring
 
     @wp.func
-    def broadside(pose: Pose):
+    def broadside(pose: struct.Pose):
         """Share of a ring's radius that reaches along x: sin of the angle between core and plate normal."""
         return wp.sqrt(wp.max(zero, one - pose.axis[0] * pose.axis[0]))
 
     @wp.func
-    def ends_of(surface: Surface, pose: Pose):
+    def ends_of(surface: struct.Surface, pose: struct.Pose):
         """The rearmost and the foremost x of the core [m]."""
-        rearmost, foremost = real(1.0e9), real(-1.0e9)
+        rearmost, foremost = real(far), real(-far)
         wide = broadside(pose)
-        index = int(0)
-        if wp.static(variant.window > 0):
-            index = use.lanes.lane()
+        index = use.lanes.lane()
         while index < surface.rings:
             ring = ring_at(surface, pose, index)
             aslant, along = ring.half_radial * wide, ring.half_axial * pose.axis[0]
             rearmost = wp.min(rearmost, ring.centre[0] - ring.radius * wide - wp.abs(along - aslant))
             foremost = wp.max(foremost, ring.centre[0] + ring.radius * wide + wp.abs(along + aslant))
-            if wp.static(variant.window > 0):
-                index += use.lanes.count()
-            else:
-                index += 1
-        if wp.static(variant.window > 0):
-            rearmost, foremost = use.lanes.lowest(rearmost), use.lanes.highest(foremost)
-        return rearmost, foremost
+            index += use.lanes.count()
+        return use.lanes.lowest(rearmost), use.lanes.highest(foremost)
 
     @wp.func
-    def reach_along_x(ring: Ring, pose: Pose, broadside: real, advance: real, turning: real):
+    def reach_along_x(ring: struct.Ring, pose: struct.Pose, broadside: real, advance: real, turning: real):
         """Largest distance along x between the ring's centre and any part of the ring within the step [m]. `advance` is
         half of the way of the centre of mass along x in the step [m]; `turning` is half of the step's rotation
         [rad]."""
@@ -206,8 +111,8 @@ def build(variant: Variant) -> SimpleNamespace:
         )
 
     @wp.func
-    def patch_at(pose: Pose, ring: Ring, cosine: real, sine: real):
-        patch = Patch()
+    def patch_at(pose: struct.Pose, ring: struct.Ring, cosine: real, sine: real):
+        patch = struct.Patch()
         patch.outward_x = cosine * pose.right[0] + sine * pose.up[0]
         patch.around_x = cosine * pose.up[0] - sine * pose.right[0]
         patch.x = ring.centre[0] + ring.radius * patch.outward_x
@@ -225,12 +130,12 @@ def build(variant: Variant) -> SimpleNamespace:
         return patch
 
     @wp.func
-    def half_lever(ring: Ring):
+    def half_lever(ring: struct.Ring):
         """Half of what the closing speed changes by over a ring, along the meridian, per rate of swing [m]."""
         return ring.normal_radial * ring.half_axial - ring.normal_axial * ring.half_radial
 
     @wp.func
-    def closes(pose: Pose, ring: Ring):
+    def closes(pose: struct.Pose, ring: struct.Ring):
         """Whether any part of a ring may advance along its normal. This is a bound: a ring for which it is False cannot
         touch."""
         along = pose.velocity[0]
@@ -262,7 +167,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.where(wp.abs(depth) < wide - narrow, depth * narrow * per_area, corner)
 
     @wp.func
-    def immersed_area(pose: Pose, ring: Ring, patch: Patch, thickness: real, dt: real):
+    def immersed_area(pose: struct.Pose, ring: struct.Ring, patch: struct.Patch, thickness: real, dt: real):
         """Area of a patch within the slab, averaged over the step [m²]."""
         meridian = ring.half_axial * pose.axis[0] + ring.half_radial * patch.outward_x
         around = ring.sector * ring.radius * patch.around_x
@@ -275,7 +180,7 @@ def build(variant: Variant) -> SimpleNamespace:
         )
         motion = half * dt * wp.abs(advance)
         wide = wp.max(extent, motion)
-        narrow = wp.max(wp.min(extent, motion), widest_ratio * wide)
+        narrow = wp.max(wp.min(extent, motion), narrowest * wide)
         per_area = half / (wide * narrow)
         front = behind_face(patch.x, wide, narrow, per_area)
         return ring.area * (front - behind_face(patch.x - thickness, wide, narrow, per_area))

@@ -5,22 +5,23 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import interaction, lanes, plate_grid
+from . import constants, interaction, lanes, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of whole numbers in a field of float32."""
+    struct = structs.build(variant)
     real = variant.real
-    one, sheet, tiny = real(1.0), real(2.0**24), real(1.0e-30)
-    use, split = variant.use(interaction, plate_grid), lanes.split(variant)
-    Law, Window, Box = use.interaction.Law, use.plate_grid.Window, use.plate_grid.Box
+    one, sheet, tiny = real(1.0), real(constants.SHEET.value), real(constants.TINY.value)
+    use = variant.use(interaction)
 
     @wp.func
-    def units(law: Law, window: Window, coarsest: real, velocity: real, dt: real):
-        """Units per exposure [1/s]: 2^24 for what one advancing sheet, or the coarsest patch, gives to a node. So the
-        rounding is that of float32, and 128 times as much still fits: a node lies below a few sheets of a core."""
+    def units(law: struct.Law, window: struct.Window, coarsest: real, velocity: real, dt: real):
+        """Units per exposure [1/s]: `sheet` of them are what one advancing sheet, or the coarsest patch, gives to a
+        node. So the rounding is that of float32, and 128 times as much still fits: a node lies below a few sheets of a
+        core."""
         patches = wp.max(one, coarsest * window.per_cell * window.per_cell)
         return sheet / (wp.max(use.interaction.exposure_in(law, dt, velocity), tiny) * patches)
 
@@ -56,9 +57,10 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func_native(
-        split("""
+        lanes.share(variant)
+        + """
     assert(start >= 0 && start + count <= field.shape[0]);
-    for (int j = 0; j < count; ++j) {
+    for (int j = lane; j < count; j += lanes) {
     #if defined(__CUDA_ARCH__)
         const int held = __float_as_int(field.data[start + j]);
     #else
@@ -67,14 +69,14 @@ def build(variant: Variant) -> SimpleNamespace:
     #endif
         field.data[start + j] = (float)held * unit;
     }
-    """)
+    """
     )
     def convert(field: wp.array(dtype=wp.float32), start: wp.int32, count: wp.int32, unit: wp.float32):
         """Whole numbers of a unit become numbers."""
         ...
 
     @wp.func
-    def measure(field: wp.array(dtype=wp.float32), window: Window, box: Box, units: real):
+    def measure(field: wp.array(dtype=wp.float32), window: struct.Window, box: struct.Box, units: real):
         """The whole numbers in the rows of a box become exposure [s]."""
         start, count = window.first + box.y_low * window.cells_z, (box.y_high - box.y_low + 1) * window.cells_z
         if wp.static(variant.deep):

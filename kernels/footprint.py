@@ -5,43 +5,27 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, lanes, plate_grid
+from . import constants, core_surface, lanes, plate_grid, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the footprint for one variant."""
+    struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
     use = variant.use(core_surface, lanes, plate_grid)
-    Surface, Pose, ring_at = use.core_surface.Surface, use.core_surface.Pose, use.core_surface.ring_at
-    Plate, Window, Box = use.plate_grid.Plate, use.plate_grid.Window, use.plate_grid.Box
-    far = wp.constant(2**20)  # nodes away: beyond any window
-
-    @wp.struct
-    class Footprint:
-        """What a step can touch. `first_ring` and `last_ring` are the first and the last ring that can be in the slab;
-        last < first if there is none. `first_closing` and `last_closing` are those of them that may close in. `through`
-        means that all rings are behind the rear face, `back` that all are before the front face. `box` holds the nodes
-        around the rings in the slab. `inside` means that the window holds the box."""
-
-        first_ring: wp.int32
-        last_ring: wp.int32
-        first_closing: wp.int32
-        last_closing: wp.int32
-        through: wp.bool
-        back: wp.bool
-        inside: wp.bool
-        box: Box
+    ring_at = use.core_surface.ring_at
+    far = wp.constant(constants.FAR_NODES.value)
 
     @wp.func
-    def node_below(window: Window, place: real):
+    def node_below(window: struct.Window, place: real):
         """Nodes from the hit to the last one before a place along one direction."""
         return wp.int32(wp.floor(place * window.per_cell))
 
     @wp.func
-    def holds(plate: Plate, window: Window, box: Box):
+    def holds(plate: struct.Plate, window: struct.Window, box: struct.Box):
         """Whether a window has all nodes that contact in a box acts on."""
         # The filter's first pass covers rows up to twice its reach away and reads slightly beyond them.
         rows = 2 * plate.reach + 1
@@ -53,7 +37,7 @@ def build(variant: Variant) -> SimpleNamespace:
         )
 
     @wp.func
-    def footprint_of(surface: Surface, plate: Plate, window: Window, pose: Pose, dt: real):
+    def footprint_of(surface: struct.Surface, plate: struct.Plate, window: struct.Window, pose: struct.Pose, dt: real):
         """The footprint at mid-step. Patches act at their centres, so a ring covers centre ± radius."""
         broadside = use.core_surface.broadside(pose)
         across_y = wp.sqrt(wp.max(zero, one - pose.axis[1] * pose.axis[1]))
@@ -65,9 +49,7 @@ def build(variant: Variant) -> SimpleNamespace:
         first_closing, last_closing = int(surface.rings), int(-1)
         y_low, y_high, z_low, z_high = int(far), int(-far), int(far), int(-far)
         plane_low, plane_high = int(far), int(-far)
-        index = int(0)
-        if wp.static(variant.window > 0):
-            index = use.lanes.lane()
+        index = use.lanes.lane()
         while index < surface.rings:
             ring = ring_at(surface, pose, index)
             reach = use.core_surface.reach_along_x(ring, pose, broadside, advance, turning)
@@ -89,63 +71,56 @@ def build(variant: Variant) -> SimpleNamespace:
                 behind, ahead = use.plate_grid.planes_at(window, rearmost), use.plate_grid.planes_at(window, foremost)
                 plane_low = wp.min(plane_low, wp.where(within, wp.int32(behind), far))
                 plane_high = wp.max(plane_high, wp.where(within, wp.int32(ahead) + 1, -far))
-            if wp.static(variant.window > 0):
-                index += use.lanes.count()
-            else:
-                index += 1
-        if wp.static(variant.window > 0):
-            first_ring, last_ring = use.lanes.least(first_ring), use.lanes.most(last_ring)
-            first_closing, last_closing = use.lanes.least(first_closing), use.lanes.most(last_closing)
-            not_through, not_back = use.lanes.most(not_through), use.lanes.most(not_back)
-            y_low, y_high = use.lanes.least(y_low), use.lanes.most(y_high)
-            z_low, z_high = use.lanes.least(z_low), use.lanes.most(z_high)
-            if wp.static(variant.deep):
-                plane_low, plane_high = use.lanes.least(plane_low), use.lanes.most(plane_high)
-        found = Footprint()
-        found.first_ring = first_ring
-        found.last_ring = last_ring
-        found.first_closing = first_closing
-        found.last_closing = last_closing
-        found.through = not_through == 0
-        found.back = not_back == 0
-        found.inside = True
-        if last_ring >= 0:
+            index += use.lanes.count()
+        footprint = struct.Footprint()
+        footprint.first_ring = use.lanes.least(first_ring)
+        footprint.last_ring = use.lanes.most(last_ring)
+        footprint.first_closing = use.lanes.least(first_closing)
+        footprint.last_closing = use.lanes.most(last_closing)
+        footprint.through = use.lanes.most(not_through) == 0
+        footprint.back = use.lanes.most(not_back) == 0
+        footprint.inside = True
+        y_low, y_high = use.lanes.least(y_low), use.lanes.most(y_high)
+        z_low, z_high = use.lanes.least(z_low), use.lanes.most(z_high)
+        if wp.static(variant.deep):
+            plane_low, plane_high = use.lanes.least(plane_low), use.lanes.most(plane_high)
+        if footprint.last_ring >= 0:
             # One node of slack, because rounding may move a patch at the ring's outermost point.
-            found.box.y_low = window.home_y + y_low - 1
-            found.box.y_high = window.home_y + y_high + 2
-            found.box.z_low = window.home_z + z_low - 1
-            found.box.z_high = window.home_z + z_high + 2
-            found.box.plane_low = plane_low
-            found.box.plane_high = plane_high
-            found.inside = holds(plate, window, found.box)
-        return found
+            footprint.box.y_low = window.home_y + y_low - 1
+            footprint.box.y_high = window.home_y + y_high + 2
+            footprint.box.z_low = window.home_z + z_low - 1
+            footprint.box.z_high = window.home_z + z_high + 2
+            footprint.box.plane_low = plane_low
+            footprint.box.plane_high = plane_high
+            footprint.inside = holds(plate, window, footprint.box)
+        return footprint
 
     @wp.func
-    def clearance_at(plate: Plate, window: Window, y: real, z: real):
+    def clearance_at(plate: struct.Plate, window: struct.Window, y: real, z: real):
         """A lower bound of a point's distance from material: in a hole, or beside a finite plate [m]."""
         beside = wp.max(wp.max(window.low_y - y, y - window.high_y), wp.max(window.low_z - z, z - window.high_z))
         return wp.max(beside, plate.clear[use.plate_grid.tile_at(plate, window, y, z)])
 
     @wp.func
-    def is_clear(plate: Plate, window: Window, found: Footprint):
+    def is_clear(plate: struct.Plate, window: struct.Window, footprint: struct.Footprint):
         """Whether there is no material at the nodes around the rings in the slab, with a node to spare."""
-        y = half * real(found.box.y_low + found.box.y_high - 2 * window.home_y) * plate.spacing
-        z = half * real(found.box.z_low + found.box.z_high - 2 * window.home_z) * plate.spacing
-        wide = half * real(found.box.y_high - found.box.y_low) + one
-        long = half * real(found.box.z_high - found.box.z_low) + one
+        y = half * real(footprint.box.y_low + footprint.box.y_high - 2 * window.home_y) * plate.spacing
+        z = half * real(footprint.box.z_low + footprint.box.z_high - 2 * window.home_z) * plate.spacing
+        wide = half * real(footprint.box.y_high - footprint.box.y_low) + one
+        long = half * real(footprint.box.z_high - footprint.box.z_low) + one
         reach = wp.sqrt(wide * wide + long * long) * plate.spacing
         return clearance_at(plate, window, y, z) > reach
 
     @wp.func
-    def is_beside(window: Window, found: Footprint, cells: wp.int32):
-        """Whether a window would hold none of the nodes around the rings in the slab, if it had so many in each
-        direction: a core that comes back elsewhere."""
+    def is_beside(window: struct.Window, footprint: struct.Footprint, cells: wp.int32):
+        """Whether a window with this number of cells in each direction would hold none of the nodes around the rings in
+        the slab: the core comes back elsewhere."""
         first_y, first_z = window.home_y - cells // 2, window.home_z - cells // 2
         return (
-            found.box.y_high < first_y
-            or found.box.z_high < first_z
-            or found.box.y_low >= first_y + cells
-            or found.box.z_low >= first_z + cells
+            footprint.box.y_high < first_y
+            or footprint.box.z_high < first_z
+            or footprint.box.y_low >= first_y + cells
+            or footprint.box.z_low >= first_z + cells
         )
 
     return SimpleNamespace(**locals())

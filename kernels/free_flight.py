@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import march, rigid_body, shots
+from . import rigid_body, shots, structs, target
 from .status import Status
 from .variant import Variant
 
@@ -13,36 +13,18 @@ from .variant import Variant
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """The free-flight kernel and the struct it fills, for one variant."""
+    struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, undefined = real(0.0), real(wp.nan)
-    use = variant.use(march, rigid_body, shots)
-    Shots, Target, Contact = use.shots.Shots, use.march.Target, use.march.Outcomes
-    angular_velocity = use.rigid_body.angular_velocity
-    axis_at = use.rigid_body.axis_at
+    use = variant.use(rigid_body, shots, target)
+    angle_between, axis_at = use.rigid_body.angle_between, use.rigid_body.axis_at
     PERFORATED, ARRESTED = wp.constant(int(Status.PERFORATED)), wp.constant(int(Status.ARRESTED))
     MISSED, UNFINISHED = wp.constant(int(Status.MISSED)), wp.constant(int(Status.UNFINISHED))
 
-    @wp.struct
-    class Report:
-        """The output for each shot; arrays of shape [shots] or [shots, stand-offs], SI and radians, NaN where there is
-        no value."""
-
-        residual_velocity: wp.array(dtype=real)
-        deflection: wp.array(dtype=real)
-        angular_velocity: wp.array(dtype=vec3)
-        energy_loss: wp.array(dtype=real)
-        contact_duration: wp.array(dtype=real)
-        tilt: wp.array2d(dtype=real)
-        pitch: wp.array2d(dtype=real)
-        yaw: wp.array2d(dtype=real)
-        total_yaw: wp.array2d(dtype=real)
-
     @wp.func
-    def angle_between(a: vec3, b: vec3):
-        return wp.atan2(wp.length(wp.cross(a, b)), wp.dot(a, b))
-
-    @wp.func
-    def report_standoff(report: Report, shot: wp.int32, standoff: wp.int32, axis: vec3, flight: vec3, velocity: vec3):
+    def report_standoff(
+        report: struct.Report, shot: wp.int32, standoff: wp.int32, axis: vec3, flight: vec3, velocity: vec3
+    ):
         report.tilt[shot, standoff] = angle_between(axis, flight)
         report.pitch[shot, standoff] = wp.atan2(axis[2], axis[0])
         report.yaw[shot, standoff] = wp.atan2(axis[1], axis[0])
@@ -50,13 +32,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     def free_flight(
         # inputs
-        shots: Shots,
-        target: Target,
-        contact: Contact,
+        shots: struct.Shots,
+        target: struct.Target,
+        contact: struct.Outcomes,
         standoffs: wp.array(dtype=wp.float64),
         ahead: real,
         # outputs
-        report: Report,
+        report: struct.Report,
     ):
         """Report one shot per thread.
 
@@ -77,13 +59,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
         report.residual_velocity[shot] = wp.where(moves, wp.length(velocity), wp.where(failed, undefined, zero))
         report.deflection[shot] = wp.where(moves, angle_between(velocity, flight), undefined)
-        omega = angular_velocity(body, axis, momentum)
+        omega = use.rigid_body.angular_velocity(body, axis, momentum)
         report.angular_velocity[shot] = wp.where(moves, omega, wp.where(failed, nothing, vec3()))
         report.energy_loss[shot] = wp.where(failed, undefined, contact.energy_loss[shot])
         report.contact_duration[shot] = wp.where(failed, undefined, contact.contact_duration[shot])
         for k in range(standoffs.shape[0]):
             if passes:
-                distance = real(standoffs[k] + use.march.depth_of(target, shot)) - contact.position[shot][0]
+                distance = real(standoffs[k] + use.target.depth_of(target, shot)) - contact.position[shot][0]
                 then = axis_at(body, axis, momentum, ahead, velocity[0], distance)
                 report_standoff(report, shot, k, then, flight, velocity)
             else:

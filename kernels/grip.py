@@ -5,32 +5,19 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import core_surface, interaction
+from . import core_surface, interaction, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a patch's contact for one variant."""
+    struct = structs.build(variant)
     real = variant.real
     use = variant.use(core_surface, interaction)
-    Pose, Ring, Patch = use.core_surface.Pose, use.core_surface.Ring, use.core_surface.Patch
-    Law = use.interaction.Law
-
-    @wp.struct
-    class Face:
-        """The part of a patch in contact: its normal (axial, outwards, around), its closing speed [m/s], and the place
-        of its middle: station ahead of the centre of mass and radius [m]."""
-
-        axial: real
-        outward: real
-        around: real
-        closing: real
-        station: real
-        radius: real
 
     @wp.func
-    def variations(ring: Ring, patch: Patch):
+    def variations(ring: struct.Ring, patch: struct.Patch):
         """Half of what the closing speed varies by over a patch, along the meridian and around [m/s].
         Along the meridian the swing of the core counts, too: at 10⁴ rad/s for more than a slender core's bend."""
         meridian = ring.turn_axial * patch.velocity_axial + ring.turn_radial * patch.velocity_outward
@@ -38,7 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return meridian, ring.sector * ring.normal_radial * patch.velocity_around
 
     @wp.func
-    def grip_of(law: Law, pose: Pose, ring: Ring, patch: Patch):
+    def grip_of(law: struct.Law, pose: struct.Pose, ring: struct.Ring, patch: struct.Patch):
         """Contact of a curved patch: normal and velocity vary linearly over it, and only the part that closes in
         touches. Without this, contact along a shank would come and go by whole patches."""
         meridian, around = variations(ring, patch)
@@ -47,11 +34,11 @@ def build(variant: Variant) -> SimpleNamespace:
         )
 
     @wp.func
-    def face_of(ring: Ring, patch: Patch, shift: real):
+    def face_of(ring: struct.Ring, patch: struct.Patch, shift: real):
         """The part of a patch in contact, from its grip's shift. There its power is that of its closing speed: the load
         of a part that closes in never drives the core."""
         meridian, around = variations(ring, patch)
-        face = Face()
+        face = struct.Face()
         face.axial = ring.normal_axial + shift * meridian * ring.turn_axial
         face.outward = ring.normal_radial + shift * meridian * ring.turn_radial
         face.around = shift * around * ring.sector * ring.normal_radial
@@ -61,7 +48,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return face
 
     @wp.func
-    def normal_along_x(pose: Pose, patch: Patch, face: Face):
+    def normal_along_x(pose: struct.Pose, patch: struct.Patch, face: struct.Face):
         return face.axial * pose.axis[0] + face.outward * patch.outward_x + face.around * patch.around_x
 
     return SimpleNamespace(**locals())

@@ -5,62 +5,28 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from . import constants, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the contact law for one variant."""
+    struct = structs.build(variant)
     real = variant.real
     zero, sixth, half, one = real(0.0), real(1.0 / 6.0), real(0.5), real(1.0)
-    tiny = real(1.0e-30)
-    # A wall sliding along itself has v_p·n = 0 up to rounding; below this share of |v_p| it does not touch.
-    at_rest = real(1.0e-5)
-    smallest_onset = real(1.0e-4)  # of the impact velocity: keeps the ramp's slope finite
-
-    @wp.struct
-    class Law:
-        """Normal stress a0 + a1 v_n + a2 v_n² [Pa], friction η and ln(β)/Δt_β [1/s]; or, where exposure counts the path
-        of the centre of mass (`by_path`), ln(β)/Δs_β [1/m]. The literal scheme takes β itself once a step.
-
-        `onset` is the closing speed [m/s] over which contact sets in (`onset_speed`): the law's own, the share
-        `onset_share` of the core's velocity; or, where the step needs a wider one, a multiple, `onset_jump` [m/s²], of
-        the time step, and at most the share `onset_limit` of the core's velocity. `steadied` is the closing speed
-        [m/s] below which contact damps by its chord (`steady_slope`).
-        """
-
-        a0: real
-        a1: real
-        a2: real
-        friction: real
-        decay_rate: real
-        degradation: real
-        by_path: wp.bool
-        onset_share: real
-        onset_jump: real
-        onset_limit: real
-        onset: real
-        steadied: real
-
-    @wp.struct
-    class Contact:
-        """How a patch touches: its mean share of contact, the derivative of that by the closing speed [s/m], and how
-        far the middle of what touches is from the patch's own, in halves of the patch and per variation of the closing
-        speed over it [s/m]."""
-
-        share: real
-        slope: real
-        shift: real
+    tiny, at_rest = real(constants.TINY.value), real(constants.AT_REST.value)
+    smallest_onset = real(constants.SMALLEST_ONSET.value)
 
     @wp.func
-    def onset_speed(law: Law, dt: real, velocity: real, impact_velocity: real):
+    def onset_speed(law: struct.Law, dt: real, velocity: real, impact_velocity: real):
         """Closing speed over which contact sets in [m/s]: follows a core that slows down, so that it is arrested where
         it should be."""
         wider = wp.min(law.onset_jump * dt, law.onset_limit * velocity)
         return wp.max(wp.max(law.onset_share * velocity, wider), smallest_onset * impact_velocity)
 
     @wp.func
-    def contact_of(law: Law, closing: real, variation: real, speed: real):
+    def contact_of(law: struct.Law, closing: real, variation: real, speed: real):
         """Contact of a patch whose closing speeds are spread evenly over closing ± variation [m/s].
 
         Each part of it is in contact by min(1, v_p·n / onset) where v_p·n > 0 (docs/model.md §4). This is the exact
@@ -80,15 +46,15 @@ def build(variant: Variant) -> SimpleNamespace:
         low = wp.clamp((middle - variation) * per_onset, zero, one)
         high = wp.clamp((middle + variation) * per_onset, zero, one)
         mean = half * (low + high)
-        found = Contact()
-        found.share = full + ramp * mean
-        found.slope = ramp * per_onset
+        contact = struct.Contact()
+        contact.share = full + ramp * mean
+        contact.slope = ramp * per_onset
         moment = full * (one - full) + ramp * (mean * (away - full) + sixth * ramp * (high - low))
-        found.shift = moment * per_variation / (found.share + tiny)
-        return found
+        contact.shift = moment * per_variation / (contact.share + tiny)
+        return contact
 
     @wp.func
-    def steady_slope(law: Law, share: real, slope: real, closing: real):
+    def steady_slope(law: struct.Law, share: real, slope: real, closing: real):
         """Derivative of the share of contact by the closing speed [s/m].
 
         Where a core swings between two walls from step to step, it is the chord down to no contact instead. Full
@@ -98,7 +64,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.where(closing < law.steadied, share / wp.max(closing, tiny), slope)
 
     @wp.func
-    def normal_stress(law: Law, closing: real):
+    def normal_stress(law: struct.Law, closing: real):
         """Normal stress [Pa] of undamaged material at closing speed v_n."""
         stress = law.a0
         if wp.static(variant.rate_dependent):
@@ -106,12 +72,12 @@ def build(variant: Variant) -> SimpleNamespace:
         return stress
 
     @wp.func
-    def stress_slope(law: Law, closing: real):
+    def stress_slope(law: struct.Law, closing: real):
         """Derivative of the normal stress by the closing speed [Pa s/m]."""
         return law.a1 + real(2.0) * law.a2 * closing
 
     @wp.func
-    def friction_per_speed(law: Law, sliding: real, speed: real):
+    def friction_per_speed(law: struct.Law, sliding: real, speed: real):
         """Friction over normal stress and sliding speed [s/m]: η / |v_t|, finite where nothing slides."""
         return law.friction / wp.max(sliding, at_rest * speed)
 
@@ -139,12 +105,12 @@ def build(variant: Variant) -> SimpleNamespace:
     exponential = wp.exp if variant.double else exp_single
 
     @wp.func
-    def exposure_in(law: Law, dt: real, velocity: real):
+    def exposure_in(law: struct.Law, dt: real, velocity: real):
         """What a step adds to the exposure under one advancing sheet: its time [s], or its path [m] at a velocity."""
         return wp.where(law.by_path, velocity * dt, dt)
 
     @wp.func
-    def remaining(law: Law, exposure: real):
+    def remaining(law: struct.Law, exposure: real):
         """Share of the resistance left after an exposure T [s]: β^(T/Δt_β); or S [m]: β^(S/Δs_β)."""
         return exponential(law.decay_rate * exposure)
 

@@ -8,37 +8,35 @@ On a CPU a block has one lane, and nothing of this costs anything. With Warp's `
 run there one after another, from barrier to barrier, on one thread of the machine: for tests.
 """
 
-import re
-from collections.abc import Callable
 from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
 import warp as wp
 
+from . import constants
 from .variant import Variant
 
-THREADS = 256
-"""Threads of a block in the simple layout on CUDA, each of which computes a shot by itself."""
-LANES = 32
-"""Lanes of a block on CUDA: one warp, so that a barrier stops nothing else."""
-BLOCKS = 12
-"""Blocks that a multiprocessor is to hold at least. More of them hide more of each other's latency, but leave fewer
-registers to a lane."""
+THREADS, LANES, BLOCKS = (number.value for number in (constants.THREADS, constants.LANES, constants.BLOCKS))
 LANE = "WP_TILE_THREAD_IDX"
 """Number of this lane in native code."""
 WAIT = "WP_TILE_SYNC();"
 """A barrier in native code on a CPU: lanes that run one after another take turns there."""
 
 
-def split(variant: Variant) -> Callable[[str], str]:
-    """What makes a loop over j, in native code, go over this lane's share of them in the block layout."""
-    share = rf"int j = \1 + {LANE}; j < \2; j += WP_TILE_BLOCK_DIM"
-    return lambda snippet: re.sub(r"int j = (\w+); j < (\w+); \+\+j", share, snippet) if variant.window else snippet
+def share(variant: Variant) -> str:
+    """Native code before a loop over j that the lanes of a block share out: `for (int j = lane; j < n; j += lanes)`.
+    In the simple layout it is the plain loop."""
+    if variant.window:
+        return f"const int lane = {LANE}, lanes = WP_TILE_BLOCK_DIM;"
+    return "constexpr int lane = 0, lanes = 1;"
 
 
-def _butterfly(kind: str, both: str) -> str:
-    """Native code that combines the x of all lanes by `both`, an expression of x and that of the `other` lane."""
+def _butterfly(variant: Variant, kind: str, both: str) -> str:
+    """Native code that combines the x of all lanes by `both`, an expression of x and that of the `other` lane. In the
+    simple layout a lane is alone."""
+    if not variant.window:
+        return "return x;"
     return f"""
 #if defined(__CUDA_ARCH__)
     static_assert(WP_TILE_BLOCK_DIM == {LANES}, "a block is one warp");
@@ -68,14 +66,14 @@ def build(variant: Variant) -> SimpleNamespace:
     real, vec2, vec3 = variant.real, variant.vec2, variant.vec3
     kind = "double" if variant.double else "float"
 
-    @wp.func_native(f"return {LANE};")
+    @wp.func_native(f"{share(variant)} return lane;")
     def lane() -> wp.int32:
-        """Number of this lane."""
+        """Number of this lane; 0 in the simple layout."""
         ...
 
-    @wp.func_native("return WP_TILE_BLOCK_DIM;")
+    @wp.func_native(f"{share(variant)} return lanes;")
     def count() -> wp.int32:
-        """Number of lanes."""
+        """Number of lanes; 1 in the simple layout."""
         ...
 
     waiting = f"""
@@ -88,35 +86,35 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func_native(waiting if variant.window else "")
     def barrier():
-        """Wait for all lanes; each then sees what the others have written. Nothing in the simple layout."""
+        """Wait for all lanes; each then sees what the others have written. It does nothing in the simple layout."""
         ...
 
-    @wp.func_native(f"return j % WP_TILE_BLOCK_DIM == {LANE};" if variant.window else "return true;")
+    @wp.func_native(f"{share(variant)} return j % lanes == lane;")
     def has(j: wp.int32) -> wp.bool:
-        """Whether number j, at least 0, is this lane's: always in the simple layout."""
+        """Whether number j, at least 0, is this lane's; always true in the simple layout."""
         ...
 
-    @wp.func_native(_butterfly(kind, "x + other"))
+    @wp.func_native(_butterfly(variant, kind, "x + other"))
     def total(x: real) -> real:
         """Sum over the lanes: the same bits in each of them."""
         ...
 
-    @wp.func_native(_butterfly(kind, "other < x ? other : x"))
+    @wp.func_native(_butterfly(variant, kind, "other < x ? other : x"))
     def lowest(x: real) -> real:
         """Minimum over the lanes."""
         ...
 
-    @wp.func_native(_butterfly(kind, "other > x ? other : x"))
+    @wp.func_native(_butterfly(variant, kind, "other > x ? other : x"))
     def highest(x: real) -> real:
         """Maximum over the lanes."""
         ...
 
-    @wp.func_native(_butterfly("int", "other < x ? other : x"))
+    @wp.func_native(_butterfly(variant, "int", "other < x ? other : x"))
     def least(x: wp.int32) -> wp.int32:
         """Minimum over the lanes."""
         ...
 
-    @wp.func_native(_butterfly("int", "other > x ? other : x"))
+    @wp.func_native(_butterfly(variant, "int", "other > x ? other : x"))
     def most(x: wp.int32) -> wp.int32:
         """Maximum over the lanes."""
         ...
@@ -134,7 +132,7 @@ def build(variant: Variant) -> SimpleNamespace:
         """Whether it is true for any lane."""
         return most(wp.where(x, 1, 0)) > 0
 
-    def own(name: str) -> Any:
+    def shared(name: str) -> Any:
         """The function that gives a block the nodes of its front window: in its shared memory on CUDA, else in global
         memory."""
 
@@ -154,6 +152,5 @@ def build(variant: Variant) -> SimpleNamespace:
 
         return place
 
-    own_exposure = own("exposure")
-    own_gain = own("gain")
+    shared_exposure, shared_gain = shared("exposure"), shared("gain")
     return SimpleNamespace(**locals())

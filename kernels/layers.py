@@ -1,27 +1,28 @@
 """A target of several layers: which of them a step can touch, the load of all of them, and how the core left each.
 
 A layer sees the core in a frame of its own: its front at x = 0, its window's home at y = z = 0. So the load of one
-layer is the load of one plate, and loads of layers add. The interface is that of kernels/one_plate.py.
+layer is the load of one plate, and loads of layers add (kernels/contracts.py, TargetKind).
 
 Long because all of them read the same layers of the same slot.
 """
 
 from functools import cache
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 
 import warp as wp
 
 from . import (
+    constants,
+    contact,
     core_surface,
-    earlier,
+    exposure,
     footprint,
-    interaction,
     lanes,
     passage,
-    plate_grid,
-    rigid_body,
+    scheme,
     shots,
     sliding,
+    structs,
     target,
 )
 from .status import RUNNING, Status
@@ -29,159 +30,97 @@ from .variant import Variant
 
 
 @cache
-def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
-    """Device functions of the layers for one variant, whose loads a scheme computes."""
-    real, vec3 = variant.real, variant.vec3
-    zero, half, one, tiny = real(0.0), real(0.5), real(1.0), real(1.0e-9)
-    far = 1.0e9  # [m]
-    use = variant.use(
-        core_surface, earlier, footprint, interaction, lanes, passage, plate_grid, rigid_body, shots, sliding
-    )
-    plates, loads = target.build(variant, scheme), scheme.build(variant)
-    Surface, Pose, Window = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Window
-    Body, State = use.rigid_body.Body, use.rigid_body.State
-    Load, Change = use.rigid_body.Load, use.rigid_body.Change
-    Law, Footprint, Shots = use.interaction.Law, use.footprint.Footprint, use.shots.Shots
-    Target, Fields, Touches = plates.Target, loads.Fields, loads.Touches
+def build(variant: Variant) -> SimpleNamespace:
+    """Device functions of several layers for one variant."""
+    struct, real, vec3 = structs.build(variant), variant.real, variant.vec3
+    zero, half, one = real(0.0), real(0.5), real(1.0)
+    small, slowest = real(constants.SMALL.value), real(constants.SLOWEST.value)
+    far = constants.FAR_AWAY.value
+    use = variant.use(contact, core_surface, exposure, footprint, lanes, passage, scheme, shots, sliding, target)
+    faces_of, layer_value, plate_of = use.target.faces_of, use.target.layer_value, use.target.plate_of
     slides = variant.degrades and not variant.burst and variant.window == 0
-    Earlier, Passage, faces_of, own_of = use.earlier.Earlier, use.passage.Passage, plates.faces_of, plates.own_of
-
-    @wp.struct
-    class Stack:
-        """Scratch of all slots, shape [slots × layers]: what a step can touch of each layer, the layer's window, the
-        place of the window's home relative to the hit [m], whether the window is open, whether the core was near the
-        layer in the last step, and the nodes that the window has held, from its home (`known`). `own_cells` are the
-        nodes in each direction of the first window that a shot has by itself, shape [layers, 1] or [layers, shots]:
-        what becomes of it must not depend on how wide the windows of those are that are computed with it."""
-
-        found: wp.array(dtype=Footprint)
-        window: wp.array(dtype=Window)
-        home: wp.array(dtype=vec3)
-        open: wp.array(dtype=wp.bool)
-        near: wp.array(dtype=wp.bool)
-        known: wp.array(dtype=use.plate_grid.Box)
-        own_cells: wp.array2d(dtype=wp.int32)
-
-    @wp.struct
-    class Reached:
-        """What a step can touch: of all layers together (`found`), and which layers; `first` > `last` if there is none.
-
-        `rearmost` and `foremost` are the ends of the core along x, and `deepest` is the largest x that it has reached
-        so far [m]. `clearance` is a lower bound of its distance from the material of layers that it passes through a
-        hole or beside [m]. `behind` says whether it has left the plate through its rear face. `barrier` is the work
-        that a core takes straight through the layers before it, if they were solid [J]. `flight` is the unit vector
-        along the line of fire; a core that gets farther away from the hit across the line than `farthest` [m] never
-        ends.
-        """
-
-        found: Footprint
-        first: wp.int32
-        last: wp.int32
-        rearmost: real
-        foremost: real
-        deepest: real
-        clearance: real
-        behind: wp.bool
-        barrier: real
-        flight: vec3
-        farthest: real
 
     @wp.func
-    def first_step(target: Target, shot: wp.int32, shortest: real):
+    def first_step(context: struct.Context, shortest: real):
         """Length of the first step [s]: that of the plate."""
-        return own_of(target.stretch, 0, shot) * shortest
+        return layer_value(context.target.stretch, 0, context.shot) * shortest
 
     @wp.func
     def next_step(
-        surface: Surface,
-        target: Target,
-        shot: wp.int32,
-        pose: Pose,
-        reached: Reached,
-        last: Change,
-        dt: real,
+        context: struct.Context,
+        reach: struct.Reach,
+        pose: struct.Pose,
+        last: struct.Change,
+        clock: struct.Clock,
         free: real,
-        shortest: real,
     ):
-        """Length of the step after the present one and a `free` time [s]: that of the layer that needs the shortest, of
-        those that the core can be in until then. It is not so long that it takes more than a share of the speed, if it
-        takes as much of it per time as the present one."""
+        """Length of the step after the present one and a `free` time [s]. Of the layers that the core can be in until
+        then, the one that needs the shortest step decides. The step is not so long that it takes more than a share of
+        the speed, if it takes as much of it per time as the present one."""
+        target, shot, dt = context.target, context.shot, clock.step
         longest = one
         for k in range(target.count):
-            longest = wp.max(longest, own_of(target.stretch, k, shot))
-        margin = (half * dt + free + longest * shortest) * pose.speed
-        low, high = reached.rearmost - margin, reached.foremost + margin
+            longest = wp.max(longest, layer_value(target.stretch, k, shot))
+        margin = (half * dt + free + longest * clock.shortest) * pose.speed
+        low, high = reach.rearmost - margin, reach.foremost + margin
         stretch = longest
         for k in range(target.count):
             front, rear = faces_of(target, k, shot)
             if high > front and low < rear:
-                stretch = wp.min(stretch, own_of(target.stretch, k, shot))
-        taken = wp.length(last.velocity) + surface.bounding_radius * wp.length(last.omega)
-        allowed = target.slowing * wp.length(pose.velocity) * dt / (taken + tiny)
-        return wp.max(shortest, wp.min(stretch * shortest, allowed))
+                stretch = wp.min(stretch, layer_value(target.stretch, k, shot))
+        taken = wp.length(last.velocity) + context.surface.bounding_radius * wp.length(last.omega)
+        allowed = target.slowing * wp.length(pose.velocity) * dt / (taken + small)
+        return wp.max(clock.shortest, wp.min(stretch * clock.shortest, allowed))
 
     @wp.func
-    def begin(
-        surface: Surface,
-        target: Target,
-        fields: Fields,
-        stack: Stack,
-        earlier: Earlier,
-        passage: Passage,
-        shots: Shots,
-        slot: wp.int32,
-        shot: wp.int32,
-        state: State,
-    ):
+    def begin(context: struct.Context, state: struct.State):
         """No layer is reached yet."""
-        plates.begin(earlier, slot, shot)
+        target, stack, shot = context.target, context.stack, context.shot
+        use.target.begin(context)
         for k in range(target.count):
-            stack.open[slot * target.count + k] = False
-            stack.near[slot * target.count + k] = False
-        use.passage.begin(passage, shot, target.count)
-        reached = Reached()
-        straight = use.shots.line_of_flight(shots, shot)
-        reached.flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
+            stack.open[context.slot * target.count + k] = False
+            stack.near[context.slot * target.count + k] = False
+        use.passage.begin(context.passage, shot, target.count)
+        reach = struct.Reach()
+        straight = use.shots.line_of_flight(context.shots, shot)
+        reach.flight = vec3(real(straight[0]), real(straight[1]), real(straight[2]))
         # A core that slides between two layers never ends: it has gone farther than one that goes straight through.
-        steep = wp.length(vec3(zero, reached.flight[1], reached.flight[2])) / reached.flight[0]
-        longest_way = real(use.shots.own(shots.longest_way, shot))
-        reached.farthest = longest_way + steep * real(plates.depth_of(target, shot))
-        return reached, RUNNING
+        steep = wp.length(vec3(zero, reach.flight[1], reach.flight[2])) / reach.flight[0]
+        longest_way = real(use.shots.shot_value(context.shots.longest_way, shot))
+        reach.farthest = longest_way + steep * real(use.target.depth_of(target, shot))
+        return reach, RUNNING
 
     @wp.func
-    def in_layer(target: Target, stack: Stack, slot: wp.int32, layer: wp.int32, shot: wp.int32, pose: Pose):
+    def in_layer(context: struct.Context, layer: wp.int32, pose: struct.Pose):
         """The pose in the frame of a layer."""
+        target = context.target
         seen = pose
-        front = real(own_of(target.front, layer, shot))
-        seen.position = pose.position - stack.home[slot * target.count + layer] - vec3(front, zero, zero)
+        front = real(layer_value(target.front, layer, context.shot))
+        home = context.stack.home[context.slot * target.count + layer]
+        seen.position = pose.position - home - vec3(front, zero, zero)
         return seen
 
     @wp.func
-    def slide(
-        target: Target,
-        stack: Stack,
-        fields: Fields,
-        slot: wp.int32,
-        layer: wp.int32,
-        touch: Footprint,
-    ):
-        """Have the window of a layer and its laminate follow a core that leaves it, if what it leaves behind is not
-        needed any more: nodes come back as if nothing had been there, so none may that were held before. Nor may
-        another layer of the laminate have been found in the window in this step."""
-        base, first = slot * target.count, target.laminate[layer]
+    def slide(context: struct.Context, layer: wp.int32, touch: struct.Footprint):
+        """Have the window of a layer and its laminate follow a core that leaves it, and return whether it could.
+
+        What the window leaves behind must not be needed any more: nodes come back as if nothing had been there, so the
+        window takes in none that it has held before. Nor may another layer of the laminate have been looked up in the
+        window in this step.
+        """
+        target, stack, fields = context.target, context.stack, context.fields
+        base, first = context.slot * target.count, target.laminate[layer]
         old, known, box = stack.window[base + layer], stack.known[base + layer], touch.box
         rows = (box.y_low + box.y_high) // 2 - old.cells_y // 2
         columns = (box.z_low + box.z_high) // 2 - old.cells_z // 2
         new = use.sliding.slid(old, rows, columns)
         before, after = use.sliding.extent_of(old), use.sliding.extent_of(new)
         possible = use.sliding.is_ahead(before, after, known)
-        possible = possible and use.footprint.holds(
-            plates.plate_of(target, layer), new, use.sliding.moved(box, rows, columns)
-        )
+        possible = possible and use.footprint.holds(plate_of(target, layer), new, use.sliding.moved(box, rows, columns))
         for k in range(first, layer):
-            possible = possible and not (stack.near[base + k] and stack.found[base + k].last_ring >= 0)
+            possible = possible and not (stack.near[base + k] and stack.footprint[base + k].last_ring >= 0)
         if possible:
-            loads.slide_nodes(fields.exposure, old.first, old.planes, old.cells_y, old.cells_z, rows, columns)
+            use.exposure.slide_nodes(fields.exposure, old.first, old.planes, old.cells_y, old.cells_z, rows, columns)
             for k in range(first, target.count):
                 if target.laminate[k] == first:
                     stack.window[base + k] = use.sliding.slid(stack.window[base + k], rows, columns)
@@ -189,72 +128,50 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         return possible
 
     @wp.func
-    def open_layer(
-        target: Target,
-        stack: Stack,
-        earlier: Earlier,
-        fields: Fields,
-        shots: Shots,
-        slot: wp.int32,
-        layer: wp.int32,
-        shot: wp.int32,
-        pose: Pose,
-        ahead: vec3,
-    ):
+    def open_layer(context: struct.Context, layer: wp.int32, pose: struct.Pose, ahead: vec3):
         """Open the windows of a layer and its laminate where the core will reach it, at first that of the plate about
         the hit."""
+        target, stack, base = context.target, context.stack, context.slot * context.target.count
         home = vec3()
-        if layer > 0 or stack.open[slot * target.count + layer]:
+        if layer > 0 or stack.open[base + layer]:
             home = vec3(zero, pose.position[1] + ahead[1], pose.position[2] + ahead[2])
         use.lanes.barrier()
         for k in range(target.laminate[layer], target.count):
             if target.laminate[k] == target.laminate[layer]:
-                here = slot * target.count + k
-                stack.window[here] = plates.open_window(target, fields, earlier, shots, slot, k, shot, home)
-                stack.home[here] = home
-                stack.open[here] = True
-                stack.known[here] = use.sliding.extent_of(stack.window[here])
+                stack.window[base + k] = use.target.open_window(context, k, home)
+                stack.home[base + k] = home
+                stack.open[base + k] = True
+                stack.known[base + k] = use.sliding.extent_of(stack.window[base + k])
 
     @wp.func
-    def was_near(target: Target, stack: Stack, slot: wp.int32, layer: wp.int32):
+    def was_near(context: struct.Context, layer: wp.int32):
         """Whether the core was near a layer, or another one of its laminate, in the last step."""
-        near = bool(False)
+        target, near = context.target, bool(False)
         for k in range(target.laminate[layer], target.count):
-            near = near or (target.laminate[k] == target.laminate[layer] and stack.near[slot * target.count + k])
+            same = target.laminate[k] == target.laminate[layer]
+            near = near or (same and context.stack.near[context.slot * target.count + k])
         return near
 
     @wp.func
-    def touch_of(
-        surface: Surface,
-        target: Target,
-        fields: Fields,
-        stack: Stack,
-        earlier: Earlier,
-        shots: Shots,
-        slot: wp.int32,
-        layer: wp.int32,
-        shot: wp.int32,
-        state: State,
-        pose: Pose,
-        dt: real,
-    ):
+    def touch_of(context: struct.Context, layer: wp.int32, state: struct.State, pose: struct.Pose, dt: real):
         """What a step can touch of a layer that the core is near, and a lower bound of the core's distance from its
         material [m]. A window opens when the core comes near, and again where it comes back elsewhere."""
-        here, plate = slot * target.count + layer, plates.plate_of(target, layer)
+        surface, target, stack = context.surface, context.target, context.stack
+        here, plate = context.slot * target.count + layer, plate_of(target, layer)
         if not stack.open[here]:
-            front, _ = faces_of(target, layer, shot)
-            ahead = real((front - pose.position[0]) / wp.max(state.velocity[0], one)) * state.velocity
-            ahead = wp.min(one, surface.bounding_radius / (wp.length(ahead) + tiny)) * ahead
-            open_layer(target, stack, earlier, fields, shots, slot, layer, shot, pose, ahead)
-        seen = in_layer(target, stack, slot, layer, shot, pose)
+            front, _ = faces_of(target, layer, context.shot)
+            ahead = real((front - pose.position[0]) / wp.max(state.velocity[0], slowest)) * state.velocity
+            ahead = wp.min(one, surface.bounding_radius / (wp.length(ahead) + small)) * ahead
+            open_layer(context, layer, pose, ahead)
+        seen = in_layer(context, layer, pose)
         touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
         if (
             touch.last_ring >= 0
-            and not was_near(target, stack, slot, layer)
-            and use.footprint.is_beside(stack.window[here], touch, own_of(stack.own_cells, layer, shot))
+            and not was_near(context, layer)
+            and use.footprint.is_beside(stack.window[here], touch, layer_value(stack.first_cells, layer, context.shot))
         ):
-            open_layer(target, stack, earlier, fields, shots, slot, layer, shot, pose, vec3())
-            seen = in_layer(target, stack, slot, layer, shot, pose)
+            open_layer(context, layer, pose, vec3())
+            seen = in_layer(context, layer, pose)
             touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
         window = stack.window[here]
         beside = use.footprint.clearance_at(plate, window, seen.position[1], seen.position[2])
@@ -263,129 +180,107 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
             touch.inside = True
         if wp.static(slides):
             if target.slide and target.weakens[layer] and not touch.inside:
-                if slide(target, stack, fields, slot, layer, touch):
+                if slide(context, layer, touch):
                     touch = use.footprint.footprint_of(surface, plate, stack.window[here], seen, dt)
         return touch, wp.max(zero, beside - surface.bounding_radius)
 
     @wp.func
-    def reach(
-        surface: Surface,
-        body: Body,
-        target: Target,
-        fields: Fields,
-        stack: Stack,
-        earlier: Earlier,
-        passage: Passage,
-        shots: Shots,
-        slot: wp.int32,
-        shot: wp.int32,
-        state: State,
-        pose: Pose,
-        before: Reached,
-        last: Change,
-        time: real,
+    def find_reach(
+        context: struct.Context,
+        before: struct.Reach,
+        state: struct.State,
+        pose: struct.Pose,
+        last: struct.Change,
+        now: real,
         dt: real,
     ):
-        """Find what a step can touch of every layer, and record the layers that the core has left. `last` is the change
-        of its velocities in the last step."""
-        reached = before
+        """What a step can touch of every layer. The layers that the core has left are recorded; `last` is the change of
+        its velocities in the last step."""
+        surface, target, stack, shot = context.surface, context.target, context.stack, context.shot
+        reach = before
         rearmost, foremost = use.core_surface.ends_of(surface, pose)
-        reached.rearmost = rearmost
-        reached.foremost = foremost
-        reached.deepest = wp.max(before.deepest, foremost)
-        reached.clearance = real(far)
-        reached.barrier = zero
-        reached.first = target.count
-        reached.last = -1
+        reach.rearmost = rearmost
+        reach.foremost = foremost
+        reach.deepest = wp.max(before.deepest, foremost)
+        reach.clearance = real(far)
+        reach.barrier = zero
+        reach.first = target.count
+        reach.last = -1
         margin = half * dt * pose.speed
         low, high = rearmost - margin, foremost + margin
-        found = Footprint()
-        found.last_ring = -1
-        found.inside = True
-        found.back = high < zero
+        footprint = struct.Footprint()
+        footprint.last_ring = -1
+        footprint.inside = True
+        footprint.back = high < zero
         for k in range(target.count):
-            here = slot * target.count + k
+            here = context.slot * target.count + k
             front, rear = faces_of(target, k, shot)
-            found.through = low > rear  # in the end, that of the last layer
+            footprint.through = low > rear  # in the end, that of the last layer
             near = high > front and low < rear
             if low > rear:
                 section = real(wp.pi) * surface.max_radius * surface.max_radius
-                reached.barrier += own_of(target.a0, k, shot) * (rear - front) * section
+                reach.barrier += layer_value(target.a0, k, shot) * (rear - front) * section
             if near:
-                touch, clearance = touch_of(
-                    surface, target, fields, stack, earlier, shots, slot, k, shot, state, pose, dt
-                )
-                reached.clearance = wp.min(reached.clearance, clearance)
+                touch, clearance = touch_of(context, k, state, pose, dt)
+                reach.clearance = wp.min(reach.clearance, clearance)
                 if touch.last_ring >= 0:
-                    reached.first = wp.min(reached.first, k)
-                    reached.last = k
-                    found.last_ring = surface.rings - 1
-                    found.inside = found.inside and (
-                        touch.inside or not (target.weakens[k] or wp.static(variant.burst))
-                    )
+                    reach.first = wp.min(reach.first, k)
+                    reach.last = k
+                    footprint.last_ring = surface.rings - 1
+                    held = touch.inside or not (target.weakens[k] or wp.static(variant.burst))
+                    footprint.inside = footprint.inside and held
                 use.lanes.barrier()
-                stack.found[here] = touch
-            elif low > rear and not use.passage.has_left(passage, shot, k):
-                since = (rearmost - rear) / wp.max(state.velocity[0], one)
+                stack.footprint[here] = touch
+            elif low > rear and not use.passage.has_left(context.passage, shot, k):
+                since = (rearmost - rear) / wp.max(state.velocity[0], slowest)
                 speed = wp.length(state.velocity)
                 if before.first != k or before.last != k:  # other layers slow the core down while it leaves this one
                     speed = wp.length(pose.velocity - (since / dt) * last.velocity)
-                use.passage.leave(passage, body, shot, k, state, speed, since, time, reached.flight)
-                use.passage.fly_on(passage, body, target.standoffs, target.ahead, shot, k, state, rear, reached.flight)
+                use.passage.leave(context, k, state, speed, since, now, reach.flight)
+                use.passage.fly_on(context, k, state, rear, reach.flight)
             stack.near[here] = near
-        reached.found = found
-        reached.behind = use.passage.has_left(passage, shot, 0)
-        return reached
+        reach.footprint = footprint
+        reach.behind = use.passage.has_left(context.passage, shot, 0)
+        return reach
 
     @wp.func
-    def law_at(target: Target, law: Law, stack: Stack, slot: wp.int32, shot: wp.int32, reached: Reached):
+    def law_at(context: struct.Context, law: struct.Law, reach: struct.Reach):
         """The law with the onset of what a step can touch: the layers add theirs."""
-        jump, most = real(0.0), real(0.0)
-        for k in range(reached.first, reached.last + 1):
-            if stack.found[slot * target.count + k].last_ring >= 0:
-                jump += own_of(target.onset_jump, k, shot)
-                most = wp.max(most, own_of(target.most_jump, k, shot))
-        found = law
-        found.onset_jump = wp.min(jump, most)
-        return found
+        target, jump, most = context.target, real(0.0), real(0.0)
+        for k in range(reach.first, reach.last + 1):
+            if context.stack.footprint[context.slot * target.count + k].last_ring >= 0:
+                jump += layer_value(target.onset_jump, k, context.shot)
+                most = wp.max(most, layer_value(target.most_jump, k, context.shot))
+        wider = law
+        wider.onset_jump = wp.min(jump, most)
+        return wider
 
     @wp.func
-    def load_on(
-        surface: Surface,
-        target: Target,
-        common: Law,
-        fields: Fields,
-        stack: Stack,
-        touches: Touches,
-        passage: Passage,
-        slot: wp.int32,
-        shot: wp.int32,
-        reached: Reached,
-        pose: Pose,
-        dt: real,
-    ):
+    def load_on(context: struct.Context, law: struct.Law, reach: struct.Reach, pose: struct.Pose, dt: real):
         """The load of all layers over one step."""
-        load = Load()
+        surface, target, stack, touches = context.surface, context.target, context.stack, context.touches
+        shot, slot = context.shot, context.slot
+        load = struct.Load()
         if wp.static(variant.bends):
-            loads.clear_sums(surface, touches, slot)
-        for k in range(reached.first, reached.last + 1):
+            use.contact.clear_sums(surface, touches, slot)
+        for k in range(reach.first, reach.last + 1):
             here = slot * target.count + k
-            if stack.found[here].last_ring >= 0:
-                part = loads.load_on(
+            if stack.footprint[here].last_ring >= 0:
+                part = use.scheme.load_on(
                     surface,
-                    plates.plate_of(target, k),
-                    plates.law_of(target, common, k, shot),
-                    fields,
+                    plate_of(target, k),
+                    use.target.law_of(target, law, k, shot),
+                    context.fields,
                     stack.window[here],
                     touches,
                     slot,
-                    stack.found[here],
-                    in_layer(target, stack, slot, k, shot, pose),
+                    stack.footprint[here],
+                    in_layer(context, k, pose),
                     dt,
                 )
                 if part.touching:
                     load.touching = True
-                    use.passage.enter(passage, shot, k)
+                    use.passage.enter(context.passage, shot, k)
                 load.damped = load.damped or part.damped
                 load.force += part.force
                 load.moment += part.moment
@@ -395,84 +290,63 @@ def build(variant: Variant, scheme: ModuleType) -> SimpleNamespace:
         return load
 
     @wp.func
-    def follow(
-        surface: Surface,
-        target: Target,
-        stack: Stack,
-        earlier: Earlier,
-        slot: wp.int32,
-        shot: wp.int32,
-        reached: Reached,
-        pose: Pose,
-    ):
-        """Take note, for later shots, of where the core is in the layers that a step can touch."""
-        for k in range(reached.first, reached.last + 1):
-            here = slot * target.count + k
-            if stack.found[here].last_ring >= 0:
-                seen = in_layer(target, stack, slot, k, shot, pose)
-                plates.follow(surface, earlier, stack.window[here], slot, k, shot, seen)
+    def follow(context: struct.Context, reach: struct.Reach, pose: struct.Pose):
+        """Take note of where the core is in the layers that a step can touch."""
+        stack, base = context.stack, context.slot * context.target.count
+        for k in range(reach.first, reach.last + 1):
+            if stack.footprint[base + k].last_ring >= 0:
+                use.target.follow(context, stack.window[base + k], k, in_layer(context, k, pose))
 
     @wp.func
-    def free_time(
-        surface: Surface, target: Target, shot: wp.int32, state: State, pose: Pose, reached: Reached, dt: real
-    ):
+    def free_time(context: struct.Context, reach: struct.Reach, state: struct.State, pose: struct.Pose, dt: real):
         """Time [s] that a core between layers can go on after a step before it may touch one, and whether it is lost
         between them. No part of it moves along x faster than its centre of mass and its turn together. It never passes
         more than its own size."""
+        surface, target = context.surface, context.target
         ahead, behind = real(far), real(far)
         for k in range(target.count):
-            front, rear = faces_of(target, k, shot)
-            if reached.foremost < front:
-                ahead = wp.min(ahead, front - reached.foremost)
-            if reached.rearmost > rear:
-                behind = wp.min(behind, reached.rearmost - rear)
+            front, rear = faces_of(target, k, context.shot)
+            if reach.foremost < front:
+                ahead = wp.min(ahead, front - reach.foremost)
+            if reach.rearmost > rear:
+                behind = wp.min(behind, reach.rearmost - rear)
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, vec3(one, zero, zero)))
         forwards, backwards = turning + state.velocity[0], turning - state.velocity[0]
         across = turning + wp.length(vec3(zero, state.velocity[1], state.velocity[2]))
-        time = surface.bounding_radius / wp.max(wp.length(state.velocity), one)
-        time = wp.min(time, reached.clearance / wp.max(across, tiny))
+        time = surface.bounding_radius / wp.max(wp.length(state.velocity), slowest)
+        time = wp.min(time, reach.clearance / wp.max(across, small))
         if forwards > zero:
             time = wp.min(time, ahead / forwards)
         if backwards > zero:
             time = wp.min(time, behind / backwards)
-        lost = wp.length(vec3(zero, state.position[1], state.position[2])) > reached.farthest
+        lost = wp.length(vec3(zero, state.position[1], state.position[2])) > reach.farthest
         return wp.max(zero, time - half * dt), lost
 
     @wp.func
-    def given_up(target: Target, shot: wp.int32, reached: Reached, state: State, touched: wp.bool):
-        """The status of a core that has not ended: it rests if it has touched, the whole of it is in the target, and
-        its centre of mass is in none of the layers."""
-        x, between = state.position[0], touched and reached.rearmost > zero
+    def given_up(context: struct.Context, reach: struct.Reach, state: struct.State, touched: wp.bool):
+        """A core that has not ended rests if it has touched, the whole of it is in the target, and its centre of mass
+        is in none of the layers."""
+        target, x, between = context.target, state.position[0], touched and reach.rearmost > zero
         for k in range(target.count):
-            front, rear = faces_of(target, k, shot)
+            front, rear = faces_of(target, k, context.shot)
             between = between and (x < front or x > rear)
             if k == target.count - 1:
-                between = between and reached.foremost < rear
+                between = between and reach.foremost < rear
         return wp.where(between, Status.ARRESTED, Status.UNFINISHED)
 
     @wp.func
-    def conclude(
-        surface: Surface,
-        target: Target,
-        fields: Fields,
-        stack: Stack,
-        earlier: Earlier,
-        passage: Passage,
-        slot: wp.int32,
-        shot: wp.int32,
-        status: wp.int32,
-        reached: Reached,
-    ):
+    def conclude(context: struct.Context, reach: struct.Reach, status: wp.int32):
         """Say how the core ended in the layers that it did not leave through their rear faces. Keep what later shots at
         this target need of those that it reached, each in its last window there."""
+        target, stack, shot = context.target, context.stack, context.shot
         for k in range(target.count):
-            here = slot * target.count + k
+            here = context.slot * target.count + k
             front, rear = faces_of(target, k, shot)
-            inside = reached.foremost > front and reached.rearmost < rear
-            use.passage.conclude(passage, shot, k, status, inside, reached.deepest - front)
+            inside = reach.foremost > front and reach.rearmost < rear
+            use.passage.conclude(context.passage, shot, k, status, inside, reach.deepest - front)
             if stack.open[here] and target.laminate[k] == k:
-                plates.keep(fields, earlier, stack.window[here], slot, shot)
-            if stack.open[here] and use.passage.has_left(passage, shot, k):
-                plates.leave_channel(surface, earlier, stack.window[here], slot, k, shot)
+                use.target.keep(context, stack.window[here])
+            if stack.open[here] and use.passage.has_left(context.passage, shot, k):
+                use.target.leave_channel(context, stack.window[here], k)
 
     return SimpleNamespace(**locals())

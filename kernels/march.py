@@ -7,25 +7,21 @@ import warp as wp
 
 from . import (
     bending,
-    block,
-    channel,
-    contact,
+    clock,
+    constants,
     core_surface,
-    damping,
-    earlier,
-    footprint,
     interaction,
     lanes,
     layers,
-    nodal,
     one_plate,
-    passage,
-    plate_grid,
     rigid_body,
+    scheme,
     shots,
+    structs,
     target,
     trace,
 )
+from .contracts import TargetKind, checked
 from .lanes import BLOCKS, LANES
 from .status import RUNNING, Status
 from .variant import Variant
@@ -33,166 +29,125 @@ from .variant import Variant
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
-    """The march kernel and the structs it takes, for one variant."""
-    real, vec3 = variant.real, variant.vec3
+    """The march kernel of one variant."""
+    struct, real, vec3 = structs.build(variant), variant.real, variant.vec3
     zero, half = real(0.0), real(0.5)
-    steadied = real(8.0)  # onsets: as far as a step carries a core beyond the ramp
-    still = real(1.0e-4)  # of the impact energy: a core at 1 % of its impact velocity has come to rest
-    spent = real(2.5e-3)  # likewise: at 5 % it does not come back through a layer that it has left
-    weak = real(2.25e-2)  # likewise: nor does one that flies back at 15 %, however fast it goes along the layers,
-    tenth = real(0.1)  # if that is no more than this share of what solid layers would take
-    most = real(1.01)  # of the impact energy: no law adds to it, and rounding errors add less in many thousand steps
-    use = variant.use(
-        bending,
-        channel,
-        core_surface,
-        damping,
-        earlier,
-        footprint,
-        interaction,
-        lanes,
-        passage,
-        plate_grid,
-        rigid_body,
-        shots,
-        trace,
-    )
-    scheme = nodal if variant.nodal else block if variant.window else contact
-    loads, plates = scheme.build(variant), target.build(variant, scheme)
-    reaches = (layers if variant.layered else one_plate).build(variant, scheme)
-    Surface, Pose, Law = use.core_surface.Surface, use.core_surface.Pose, use.interaction.Law
-    Body, State = use.rigid_body.Body, use.rigid_body.State
-    Load, Change = use.rigid_body.Load, use.rigid_body.Change
-    Fields, Footprint, Touches = loads.Fields, use.footprint.Footprint, loads.Touches
-    Sections, Bending = use.bending.Sections, use.bending.Bending
-    Shots, own = use.shots.Shots, use.shots.own
-    Target, Stack, Passage, Earlier = plates.Target, reaches.Stack, use.passage.Passage, use.earlier.Earlier
-    Channels, Section, Box = use.channel.Channels, use.channel.Section, use.plate_grid.Box
-
-    @wp.struct
-    class Outcomes:
-        """How each shot's contact ended: arrays of shape [shots]; position relative to the hit point."""
-
-        status: wp.array(dtype=wp.int32)
-        steps: wp.array(dtype=wp.int32)
-        contact_duration: wp.array(dtype=real)
-        energy_loss: wp.array(dtype=real)
-        position: wp.array(dtype=vec3)
-        axis: wp.array(dtype=vec3)
-        velocity: wp.array(dtype=vec3)
-        angular_momentum: wp.array(dtype=vec3)
+    at_rest, spent, weak = (real(share.value) for share in (constants.STILL, constants.SPENT, constants.WEAK))
+    barrier_share, gained = real(constants.BARRIER_SHARE.value), real(constants.GAINED.value)
+    steadied = real(constants.STEADIED.value)
+    use = variant.use(bending, clock, core_surface, interaction, lanes, rigid_body, scheme, shots, target, trace)
+    kind = checked(TargetKind, variant, (layers if variant.layered else one_plate).build(variant))
+    shot_value = use.shots.shot_value
 
     @wp.func
-    def ended(
-        surface: Surface,
-        body: Body,
-        state: State,
-        pose: Pose,
-        found: Footprint,
+    def status_of(
+        context: struct.Context,
+        reach: struct.Reach,
+        state: struct.State,
+        pose: struct.Pose,
         touched: wp.bool,
-        behind: wp.bool,
-        barrier: real,
-        initial_energy: real,
-        depth: real,
     ):
         """The final status of a core, or RUNNING.
 
-        A core outside the target, which is `depth` [m] deep, cannot come back if it moves away faster than its rotation
-        moves any part of it. A core that turns back `behind` a layer, and is spent, rests there; between
-        layers, what it has along them does not count, and they are a `barrier` to it [J].
+        A core outside the target cannot come back if it moves away faster than its rotation moves any part of it. A
+        core that turns back behind a layer, and is spent, rests there; between layers, what it has along them does not
+        count (docs/model.md §8).
         """
+        body, surface, footprint = context.body, context.surface, reach.footprint
         status = RUNNING
         energy = use.rigid_body.kinetic_energy(body, pose.axis, state.velocity, state.angular_momentum)
         along = wp.dot(state.angular_momentum, pose.axis)
         about_axis = half * along * along / body.inertia_axial
         turning = surface.bounding_radius * wp.length(wp.cross(pose.omega, pose.axis))
         leaving = wp.abs(state.velocity[0])
-        beyond = wp.max(state.position[0] - depth, -state.position[0])
-        back = behind and state.velocity[0] < zero
-        rests = energy - about_axis < wp.where(back, spent, still) * initial_energy
+        beyond = wp.max(state.position[0] - context.depth, -state.position[0])
+        back = reach.behind and state.velocity[0] < zero
+        rests = energy - about_axis < wp.where(back, spent, at_rest) * context.impact_energy
         along_layers = half * body.mass * wp.length_sq(vec3(zero, state.velocity[1], state.velocity[2]))
         crossing = energy - about_axis - along_layers
-        stays = back and found.last_ring < 0 and crossing < wp.min(weak * initial_energy, tenth * barrier)
+        held = crossing < wp.min(weak * context.impact_energy, barrier_share * reach.barrier)
+        stays = back and footprint.last_ring < 0 and held
         gone = leaving > turning or beyond > surface.bounding_radius
         if not wp.isfinite(energy):
             status = Status.NOT_FINITE
-        elif energy > most * initial_energy:
+        elif energy > gained * context.impact_energy:
             status = Status.GAINED_ENERGY
-        elif found.through and state.velocity[0] > zero and gone:
+        elif footprint.through and state.velocity[0] > zero and gone:
             status = wp.where(touched, Status.PERFORATED, Status.MISSED)
-        elif found.back and state.velocity[0] < zero and gone:
+        elif footprint.back and state.velocity[0] < zero and gone:
             status = wp.where(touched, Status.RICOCHETED, Status.MISSED)
         elif touched and (rests or stays):
             status = Status.ARRESTED
-        elif not found.inside:
+        elif not footprint.inside:
             status = Status.LEFT_WINDOW
         return status
 
+    @wp.func
+    def context_of(
+        inputs: struct.Inputs, scratch: struct.Scratch, passage: struct.Passage, slot: wp.int32, shot: wp.int32
+    ):
+        """A shot in a slot, with the surface and the plates of the shot, and the fields of the slot."""
+        context, shots = struct.Context(), inputs.shots
+        context.shot = shot
+        context.slot = slot
+        context.surface = inputs.surface
+        context.target = inputs.target
+        if wp.static(variant.tabled):
+            context.surface = inputs.surfaces[shot_value(shots.surface, shot)]
+            context.target = use.target.with_plates_of(inputs.target, shots, shot)
+        context.body = use.shots.body_of(shots, shot)
+        context.law = use.target.law_of(context.target, inputs.law, 0, shot)
+        context.law.onset_share = shot_value(shots.onset_share, shot)
+        context.depth = real(use.target.depth_of(context.target, shot))
+        context.shots = shots
+        context.fields = use.scheme.fields_of_slot(scratch.fields, slot)
+        context.touches = scratch.touches
+        context.stack = scratch.stack
+        context.earlier = scratch.earlier
+        context.passage = passage
+        return context
+
     def march(
-        # inputs
         first: wp.int32,
         slots: wp.int32,
         order: wp.array(dtype=wp.int32),
-        surface: Surface,
-        sections: Sections,
-        surfaces: wp.array(dtype=Surface),
-        all_sections: wp.array(dtype=Sections),
-        target: Target,
-        law: Law,
-        shots: Shots,
-        rows: wp.int32,
-        # scratch
-        fields: Fields,
-        touches: Touches,
-        stack: Stack,
-        earlier: Earlier,
-        # outputs
-        outcomes: Outcomes,
-        passage: Passage,
-        bending: wp.array(dtype=Bending),
-        trace: wp.array2d(dtype=real),
+        inputs: struct.Inputs,
+        scratch: struct.Scratch,
+        results: struct.Results,
     ):
         """March one shot per thread, or per block of threads: number k computes shot order[first + k] in slot k mod
-        slots.
+        slots. Shots at one plate are numbered in a row, and are computed one after another in one slot.
 
-        Shots at one plate are numbered in a row, and are computed one after another in one slot. All shots have one
-        surface, by value as one plate is (kernels/target.py), or each has one of the table. Each shot has `rows` rows
-        of the trace; 0 means no trace. The trace has no build of its own, so a shot computes the same bits with and
-        without it.
+        A step finds what the core can touch at mid-step, loads the core, kicks it there, and drifts it to the middle of
+        the next step (kernels/clock.py). Velocities therefore change at mid-steps only, where positions are known: the
+        method is of second order, and exact where nothing touches. A load depends on the velocities at mid-step, of
+        which half of the change is still to come: this half is foreseen from the last step.
+
+        The trace has no build of its own, so a shot computes the same bits with and without it.
         """
         shot = order[first + wp.tid()]
         slot = wp.tid() % slots
-        body = use.shots.body_of(shots, shot)
-        if wp.static(variant.tabled):
-            surface = surfaces[own(shots.surface, shot)]
-            sections = all_sections[own(shots.surface, shot)]
-            target = plates.of_shot(target, shots, shot)
-        law = plates.law_of(target, law, 0, shot)
-        law.onset_share = own(shots.onset_share, shot)
-        speed = own(shots.velocity, shot)
-        shortest = real(own(shots.time_step, shot))
-        max_steps = wp.int32(wp.ceil(own(shots.longest_way, shot) / (speed * wp.float64(shortest))))
-        depth = real(plates.depth_of(target, shot))
-        fields = loads.own_fields(fields, slot)
+        context = context_of(inputs, scratch, results.passage, slot, shot)
+        surface, body, shots = context.surface, context.body, context.shots
+        speed = shot_value(shots.velocity, shot)
+        shortest = real(shot_value(shots.time_step, shot))
+        max_steps = wp.int32(wp.ceil(shot_value(shots.longest_way, shot) / (speed * wp.float64(shortest))))
         state = use.shots.launch_state(surface, body, shots, shot)
         axis = use.rigid_body.axis_of(state.attitude)
-        initial_energy = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
-        dt = reaches.first_step(target, shot, shortest)
-        # Positions are those of mid-step from here on: kicks at mid-step, exact drifts between them.
-        state = use.rigid_body.drift(body, state, half * dt)
-        reached, status = reaches.begin(surface, target, fields, stack, earlier, passage, shots, slot, shot, state)
+        context.impact_energy = use.rigid_body.kinetic_energy(body, axis, state.velocity, state.angular_momentum)
+        clock = use.clock.started(shortest, kind.first_step(context, shortest))
+        state = use.rigid_body.drift(body, state, half * clock.step)  # to the first mid-step
+        reach, status = kind.begin(context, state)
         touched, lost = bool(False), bool(False)
         if wp.static(variant.bends):
-            worst = Bending()
-            worst.strength = own(shots.strength, shot)
-        contact_steps = int(0)
-        skipped = half * (dt - shortest)  # time that no shortest step counts
-        longer = real(0.0)  # what steps in contact are longer than the shortest, together
-        last = Change()
-        before_last = Change()
-        step = int(0)
-        while status == RUNNING and step < max_steps and not lost:
-            now = (real(step) + half) * shortest + skipped
+            sections = inputs.sections
+            if wp.static(variant.tabled):
+                sections = inputs.all_sections[shot_value(shots.surface, shot)]
+            worst = struct.Bending()
+            worst.strength = shot_value(shots.strength, shot)
+        last, before_last = struct.Change(), struct.Change()
+        while status == RUNNING and clock.steps < max_steps and not lost:
+            now, dt = use.clock.now(clock), clock.step
             omega = use.rigid_body.angular_velocity(
                 body, use.rigid_body.axis_of(state.attitude), state.angular_momentum
             )
@@ -200,84 +155,70 @@ def build(variant: Variant) -> SimpleNamespace:
             # The closing speeds are those at mid-step, if this step changes the velocities as much as the last one did.
             pose.velocity += half * last.velocity
             pose.omega += half * last.omega
-            reached = reaches.reach(
-                surface, body, target, fields, stack, earlier, passage, shots, slot, shot, state, pose, reached, last,
-                now, dt,
-            )  # fmt: skip
-            found = reached.found
-            status = ended(
-                surface, body, state, pose, found, touched, reached.behind, reached.barrier, initial_energy, depth
-            )
+            reach = kind.find_reach(context, reach, state, pose, last, now, dt)
+            status = status_of(context, reach, state, pose, touched)
             if status == RUNNING:
-                law = reaches.law_at(target, law, stack, slot, shot, reached)
+                law = kind.law_at(context, context.law, reach)
                 law.onset = use.interaction.onset_speed(law, dt, wp.length(pose.velocity), real(speed))
                 law.steadied = wp.where(use.rigid_body.swings(body, before_last, last), steadied * law.onset, zero)
                 before_last = last
-                load = Load()
+                load = struct.Load()
                 before = state
                 free = real(0.0)
-                if found.last_ring >= 0:
-                    load = reaches.load_on(
-                        surface, target, law, fields, stack, touches, passage, slot, shot, reached, pose, dt
-                    )
-                    reaches.follow(surface, target, stack, earlier, slot, shot, reached, pose)
+                if reach.footprint.last_ring >= 0:
+                    load = kind.load_on(context, law, reach, pose, dt)
+                    kind.follow(context, reach, pose)
                 else:
-                    free, lost = reaches.free_time(surface, target, shot, state, pose, reached, dt)
+                    free, lost = kind.free_time(context, reach, state, pose, dt)
                 if load.touching:
                     touched = True
-                    contact_steps += 1
-                    longer += dt - shortest
+                    clock = use.clock.in_contact(clock)
                     # The damping counts from the speeds at the start of the step.
                     load.force += load.damping_vv * last.velocity + load.damping_vw * last.omega
                     load.moment += wp.transpose(load.damping_vw) * last.velocity + load.damping_ww * last.omega
                     if wp.static(variant.bends):
                         worst = use.bending.bent(
-                            worst, surface, sections, body, touches, slot, found, pose, state, load, last, dt, now
+                            worst, context, sections, reach.footprint, pose, state, load, last, dt, now
                         )
                     state = use.rigid_body.kick(body, state, load, dt)
                     last = use.rigid_body.change_between(body, before, state)
                 else:
-                    last = Change()
-                if rows > 0:
+                    last = struct.Change()
+                if inputs.rows > 0:
                     force, moment = use.rigid_body.mean_load(body, before, load, dt)
-                    use.trace.record(trace, shot * rows + step, now, dt, state, force, moment)
-                following = reaches.next_step(surface, target, shot, pose, reached, last, dt, free, shortest)
-                between = half * (dt + following)  # from mid-step to mid-step
-                state = use.rigid_body.drift(body, state, between + free)
-                skipped += between - shortest + free
+                    row = shot * inputs.rows + clock.steps
+                    use.trace.record(results.trace, row, now, dt, state, force, moment)
+                following = kind.next_step(context, reach, pose, last, clock, free)
+                state = use.rigid_body.drift(body, state, use.clock.drift_time(clock, following) + free)
+                clock = use.clock.advanced(clock, following, free)
                 last = use.rigid_body.in_step(last, following / dt)
-                dt = following
-                step += 1
-        if rows > 0:
-            now = (real(step) + half) * shortest + skipped
-            use.trace.record(trace, shot * rows + step, now, dt, state, vec3(), vec3())
+        if inputs.rows > 0:
+            row = shot * inputs.rows + clock.steps
+            use.trace.record(results.trace, row, use.clock.now(clock), clock.step, state, vec3(), vec3())
         if status == RUNNING:
-            status = reaches.given_up(target, shot, reached, state, touched)
-        reaches.conclude(surface, target, fields, stack, earlier, passage, slot, shot, status, reached)
+            status = kind.given_up(context, reach, state, touched)
+        kind.conclude(context, reach, status)
         axis = use.rigid_body.axis_of(state.attitude)
-        if wp.static(variant.window > 0):
-            if use.lanes.lane() > 0:  # all lanes know the outcome
-                return
-        outcomes.status[shot] = status
-        outcomes.steps[shot] = step
-        outcomes.contact_duration[shot] = real(contact_steps) * shortest + longer
+        if use.lanes.lane() > 0:  # all lanes of a block know the outcome
+            return
         energy_loss = zero
         if status == Status.ARRESTED:
-            energy_loss = initial_energy
+            energy_loss = context.impact_energy
         elif touched:
-            energy_loss = initial_energy - use.rigid_body.kinetic_energy(
+            energy_loss = context.impact_energy - use.rigid_body.kinetic_energy(
                 body, axis, state.velocity, state.angular_momentum
             )
-        outcomes.energy_loss[shot] = energy_loss
         if wp.static(variant.bends):
-            bending[shot] = worst
+            results.bending[shot] = worst
+        outcomes = results.outcomes
+        outcomes.status[shot] = status
+        outcomes.steps[shot] = clock.steps
+        outcomes.contact_duration[shot] = use.clock.contact_duration(clock)
+        outcomes.energy_loss[shot] = energy_loss
         outcomes.position[shot] = state.position
         outcomes.axis[shot] = axis
         outcomes.velocity[shot] = state.velocity
         outcomes.angular_momentum[shot] = state.angular_momentum
 
     kernel = variant.kernel(march, (LANES, BLOCKS) if variant.window else None)
-    Plate = use.plate_grid.Plate
-    Sums = use.damping.Sums
-    depth_of = plates.depth_of
-    return SimpleNamespace(**locals())
+    return SimpleNamespace(**vars(struct), kernel=kernel)

@@ -6,6 +6,21 @@ from typing import Any
 
 import warp as wp
 
+ACROSS = """
+    const auto across = [](const auto* from, auto z) {  // linear interpolation between a number and the next one
+    #if !defined(__CUDA_ARCH__)
+        if constexpr (sizeof(z) == 4) {  // a CPU reads two neighbours at once in half the time
+            unsigned long long both;
+            memcpy(&both, from, sizeof(both));
+            const float first = __builtin_bit_cast(float, (unsigned)both);
+            return first + z * (__builtin_bit_cast(float, (unsigned)(both >> 32)) - first);
+        }
+    #endif
+        return from[0] + z * (from[1] - from[0]);
+    };
+"""
+"""Native code that defines the function `across` of an address and a place between 0 and 1."""
+
 
 @cache
 def build(dtype: Any) -> SimpleNamespace:

@@ -10,48 +10,44 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import contact, core_surface, footprint, interaction, memory, plate_grid, rigid_body
+from . import core_surface, memory, plate_grid, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of a literal step's load for one variant."""
+    struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    use = variant.use(contact, core_surface, footprint, interaction, plate_grid, rigid_body)
-    Surface, Pose, Plate = use.core_surface.Surface, use.core_surface.Pose, use.plate_grid.Plate
-    Window, Law, Load = use.plate_grid.Window, use.interaction.Law, use.rigid_body.Load
-    Footprint, Touches = use.footprint.Footprint, use.contact.Touches
+    use = variant.use(core_surface, plate_grid)
     part_of = memory.build(real).part_of
 
-    @wp.struct
-    class Fields:
-        """Scratch of all slots, or of one (kernels/exposure.py): each node's share of the resistance Y, 0 in holes; and
-        1 where the step touched the node."""
-
-        share: wp.array(dtype=real)
-        touched: wp.array(dtype=real)
-        nodes: wp.int32
-        first: wp.array(dtype=wp.int32)
-        cells_y: wp.array(dtype=wp.int32)
-        cells_z: wp.array(dtype=wp.int32)
-
     @wp.func
-    def outward_of(surface: Surface, pose: Pose, index: wp.int32):
+    def outward_of(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func
-    def own_fields(fields: Fields, slot: wp.int32):
+    def fields_of_slot(fields: struct.Fields, slot: wp.int32):
         """The fields of one slot."""
-        own = fields
-        own.share = part_of(fields.share, slot * fields.nodes, fields.nodes)
-        own.touched = part_of(fields.touched, slot * fields.nodes, fields.nodes)
-        return own
+        part = fields
+        part.share = part_of(fields.share, slot * fields.nodes, fields.nodes)
+        part.touched = part_of(fields.touched, slot * fields.nodes, fields.nodes)
+        return part
+
+    @wp.func
+    def fields_of_window(fields: struct.Fields, first: wp.int32):
+        """The fields of a window that begins at node `first` of its slot: those of the slot."""
+        return fields
 
     @wp.func
     def open_window(
-        plate: Plate, thickness: real, fields: Fields, layer: wp.int32, hit_y: wp.float64, hit_z: wp.float64
+        plate: struct.Plate,
+        thickness: real,
+        fields: struct.Fields,
+        layer: wp.int32,
+        hit_y: wp.float64,
+        hit_z: wp.float64,
     ):
         """The window of a layer about a hit: nodes at the centres of the tile's cells, each with its share of the
         resistance; nothing touched."""
@@ -79,17 +75,24 @@ def build(variant: Variant) -> SimpleNamespace:
         return window
 
     @wp.func
-    def node_under(window: Window, point: vec3):
+    def node_under(window: struct.Window, point: vec3):
         """Index of the nearest node."""
         row = wp.int32(wp.floor((point[1] - window.y0) * window.per_row + half))
         column = wp.int32(wp.floor((point[2] - window.z0) * window.per_column + half))
         return window.home + row * window.cells_z + column
 
     @wp.func
-    def total_load(surface: Surface, law: Law, fields: Fields, window: Window, found: Footprint, pose: Pose):
+    def total_load(
+        surface: struct.Surface,
+        law: struct.Law,
+        fields: struct.Fields,
+        window: struct.Window,
+        footprint: struct.Footprint,
+        pose: struct.Pose,
+    ):
         """Σ Y (−n + η t) dS over the points in the slab, t the meridian tangent towards the base."""
-        load = Load()
-        for index in range(found.first_ring, found.last_ring + 1):
+        load = struct.Load()
+        for index in range(footprint.first_ring, footprint.last_ring + 1):
             ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 outward = outward_of(surface, pose, j)
@@ -112,9 +115,16 @@ def build(variant: Variant) -> SimpleNamespace:
         return load
 
     @wp.func
-    def degrade(surface: Surface, fields: Fields, window: Window, found: Footprint, pose: Pose, factor: real):
+    def degrade(
+        surface: struct.Surface,
+        fields: struct.Fields,
+        window: struct.Window,
+        footprint: struct.Footprint,
+        pose: struct.Pose,
+        factor: real,
+    ):
         """Multiply every node that was touched in this step by β, once even if several points touched it (eq. 6)."""
-        for index in range(found.first_ring, found.last_ring + 1):
+        for index in range(footprint.first_ring, footprint.last_ring + 1):
             ring = use.core_surface.ring_at(surface, pose, index)
             for j in range(surface.around):
                 arm = ring.station * pose.axis + ring.radius * outward_of(surface, pose, j)
@@ -127,21 +137,21 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def load_on(
-        surface: Surface,
-        plate: Plate,
-        law: Law,
-        fields: Fields,
-        window: Window,
-        touches: Touches,
+        surface: struct.Surface,
+        plate: struct.Plate,
+        law: struct.Law,
+        fields: struct.Fields,
+        window: struct.Window,
+        touches: struct.Touches,
         slot: wp.int32,
-        found: Footprint,
-        pose: Pose,
+        footprint: struct.Footprint,
+        pose: struct.Pose,
         dt: real,
     ):
-        """The load over one step; touched nodes weaken."""
-        load = total_load(surface, law, fields, window, found, pose)
+        """The load of one step in the literal scheme (kernels/contracts.py); touched nodes weaken."""
+        load = total_load(surface, law, fields, window, footprint, pose)
         if wp.static(variant.degrades):
-            degrade(surface, fields, window, found, pose, law.degradation)
+            degrade(surface, fields, window, footprint, pose, law.degradation)
         return load
 
     return SimpleNamespace(**locals())

@@ -9,115 +9,20 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import lanes
+from . import lanes, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the plate for one variant."""
+    struct = structs.build(variant)
     real = variant.real
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    split = lanes.split(variant)
-
-    @wp.struct
-    class Plate:
-        """The pristine plate.
-
-        `tile` holds the material fractions of one period, shape [tile_y × tile_z]; its corner is at the origin. `clear`
-        is a lower bound of each cell's distance from material [m]. `period_y` and `period_z` are the period [m].
-        `half_y` and `half_z` are half the sides of a finite plate [m], infinite if there is no rim. `spacing` is that
-        of the exposure's grid [m]. `taps` is half of the tent filter on this grid, and `reach` is its reach in nodes,
-        at least 1. A
-        window has `planes` of the grid through the thickness, `per_plane` of them per metre, of which a contact weakens
-        those up to `plane_reach` planes away; one plane stands for the whole thickness.
-        """
-
-        tile: wp.array(dtype=real)
-        clear: wp.array(dtype=real)
-        tile_y: wp.int32
-        tile_z: wp.int32
-        period_y: wp.float64
-        period_z: wp.float64
-        half_y: wp.float64
-        half_z: wp.float64
-        spacing: real
-        taps: wp.array(dtype=real)
-        reach: wp.int32
-        planes: wp.int32
-        per_plane: real
-        plane_reach: wp.int32
-
-    @wp.struct
-    class Window:
-        """The part of a slot's fields that a layer has, and its place on the tile.
-
-        `first` is the index of the first node. `home` is that of the node at the hit, which is in row `home_y` and
-        column `home_z`, within the window or not: so a shot computes the same bits in a window of any size and place.
-        `per_cell` is nodes per metre. `row` and `column` are the cell of the tile that holds the hit, `tile_y` and
-        `tile_z` are the hit's place in this cell, `per_row` and `per_column` are cells of the tile per metre.
-        `thickness` is that of the plate; its front face is `behind` [m] the first of `planes` planes of `nodes` nodes
-        each; `low_y`, `high_y`, `low_z` and `high_z` are its rims relative to the hit [m]. (y0, z0) is the place of the
-        node `home` in the literal scheme [m]. `weakens` says whether the fields hold this window. `channel` is the
-        first node of its `channel_planes` planes with the channels of earlier hits (kernels/channel.py), `pierced` says
-        whether there are any.
-        """
-
-        first: wp.int32
-        home: wp.int32
-        home_y: wp.int32
-        home_z: wp.int32
-        cells_y: wp.int32
-        cells_z: wp.int32
-        nodes: wp.int32
-        planes: wp.int32
-        per_cell: real
-        per_plane: real
-        behind: real
-        row: wp.int32
-        column: wp.int32
-        tile_y: real
-        tile_z: real
-        per_row: real
-        per_column: real
-        thickness: real
-        low_y: real
-        high_y: real
-        low_z: real
-        high_z: real
-        y0: real
-        z0: real
-        weakens: wp.bool
-        channel: wp.int32
-        channel_planes: wp.int32
-        per_channel_plane: real
-        pierced: wp.bool
-
-    @wp.struct
-    class Cell:
-        """The four nodes around a point: index, row and column of the first, and the point's place between them, 0 to
-        1."""
-
-        index: wp.int32
-        row: wp.int32
-        column: wp.int32
-        y: real
-        z: real
-
-    @wp.struct
-    class Box:
-        """Rows, columns and planes of nodes, ends included, that a step may touch."""
-
-        y_low: wp.int32
-        y_high: wp.int32
-        z_low: wp.int32
-        z_high: wp.int32
-        plane_low: wp.int32
-        plane_high: wp.int32
 
     @wp.func
     def window_at(
-        plate: Plate,
+        plate: struct.Plate,
         thickness: real,
         first: wp.int32,
         cells_y: wp.int32,
@@ -127,7 +32,7 @@ def build(variant: Variant) -> SimpleNamespace:
     ):
         """The window about a hit, from node `first` of its slot on. It is computed in float64, so a hit far from the
         origin loses no accuracy."""
-        window = Window()
+        window = struct.Window()
         window.first = first
         window.nodes = cells_y * cells_z
         window.planes = plate.planes
@@ -162,7 +67,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.int32(place - real(period) * wp.floor((place + half) / real(period)))
 
     @wp.func
-    def tile_at(plate: Plate, window: Window, y: real, z: real):
+    def tile_at(plate: struct.Plate, window: struct.Window, y: real, z: real):
         """Index of the tile's cell that holds a point."""
         row = real(window.row) + wp.floor(window.tile_y + y * window.per_row)
         column = real(window.column) + wp.floor(window.tile_z + z * window.per_column)
@@ -170,12 +75,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     # Native, because a compiler reads several cells at once only if the pointers do not alias.
     @wp.func_native(
-        split("""
+        lanes.share(variant)
+        + """
     assert(start >= 0 && start + count <= area.shape[0]);
-    const auto scale = [count](auto* __restrict__ area, auto* __restrict__ slope, auto* __restrict__ gain,
+    const auto scale = [=](auto* __restrict__ area, auto* __restrict__ slope, auto* __restrict__ gain,
                                const int* __restrict__ at, const auto* __restrict__ tile, int cells) {
         decltype(0 * area[0]) total = 0;
-        for (int j = 0; j < count; ++j) {
+        for (int j = lane; j < count; j += lanes) {
             assert(at[j] >= 0 && at[j] < cells);
             const auto share = tile[at[j]];
             area[j] *= share;
@@ -186,7 +92,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return total;
     };
     return scale(area.data + start, slope.data + start, gain.data + start, at.data + start, tile.data, tile.shape[0]);
-    """)
+    """
     )
     def meet(
         area: wp.array(dtype=real),
@@ -201,12 +107,12 @@ def build(variant: Variant) -> SimpleNamespace:
         ...
 
     @wp.func
-    def clearance(plate: Plate, window: Window):
+    def clearance(plate: struct.Plate, window: struct.Window):
         """A lower bound of the hit's distance from material [m]."""
         return plate.clear[tile_at(plate, window, zero, zero)]
 
     @wp.func
-    def on_plate(plate: Plate, window: Window, y: real, z: real):
+    def on_plate(plate: struct.Plate, window: struct.Window, y: real, z: real):
         """Share of half a grid cell about a point that belongs to a finite plate."""
         width = half * plate.spacing
         inside_y = wp.min(y - window.low_y, window.high_y - y) / width + half
@@ -214,11 +120,11 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.clamp(inside_y, zero, one) * wp.clamp(inside_z, zero, one)
 
     @wp.func
-    def cell_at(window: Window, y: real, z: real):
+    def cell_at(window: struct.Window, y: real, z: real):
         """The cell of the grid around a point; the caller keeps it inside the window."""
         across, along = y * window.per_cell, z * window.per_cell
         row, column = wp.floor(across), wp.floor(along)
-        cell = Cell()
+        cell = struct.Cell()
         cell.index = window.home + wp.int32(row) * window.cells_z + wp.int32(column)
         cell.row = wp.int32(row) + window.home_y
         cell.column = wp.int32(column) + window.home_z
@@ -227,7 +133,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return cell
 
     @wp.func
-    def planes_at(window: Window, x: real):
+    def planes_at(window: struct.Window, x: real):
         """Where a depth behind the front face lies among the planes, in planes; a point outside counts at the face."""
         return (wp.clamp(x, zero, window.thickness) + window.behind) * window.per_plane
 

@@ -10,63 +10,29 @@ from types import SimpleNamespace
 
 import warp as wp
 
+from . import constants, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the motion for one variant."""
+    struct = structs.build(variant)
     real, vec3, mat33, quat = variant.real, variant.vec3, variant.mat33, variant.quat
     zero, half, one = real(0.0), real(0.5), real(1.0)
-    iterations = wp.constant(64)
+    iterations = wp.constant(constants.ITERATIONS.value)
     quarter, six, twelve, twenty, thirty, forty_two = (real(value) for value in (0.25, 6.0, 12.0, 20.0, 30.0, 42.0))
     gamma, two_gamma = real(1.0 - math.sqrt(0.5)), real(2.0 - math.sqrt(2.0))
-    small_square = real(0.02**2)  # of half an angle [rad²]
-    faint = real(1.0e-8)  # square of a share of the change along the axis
+    small_square = real(constants.SMALL_ANGLE.value**2)
+    faint = real(constants.FAINT.value)
     least_normal = real(
         math.ldexp(1.0, -1022 if variant.double else -126)
     )  # the inverse of a smaller number is infinite
 
-    @wp.struct
-    class Body:
-        """Mass [kg] and principal moments of inertia [kg m²] of a core."""
-
-        mass: real
-        inertia_axial: real
-        inertia_transverse: real
-
-    @wp.struct
-    class State:
-        """Plate frame, origin at the hit point on the front face; SI."""
-
-        position: vec3
-        attitude: quat
-        velocity: vec3
-        angular_momentum: vec3
-
-    @wp.struct
-    class Load:
-        """Force [N], moment about the centre of mass [N m], and their resistance to a change of velocity; along the
-        body axes.
-
-        The damping blocks are −½ ∂(force, moment)/∂(velocity, angular velocity). `damped` means that at least one of
-        them is not zero, `touching` that at least one patch touches material.
-        """
-
-        force: vec3
-        moment: vec3
-        damping_vv: mat33
-        damping_vw: mat33
-        damping_ww: mat33
-        damped: wp.bool
-        touching: wp.bool
-
-    @wp.struct
-    class Change:
-        """Change of velocity [m/s] and angular velocity [rad/s] in a step, along the body axes."""
-
-        velocity: vec3
-        omega: vec3
+    @wp.func
+    def angle_between(a: vec3, b: vec3):
+        """Angle between two vectors [rad]."""
+        return wp.atan2(wp.length(wp.cross(a, b)), wp.dot(a, b))
 
     @wp.func
     def axis_of(attitude: quat):
@@ -74,19 +40,19 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.quat_rotate(attitude, vec3(one, zero, zero))
 
     @wp.func
-    def angular_velocity(body: Body, axis: vec3, angular_momentum: vec3):
+    def angular_velocity(body: struct.Body, axis: vec3, angular_momentum: vec3):
         """ω = I⁻¹ L in the plate frame, I = I_t 1 + (I_a − I_t) a aᵀ."""
         along = wp.dot(angular_momentum, axis) * axis
         return along / body.inertia_axial + (angular_momentum - along) / body.inertia_transverse
 
     @wp.func
-    def angular_momentum(body: Body, axis: vec3, omega: vec3):
+    def angular_momentum(body: struct.Body, axis: vec3, omega: vec3):
         """L = I ω in the plate frame."""
         along = wp.dot(omega, axis) * axis
         return body.inertia_axial * along + body.inertia_transverse * (omega - along)
 
     @wp.func
-    def kinetic_energy(body: Body, axis: vec3, velocity: vec3, momentum: vec3):
+    def kinetic_energy(body: struct.Body, axis: vec3, velocity: vec3, momentum: vec3):
         """Translation and rotation [J]."""
         omega = angular_velocity(body, axis, momentum)
         return half * (body.mass * wp.dot(velocity, velocity) + wp.dot(momentum, omega))
@@ -106,17 +72,17 @@ def build(variant: Variant) -> SimpleNamespace:
         return quat(scale * vector[0], scale * vector[1], scale * vector[2], cosine)
 
     @wp.func
-    def own_rate(body: Body, axis: vec3, momentum: vec3):
+    def roll_rate_of(body: struct.Body, axis: vec3, momentum: vec3):
         """Rate about the axis within the precession: (L·a)(1/I_a − 1/I_t) [rad/s]."""
         return wp.dot(momentum, axis) * (one / body.inertia_axial - one / body.inertia_transverse)
 
     @wp.func
-    def turned(body: Body, axis: vec3, momentum: vec3, time: real):
+    def turned(body: struct.Body, axis: vec3, momentum: vec3, time: real):
         """The axis after torque-free motion over a time: it precesses about L at |L|/I_t."""
         return wp.quat_rotate(rotation((time / body.inertia_transverse) * momentum), axis)
 
     @wp.func
-    def axis_at(body: Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real):
+    def axis_at(body: struct.Body, axis: vec3, momentum: vec3, ahead: real, velocity: real, distance: real):
         """The axis at the moment when the point `ahead` of the centre of mass has moved by `distance` along x.
 
         The swing of the point changes the time of flight, which a fixed-point iteration finds. It converges while the
@@ -131,13 +97,13 @@ def build(variant: Variant) -> SimpleNamespace:
         return then
 
     @wp.func
-    def drift(body: Body, state: State, dt: real):
+    def drift(body: struct.Body, state: struct.State, dt: real):
         """Torque-free motion over dt, exact for any dt (the symmetric top)."""
         momentum = state.angular_momentum
-        own = own_rate(body, axis_of(state.attitude), momentum)
+        roll_rate = roll_rate_of(body, axis_of(state.attitude), momentum)
         precession = rotation((dt / body.inertia_transverse) * momentum)
-        roll = rotation(vec3(dt * own, zero, zero))
-        moved = State()
+        roll = rotation(vec3(dt * roll_rate, zero, zero))
+        moved = struct.State()
         moved.position = state.position + dt * state.velocity
         moved.attitude = wp.normalize(precession * state.attitude * roll)
         moved.velocity = state.velocity
@@ -145,7 +111,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return moved
 
     @wp.func
-    def velocity_change(body: Body, load: Load, dt: real):
+    def velocity_change(body: struct.Body, load: struct.Load, dt: real):
         """Change Δu = (Δv, Δω) of the velocities, along the body axes, that a load makes over dt; and the change e
         whose damping the load feels on average: M Δu = dt (F − D e).
 
@@ -181,7 +147,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return dv, dw, felt_v, felt_w
 
     @wp.func
-    def restraint(body: Body, axis: vec3, state: State, dv: vec3, dw: vec3):
+    def restraint(body: struct.Body, axis: vec3, state: struct.State, dv: vec3, dw: vec3):
         """Share of a change of velocities, in the plate frame, that can be applied without a rise of the kinetic
         energy.
 
@@ -198,19 +164,19 @@ def build(variant: Variant) -> SimpleNamespace:
         return share
 
     @wp.func
-    def restraint_of(body: Body, state: State, dv: vec3, dw: vec3):
+    def restraint_of(body: struct.Body, state: struct.State, dv: vec3, dw: vec3):
         """The restraint for a change of velocities along the body axes."""
         dv_plate, dw_plate = wp.quat_rotate(state.attitude, dv), wp.quat_rotate(state.attitude, dw)
         return restraint(body, axis_of(state.attitude), state, dv_plate, dw_plate)
 
     @wp.func
-    def kick(body: Body, state: State, load: Load, dt: real):
+    def kick(body: struct.Body, state: struct.State, load: struct.Load, dt: real):
         """Change the velocities by the load over dt."""
         axis = axis_of(state.attitude)
         dv_body, dw_body, _, _ = velocity_change(body, load, dt)
         dv, dw = wp.quat_rotate(state.attitude, dv_body), wp.quat_rotate(state.attitude, dw_body)
         share = restraint(body, axis, state, dv, dw)
-        kicked = State()
+        kicked = struct.State()
         kicked.position = state.position
         kicked.attitude = state.attitude
         kicked.velocity = state.velocity + share * dv
@@ -218,24 +184,24 @@ def build(variant: Variant) -> SimpleNamespace:
         return kicked
 
     @wp.func
-    def change_between(body: Body, before: State, after: State):
+    def change_between(body: struct.Body, before: struct.State, after: struct.State):
         """The change of the velocities by a kick."""
         momentum = after.angular_momentum - before.angular_momentum
-        change = Change()
+        change = struct.Change()
         change.velocity = wp.quat_rotate_inv(before.attitude, after.velocity - before.velocity)
         change.omega = wp.quat_rotate_inv(before.attitude, angular_velocity(body, axis_of(before.attitude), momentum))
         return change
 
     @wp.func
-    def in_step(change: Change, share: real):
+    def in_step(change: struct.Change, share: real):
         """The change in a step that is longer than another by some factor, if the load stays as it was."""
-        foreseen = Change()
+        foreseen = struct.Change()
         foreseen.velocity = share * change.velocity
         foreseen.omega = share * change.omega
         return foreseen
 
     @wp.func
-    def swings(body: Body, before: Change, last: Change):
+    def swings(body: struct.Body, before: struct.Change, last: struct.Change):
         """Whether a step has turned back the change across the axis that the one before it made, by more than rounding
         can: in a straight shot nothing else acts across the axis."""
         pushed = before.velocity[1] * last.velocity[1] + before.velocity[2] * last.velocity[2]
@@ -244,7 +210,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return body.mass * (pushed + rounding) + body.inertia_transverse * turned < zero
 
     @wp.func
-    def mean_load(body: Body, state: State, load: Load, dt: real):
+    def mean_load(body: struct.Body, state: struct.State, load: struct.Load, dt: real):
         """The mean force and moment of a kick over its step, in the plate frame."""
         dv, dw, _, _ = velocity_change(body, load, dt)
         share = restraint_of(body, state, dv, dw)

@@ -1,7 +1,4 @@
-"""The conditions of every shot.
-
-Every array has one value for all shots or one value per shot. The same line reads both.
-"""
+"""The conditions of every shot, its start, and its line of flight."""
 
 from functools import cache
 from types import SimpleNamespace
@@ -9,63 +6,34 @@ from typing import Any
 
 import warp as wp
 
-from . import core_surface, rigid_body
+from . import core_surface, rigid_body, structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the shots for one variant."""
+    struct = structs.build(variant)
     real, vec3, quat = variant.real, variant.vec3, variant.quat
     use = variant.use(core_surface, rigid_body)
-    Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
-    Body, State = use.rigid_body.Body, use.rigid_body.State
-
-    @wp.struct
-    class Shots:
-        """Arrays of shape [1] or [shots], SI and radians.
-
-        Hit point, velocity and attitude on impact (docs/model.md §1); the members of Body, the strength of the core
-        [Pa], `onset_share` of Law, the time step [s] where it is shortest, and the distance [m] at impact velocity
-        after which a shot that has not ended is given up. `plates` is the number of the target's plates, and `surface`
-        that of the core's surface, where these come from tables.
-        """
-
-        hit_y: wp.array(dtype=wp.float64)
-        hit_z: wp.array(dtype=wp.float64)
-        velocity: wp.array(dtype=wp.float64)
-        obliquity: wp.array(dtype=wp.float64)
-        azimuth: wp.array(dtype=wp.float64)
-        pitch: wp.array(dtype=wp.float64)
-        yaw: wp.array(dtype=wp.float64)
-        spin: wp.array(dtype=wp.float64)
-        mass: wp.array(dtype=real)
-        inertia_axial: wp.array(dtype=real)
-        inertia_transverse: wp.array(dtype=real)
-        strength: wp.array(dtype=real)
-        onset_share: wp.array(dtype=real)
-        plates: wp.array(dtype=wp.int32)
-        surface: wp.array(dtype=wp.int32)
-        time_step: wp.array(dtype=wp.float64)
-        longest_way: wp.array(dtype=wp.float64)
 
     @wp.func
-    def own(values: wp.array(dtype=Any), shot: wp.int32):
-        """The value of one shot."""
+    def shot_value(values: wp.array(dtype=Any), shot: wp.int32):
+        """The value of one shot, or the one value of all shots."""
         return values[wp.min(shot, values.shape[0] - 1)]
 
     @wp.func
-    def body_of(shots: Shots, shot: wp.int32):
-        body = Body()
-        body.mass = own(shots.mass, shot)
-        body.inertia_axial = own(shots.inertia_axial, shot)
-        body.inertia_transverse = own(shots.inertia_transverse, shot)
+    def body_of(shots: struct.Shots, shot: wp.int32):
+        body = struct.Body()
+        body.mass = shot_value(shots.mass, shot)
+        body.inertia_axial = shot_value(shots.inertia_axial, shot)
+        body.inertia_transverse = shot_value(shots.inertia_transverse, shot)
         return body
 
     @wp.func
-    def line_of_flight(shots: Shots, shot: wp.int32):
+    def line_of_flight(shots: struct.Shots, shot: wp.int32):
         """Unit vector along the line of fire."""
-        obliquity, azimuth = own(shots.obliquity, shot), own(shots.azimuth, shot)
+        obliquity, azimuth = shot_value(shots.obliquity, shot), shot_value(shots.azimuth, shot)
         sine = wp.sin(obliquity)
         return wp.vec3d(wp.cos(obliquity), sine * wp.cos(azimuth), sine * wp.sin(azimuth))
 
@@ -75,7 +43,7 @@ def build(variant: Variant) -> SimpleNamespace:
         return wp.normalize(wp.quatd(wp.float64(0.0), -axis[2], axis[1], wp.float64(1.0) + axis[0]))
 
     @wp.func
-    def foremost(surface: Surface, pose: Pose):
+    def foremost(surface: struct.Surface, pose: struct.Pose):
         """How far the core reaches ahead of its centre of mass along x [m]."""
         front = -surface.bounding_radius
         for index in range(surface.rings):
@@ -86,18 +54,18 @@ def build(variant: Variant) -> SimpleNamespace:
         return front
 
     @wp.func
-    def launch_state(surface: Surface, body: Body, shots: Shots, shot: wp.int32):
+    def launch_state(surface: struct.Surface, body: struct.Body, shots: struct.Shots, shot: wp.int32):
         """State with the foremost point at the front face, the centre of mass on the line through the hit."""
         flight = line_of_flight(shots, shot)
-        yaw = wp.atan2(flight[1], flight[0]) + own(shots.yaw, shot)
-        pitch = wp.atan2(flight[2], flight[0]) + own(shots.pitch, shot)
+        yaw = wp.atan2(flight[1], flight[0]) + shot_value(shots.yaw, shot)
+        pitch = wp.atan2(flight[2], flight[0]) + shot_value(shots.pitch, shot)
         axis = wp.normalize(wp.vec3d(wp.float64(1.0), wp.tan(yaw), wp.tan(pitch)))
         turn = attitude_of(axis)
         direction = vec3(real(flight[0]), real(flight[1]), real(flight[2]))
-        state = State()
+        state = struct.State()
         state.attitude = quat(real(turn[0]), real(turn[1]), real(turn[2]), real(turn[3]))
-        state.velocity = real(own(shots.velocity, shot)) * direction
-        state.angular_momentum = (body.inertia_axial * real(own(shots.spin, shot))) * use.rigid_body.axis_of(
+        state.velocity = real(shot_value(shots.velocity, shot)) * direction
+        state.angular_momentum = (body.inertia_axial * real(shot_value(shots.spin, shot))) * use.rigid_body.axis_of(
             state.attitude
         )
         pose = use.core_surface.pose_of(surface, vec3(), state.attitude, state.velocity, vec3())

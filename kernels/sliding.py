@@ -5,20 +5,19 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import plate_grid
+from . import structs
 from .variant import Variant
 
 
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of windows that slide for one variant."""
-    use = variant.use(plate_grid)
-    Window, Box = use.plate_grid.Window, use.plate_grid.Box
+    struct = structs.build(variant)
 
     @wp.func
-    def extent_of(window: Window):
+    def extent_of(window: struct.Window):
         """The nodes of a window, from its home."""
-        extent = Box()
+        extent = struct.Box()
         extent.y_low = -window.home_y
         extent.z_low = -window.home_z
         extent.y_high = extent.y_low + window.cells_y - 1
@@ -26,36 +25,36 @@ def build(variant: Variant) -> SimpleNamespace:
         return extent
 
     @wp.func
-    def around(one: Box, other: Box):
+    def around(a: struct.Box, b: struct.Box):
         """The nodes about those of two boxes."""
-        found = one
-        found.y_low = wp.min(one.y_low, other.y_low)
-        found.z_low = wp.min(one.z_low, other.z_low)
-        found.y_high = wp.max(one.y_high, other.y_high)
-        found.z_high = wp.max(one.z_high, other.z_high)
-        return found
+        both = a
+        both.y_low = wp.min(a.y_low, b.y_low)
+        both.z_low = wp.min(a.z_low, b.z_low)
+        both.y_high = wp.max(a.y_high, b.y_high)
+        both.z_high = wp.max(a.z_high, b.z_high)
+        return both
 
     @wp.func
-    def moved(box: Box, rows: wp.int32, columns: wp.int32):
+    def moved(box: struct.Box, rows: wp.int32, columns: wp.int32):
         """The nodes of a box as a window has them that has slid by some rows and columns."""
-        found = box
-        found.y_low -= rows
-        found.y_high -= rows
-        found.z_low -= columns
-        found.z_high -= columns
-        return found
+        seen = box
+        seen.y_low -= rows
+        seen.y_high -= rows
+        seen.z_low -= columns
+        seen.z_high -= columns
+        return seen
 
     @wp.func
-    def slid(window: Window, rows: wp.int32, columns: wp.int32):
+    def slid(window: struct.Window, rows: wp.int32, columns: wp.int32):
         """A window that has slid over its plate by some rows and columns."""
-        found = window
-        found.home -= rows * window.cells_z + columns
-        found.home_y -= rows
-        found.home_z -= columns
-        return found
+        moved_window = window
+        moved_window.home -= rows * window.cells_z + columns
+        moved_window.home_y -= rows
+        moved_window.home_z -= columns
+        return moved_window
 
     @wp.func
-    def is_ahead(before: Box, after: Box, known: Box):
+    def is_ahead(before: struct.Box, after: struct.Box, known: struct.Box):
         """Whether a window that slides from one place to another takes in none of the nodes that it has left earlier,
         of all that are `known`."""
         return (

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import warp as wp
 
-from . import rigid_body
+from . import structs
 from .variant import Variant
 
 COLUMNS = {
@@ -27,8 +27,8 @@ WIDTH = COLUMNS["step"].stop
 @cache
 def build(variant: Variant) -> SimpleNamespace:
     """Device functions of the trace for one variant."""
+    struct = structs.build(variant)
     real, vec3 = variant.real, variant.vec3
-    State = rigid_body.build(variant).State
     time_at, position_at, attitude_at, velocity_at, momentum_at, force_at, moment_at, step_at = (
         wp.constant(columns.start) for columns in COLUMNS.values()
     )
@@ -40,7 +40,13 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def record(
-        trace: wp.array2d(dtype=real), row: wp.int32, time: real, dt: real, state: State, force: vec3, moment: vec3
+        trace: wp.array2d(dtype=real),
+        row: wp.int32,
+        time: real,
+        dt: real,
+        state: struct.State,
+        force: vec3,
+        moment: vec3,
     ):
         """Write the row of one step: the state after its kick, and the load of the kick."""
         trace[row, time_at] = time

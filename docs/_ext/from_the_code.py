@@ -370,6 +370,20 @@ class KernelReference(FromTheCode):
         yield from [f"  `{node.name}({signature})`", ""]
 
 
+class ConstantReference(FromTheCode):
+    """The table of the constants of the device code."""
+
+    def lines(self) -> Iterator[str]:
+        from warpimpact.kernels import constants
+
+        yield from ["| constant | value | unit | reason | § | test |", "|---|---|---|---|---|---|"]
+        for name, row in vars(constants).items():
+            if isinstance(row, constants.Constant):
+                test = f"`{row.test}`" if row.test else ""
+                yield f"| `{name}` | {row.value:.6g} | {row.unit} | {row.reason} | {row.section} | {test} |"
+        yield ""
+
+
 def device_mark(node: ast.FunctionDef | ast.ClassDef) -> str | None:
     """Which decorator of Warp a definition has: func, func_native, struct or kernel."""
     for one in node.decorator_list:
@@ -389,6 +403,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         "variable-reference": VariableReference,
         "status-reference": StatusReference,
         "public-reference": PublicReference,
+        "constant-reference": ConstantReference,
         "kernel-reference": KernelReference,
     }.items():
         app.add_directive(name, directive)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.kernels import bending, contact, core_surface, footprint, rigid_body
+from warpimpact.kernels import bending, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ProfileCore
 from warpimpact.solver.rings import rings_of, sections_of
@@ -14,14 +14,14 @@ from warpimpact.solver.rings import rings_of, sections_of
 from .probes import poisoned_touches, surface_of
 
 VARIANT = Variant(double=True, bends=True)
-use = VARIANT.use(bending, contact, core_surface, footprint, rigid_body)
+use, struct = VARIANT.use(bending), structs.build(VARIANT)
 LENGTH, RADIUS, MASS, RINGS = 0.1, 0.1e-3, 4e-3, 201
 FORCE = 1000.0
 ROD = ProfileCore(s=(0.0, LENGTH), r=(RADIUS, RADIUS), mass=MASS)
-Body, Load, State, Change = use.rigid_body.Body, use.rigid_body.Load, use.rigid_body.State, use.rigid_body.Change
-Surface, Pose = use.core_surface.Surface, use.core_surface.Pose
-Footprint, Touches = use.footprint.Footprint, use.contact.Touches
-Sections, Bending = use.bending.Sections, use.bending.Bending
+Body, Load, State, Change = struct.Body, struct.Load, struct.State, struct.Change
+Surface, Pose = struct.Surface, struct.Pose
+Footprint, Touches = struct.Footprint, struct.Touches
+Sections, Bending = struct.Sections, struct.Bending
 bent = use.bending.bent
 
 
@@ -54,13 +54,14 @@ def bend(
     footprint = Footprint()
     footprint.first_ring = struck
     footprint.last_ring = struck
+    context = struct.Context()
+    context.surface = surface
+    context.body = body
+    context.touches = touches
     found[0] = bent(
         Bending(),
-        surface,
+        context,
         sections,
-        body,
-        touches,
-        0,
         footprint,
         pose,
         state,

@@ -13,17 +13,8 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels import (
-    block,
-    contact,
-    core_surface,
-    exposure,
-    footprint,
-    interaction,
-    lanes,
-    plate_grid,
-    rigid_body,
-)
+from warpimpact.kernels import block, contact, core_surface, footprint, lanes
+from warpimpact.kernels import structs as device_structs
 from warpimpact.kernels.status import Status
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import (
@@ -228,16 +219,16 @@ LAID = {"simple": Variant(), "block": Variant(window=CELLS**2)}
 def probe_of(variant: Variant) -> Any:
     """A kernel that computes one step of every pose on its own plate, and what it needs."""
     real, vec3, quat = variant.real, variant.vec3, variant.quat
-    use = variant.use(core_surface, exposure, footprint, interaction, plate_grid, rigid_body)
+    use, struct = variant.use(core_surface, footprint), device_structs.build(variant)
     scheme = (block if variant.window else contact).build(variant)
     Surface, Plate_, Fields, Law, Load = (
-        use.core_surface.Surface,
-        use.plate_grid.Plate,
-        use.exposure.Fields,
-        use.interaction.Law,
-        use.rigid_body.Load,
+        struct.Surface,
+        struct.Plate,
+        struct.Fields,
+        struct.Law,
+        struct.Load,
     )
-    Touches = scheme.Touches
+    Touches = struct.Touches
 
     def steps(
         surface: Surface,
@@ -255,7 +246,7 @@ def probe_of(variant: Variant) -> Any:
     ) -> None:
         """Two steps at the same pose: the second one finds the exposure of the first."""
         i = wp.tid()
-        fields = scheme.own_fields(fields, i)
+        fields = scheme.fields_of_slot(fields, i)
         window = scheme.open_window(plate, thickness, fields, 0, wp.float64(0.0), wp.float64(0.0))
         pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
         found = use.footprint.footprint_of(surface, plate, window, pose, dt)

@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels import contact, core_surface, exposure, footprint, interaction, plate_grid, rigid_body
+from warpimpact.kernels import contact, core_surface, footprint, plate_grid, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore, OgiveCore, ProfileCore
 
@@ -19,15 +19,15 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-use = VARIANT.use(contact, core_surface, exposure, footprint, interaction, plate_grid, rigid_body)
+use, struct = VARIANT.use(contact, core_surface, footprint, plate_grid), structs.build(VARIANT)
 Surface, Plate, Fields, Law, Load = (
-    use.core_surface.Surface,
-    use.plate_grid.Plate,
-    use.exposure.Fields,
-    use.interaction.Law,
-    use.rigid_body.Load,
+    struct.Surface,
+    struct.Plate,
+    struct.Fields,
+    struct.Law,
+    struct.Load,
 )
-Touches = use.contact.Touches
+Touches = struct.Touches
 
 CELL = 0.25e-3
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
@@ -57,7 +57,7 @@ def loads(
     small."""
     i = wp.tid()
     slot = first + i
-    fields = use.contact.own_fields(fields, slot)
+    fields = use.contact.fields_of_slot(fields, slot)
     window = use.contact.open_window(plate, thickness, fields, 0, wp.float64(0.0), wp.float64(0.0))
     pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity[i], omega[i])
     found = use.footprint.footprint_of(surface, plate, window, pose, dt)

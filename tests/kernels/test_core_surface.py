@@ -8,7 +8,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels import core_surface
+from warpimpact.kernels import core_surface, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore, Core, OgiveCore, PolynomialCore
 
@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-use = VARIANT.use(core_surface)
-Surface = use.core_surface.Surface
+use, struct = VARIANT.use(core_surface), structs.build(VARIANT)
+Surface = struct.Surface
 
 PAPER = PolynomialCore(coefficients=(3.0e-4, 0.24, -5.29), length=27.86e-3, density=7850.0)
 OGIVE = OgiveCore(diameter=6.17e-3, crh=3.0, length=27.0e-3, mass=5.25e-3)
@@ -45,9 +45,9 @@ def share(
 ) -> None:
     """Share beyond the front face of patches that stand across it and move by ±motion in a step of 2 s."""
     i = wp.tid()
-    pose = use.core_surface.Pose()
+    pose = struct.Pose()
     pose.axis = vec3(real(1.0), real(0.0), real(0.0))
-    ring, patch = use.core_surface.Ring(), use.core_surface.Patch()
+    ring, patch = struct.Ring(), struct.Patch()
     ring.area = real(1.0)
     ring.half_axial = extent[i]
     patch.x = depth[i]

@@ -5,15 +5,14 @@ import pytest
 import warp as wp
 from scipy.ndimage import map_coordinates
 
-from warpimpact.kernels import channel, earlier, exposure, plate_grid
+from warpimpact.kernels import channel, earlier, exposure, structs
 from warpimpact.kernels.variant import Variant
 
 from .probes import plate_of, poisoned, poisoned_fields
 
 VARIANT = Variant(double=True, burst=True)
-use = VARIANT.use(channel, earlier, exposure, plate_grid)
-Channels = use.channel.Channels
-Earlier, Plate, Fields, Window = use.earlier.Earlier, use.plate_grid.Plate, use.exposure.Fields, use.plate_grid.Window
+use, struct = VARIANT.use(channel, earlier, exposure), structs.build(VARIANT)
+Earlier, Plate, Fields, Window = struct.Earlier, struct.Plate, struct.Fields, struct.Window
 
 CELL, CELLS_Y, CELLS_Z = 0.25e-3, 20, 26
 SLOTS, COUNT, SLOT = 2, 3, 1
@@ -30,12 +29,12 @@ def hit(
     added: wp.array(dtype=wp.float64),
     found: wp.array(dtype=wp.float64),
 ) -> None:
-    fields = use.exposure.own_fields(fields, SLOT)
+    fields = use.exposure.fields_of_slot(fields, SLOT)
     window = use.exposure.open_window(plate, wp.float64(4.0e-3), fields, 0, y[shot], z[shot])
     window.weakens = True
-    window = use.channel.open_window(window, earlier.channels, wp.float64(4.0e-3), 0)
+    window = use.channel.open_window(earlier, window, wp.float64(4.0e-3), 0)
     use.earlier.begin(earlier, SLOT, shot)
-    use.earlier.recall(earlier, fields, plate, window, SLOT, 0, shot, y[shot], z[shot])
+    use.earlier.recall(earlier, fields, plate, window, SLOT, shot, 0, y[shot], z[shot])
     for k in range(NODES):
         found[k] = fields.exposure[window.first + k]
         fields.exposure[window.first + k] = found[k] + added[shot * NODES + k]
@@ -46,26 +45,19 @@ kernel = VARIANT.kernel(hit)
 
 
 def scratch(device: str) -> Earlier:
-    """Scratch of earlier hits, all poisoned."""
+    """Scratch of earlier hits, with channels on the two faces of a layer, all poisoned."""
     earlier = Earlier()
     earlier.count, earlier.nodes, earlier.layers = COUNT, NODES, 1
     earlier.exposure = poisoned(SLOTS * COUNT * NODES, wp.float64, device)
     earlier.y, earlier.z = (poisoned(SLOTS * COUNT, wp.float64, device) for _ in range(2))
-    earlier.open = poisoned(SLOTS * COUNT, wp.bool, device)
-    earlier.channels = channels(device)
+    earlier.channel_nodes, earlier.planes = 2 * NODES, 2
+    earlier.inside = poisoned(SLOTS * COUNT * earlier.channel_nodes, wp.float64, device)
+    earlier.sections = poisoned(SLOTS * earlier.planes, struct.Section, device)
+    for name, kind in (("open", wp.bool), ("box", struct.Box), ("through", wp.bool)):
+        setattr(earlier, name, poisoned(SLOTS * COUNT, kind, device))
+    earlier.first, earlier.first_plane = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
+    earlier.apart = wp.array([4.0e-3], dtype=wp.float64, device=device)
     return earlier
-
-
-def channels(device: str) -> Channels:
-    """Scratch of channels on the two faces of a layer, all poisoned."""
-    channels = Channels()
-    channels.count, channels.nodes, channels.planes = COUNT, 2 * NODES, 2
-    channels.inside = poisoned(SLOTS * COUNT * channels.nodes, wp.float64, device)
-    channels.sections = poisoned(SLOTS * channels.planes, use.channel.Section, device)
-    channels.box, channels.through = (poisoned(SLOTS * COUNT, kind, device) for kind in (use.plate_grid.Box, wp.bool))
-    channels.first, channels.first_plane = (wp.zeros(1, dtype=wp.int32, device=device) for _ in range(2))
-    channels.apart = wp.array([4.0e-3], dtype=wp.float64, device=device)
-    return channels
 
 
 def shoot(y: list[float], z: list[float], added: np.ndarray, device: str) -> tuple[list[np.ndarray], np.ndarray]:

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import core_surface, exposure, footprint, plate_grid
+from warpimpact.kernels import core_surface, exposure, footprint, plate_grid, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import ConeCore
 
@@ -17,12 +17,12 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real, vec3, quat = VARIANT.real, VARIANT.vec3, VARIANT.quat
-use = VARIANT.use(core_surface, exposure, footprint, plate_grid)
+use, struct = VARIANT.use(core_surface, exposure, footprint, plate_grid), structs.build(VARIANT)
 Surface, Plate, Fields, Footprint = (
-    use.core_surface.Surface,
-    use.plate_grid.Plate,
-    use.exposure.Fields,
-    use.footprint.Footprint,
+    struct.Surface,
+    struct.Plate,
+    struct.Fields,
+    struct.Footprint,
 )
 
 CELL = 0.25e-3
@@ -46,7 +46,7 @@ def footprints(
 ) -> None:
     """The footprints of poses; for each ring, whether it is immersed; for each patch, its first cell."""
     i = wp.tid()
-    fields = use.exposure.own_fields(fields, i)
+    fields = use.exposure.fields_of_slot(fields, i)
     window = use.exposure.open_window(plate, real(THICKNESS), fields, 0, wp.float64(0.0), wp.float64(0.0))
     pose = use.core_surface.pose_of(surface, position[i], attitude[i], velocity, omega)
     found[i] = use.footprint.footprint_of(surface, plate, window, pose, dt)

@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import core_surface, grip, interaction
+from warpimpact.kernels import core_surface, grip, interaction, structs
 from warpimpact.kernels.variant import Variant
 
 from .probes import poisoned, records
@@ -17,13 +17,13 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
-use = VARIANT.use(core_surface, grip, interaction)
+use, struct = VARIANT.use(core_surface, grip, interaction), structs.build(VARIANT)
 Ring, Patch, Law, Grip, Face = (
-    use.core_surface.Ring,
-    use.core_surface.Patch,
-    use.interaction.Law,
-    use.interaction.Contact,
-    use.grip.Face,
+    struct.Ring,
+    struct.Patch,
+    struct.Law,
+    struct.Contact,
+    struct.Face,
 )
 
 SLIDING = 100.0  # [m/s]
@@ -38,7 +38,7 @@ def grips(
     faces: wp.array(dtype=Face),
 ) -> None:
     i = wp.tid()
-    pose = use.core_surface.Pose()
+    pose = struct.Pose()
     pose.speed = speed
     grips[i] = use.grip.grip_of(law, pose, rings[i], patches[i])
     faces[i] = use.grip.face_of(rings[i], patches[i], grips[i].shift)
@@ -56,7 +56,7 @@ def bounds(
     closes: wp.array(dtype=wp.bool),
 ) -> None:
     i = wp.tid()
-    pose = use.core_surface.Pose()
+    pose = struct.Pose()
     pose.velocity = velocities[i]
     pose.omega = omegas[i]
     share = real(0.0)

@@ -8,7 +8,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 
-from warpimpact.kernels import interaction
+from warpimpact.kernels import interaction, structs
 from warpimpact.kernels.variant import Variant
 
 from .probes import poisoned, unit_vectors
@@ -17,16 +17,16 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True, rate_dependent=True)
 real = VARIANT.real
-use = VARIANT.use(interaction)
-Law, Contact = use.interaction.Law, use.interaction.Contact
+use, struct = VARIANT.use(interaction), structs.build(VARIANT)
+Law, Contact = struct.Law, struct.Contact
 
 FRICTION, ONSET = 0.05, 4.0
 A0, A1, A2 = 2.6e9, 4.5e6, 7850.0
 STATIC, SINGLE = Variant(double=True), Variant()
 static = STATIC.use(interaction)
-StaticLaw = static.interaction.Law
+StaticLaw = structs.build(STATIC).Law
 single = SINGLE.use(interaction)
-SingleLaw = single.interaction.Law
+SingleLaw = structs.build(SINGLE).Law
 
 
 def law(

@@ -10,7 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from warpimpact.kernels import exposure, plate_grid
+from warpimpact.kernels import exposure, plate_grid, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.solver.grid import tent_taps
 
@@ -21,13 +21,8 @@ Array = NDArray[np.float64]
 VARIANT, SINGLE = Variant(double=True), Variant()
 real = VARIANT.real
 use, single = (variant.use(exposure, plate_grid) for variant in (VARIANT, SINGLE))
-Plate, Fields, Window, Cell, Box = (
-    use.plate_grid.Plate,
-    use.exposure.Fields,
-    use.plate_grid.Window,
-    use.plate_grid.Cell,
-    use.plate_grid.Box,
-)
+struct = structs.build(VARIANT)
+Plate, Fields, Window, Cell, Box = struct.Plate, struct.Fields, struct.Window, struct.Cell, struct.Box
 
 CELL = 0.25e-3
 CELLS_Y, CELLS_Z = 24, 30

@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from warpimpact.kernels import rigid_body
+from warpimpact.kernels import rigid_body, structs
 from warpimpact.kernels.variant import Variant
 
 from .probes import attitudes, poisoned, records, unit_vectors
@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 
 VARIANT = Variant(double=True)
 real, vec3 = VARIANT.real, VARIANT.vec3
-use = VARIANT.use(rigid_body)
-Body, State, Load = use.rigid_body.Body, use.rigid_body.State, use.rigid_body.Load
+use, struct = VARIANT.use(rigid_body), structs.build(VARIANT)
+Body, State, Load = struct.Body, struct.State, struct.Load
 
 COUNT = 64
 MASS, AXIAL, TRANSVERSE = 4.0e-3, 1.5e-8, 1.65e-7  # the paper's core, SI
@@ -332,7 +332,7 @@ single = SINGLE.use(rigid_body)
 
 
 def single_energy(
-    body: single.rigid_body.Body,
+    body: structs.build(SINGLE).Body,
     axes: wp.array(dtype=SINGLE.vec3),
     momenta: wp.array(dtype=SINGLE.vec3),
     energies: wp.array(dtype=SINGLE.real),
@@ -350,7 +350,7 @@ def test_energy_of_a_spinning_disc_is_exact_in_single_precision(device: str) -> 
     rng, axial = np.random.default_rng(2), 1.5e-8
     axes = unit_vectors(rng, COUNT).astype(np.float32)
     spin = np.geomspace(1e2, 1e6, COUNT)
-    body = single.rigid_body.Body()
+    body = structs.build(SINGLE).Body()
     body.mass, body.inertia_axial, body.inertia_transverse = MASS, axial, 0.5 * axial
     momenta = (axial * spin[:, None] * axes).astype(np.float32)
     found = poisoned(COUNT, SINGLE.real, device)
@@ -358,3 +358,23 @@ def test_energy_of_a_spinning_disc_is_exact_in_single_precision(device: str) -> 
     wp.launch(SINGLE_ENERGY, COUNT, inputs=inputs, outputs=[found], device=device)
     size = np.linalg.norm(momenta.astype(np.float64), axis=1)  # the axis is rounded, too, and counts as along L
     assert found.numpy() / (0.5 * size**2 / axial) == pytest.approx(1.0, abs=6 * 2.0**-23)
+
+
+def swing(
+    body: Body, before: wp.array(dtype=struct.Change), last: struct.Change, swings: wp.array(dtype=wp.bool)
+) -> None:
+    i = wp.tid()
+    swings[i] = use.rigid_body.swings(body, before[i], last)
+
+
+SWING = VARIANT.kernel(swing)
+
+
+def test_a_core_swings_when_a_step_turns_back_the_last_one(device: str) -> None:
+    # Changes across the axis that are smaller than 1e-4 of those along it are rounding.
+    across = np.array([-1.0, -1.2e-4, -0.8e-4, 0.0, 0.8e-4, 1.0])
+    before = records(struct.Change, device, velocity=np.stack([np.ones(6), across, 0.0 * across], axis=1))
+    last, swings = struct.Change(), poisoned(6, wp.bool, device)
+    last.velocity = vec3(1.0, 1.0e-4, 0.0)
+    wp.launch(SWING, 6, inputs=[paper_body(), before, last], outputs=[swings], device=device)
+    np.testing.assert_array_equal(swings.numpy(), [True, True, False, False, False, False])

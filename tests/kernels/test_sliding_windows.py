@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from warpimpact.kernels import exposure, plate_grid, sliding
+from warpimpact.kernels import exposure, sliding, structs
 from warpimpact.kernels.variant import Variant
 from warpimpact.scene import Hits, Impact, Layer, Numerics, Plate, Scene, Target, make_shots
 from warpimpact.solver import windows
@@ -124,8 +124,8 @@ WINDOW = (0, 9, 0, 9)  # rows, columns
 def test_a_window_returns_to_no_nodes_that_it_has_left(
     after: tuple[int, ...], known: tuple[int, ...], ahead: bool, device: str
 ) -> None:
-    use = Variant().use(plate_grid, sliding)
-    Box, is_ahead = use.plate_grid.Box, use.sliding.is_ahead
+    use, struct = Variant().use(sliding), structs.build(Variant())
+    Box, is_ahead = struct.Box, use.sliding.is_ahead
 
     @wp.kernel(module="unique")
     def look(boxes: wp.array(dtype=Box), found: wp.array(dtype=wp.bool)):

@@ -165,9 +165,9 @@ def test_the_exposure_of_a_burst_is_the_sum_of_what_its_shots_add(offset: float)
     scratch = memory.scratch(1, cells)
     order, outcomes = memory.put(np.arange(2), wp.int32), memory.outcomes()
     memory.launch(order, outcomes, scratch, 1, 0, 2)
-    added = scratch[3].exposure.numpy().reshape(2, *cells)
+    added = scratch.earlier.exposure.numpy().reshape(2, *cells)
     assert (added >= 0.0).all()
-    assert scratch[0].exposure.numpy().sum() == pytest.approx(added.sum(), rel=1e-12)
+    assert scratch.fields.exposure.numpy().sum() == pytest.approx(added.sum(), rel=1e-12)
     assert 0.0 < added[1].sum() < added[0].sum()
 
 

@@ -10,14 +10,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.kernels import constants
+
 if TYPE_CHECKING:
     from warpimpact.solver.prepare import Prepared
 
 PLANES = 1.5
 """Largest distance of the planes of a channel, in √(R × cell), R the largest radius of the core. Between two planes the
 side wall of an oblique channel is off by 0.28 tan² of the angle with the normal, in cells, at most."""
-CLOSED = -1.0
-"""What a window holds where no channel is near [m]."""
 
 
 def planes(prepared: Prepared) -> list[int]:
@@ -55,25 +55,23 @@ def scratch(
         nodes: of the exposure in a slot.
         windows: cells of the windows of all layers.
     """
-    earlier, channels = stage.Earlier(), stage.Channels()
+    earlier = stage.Earlier()
     count, layers = prepared.shots.at_a_plate, len(prepared.grids)
     pierced, through = channel_nodes(prepared, windows), planes(prepared)
-    channels.count, channels.nodes, channels.planes = count, sum(pierced), sum(through)
-    channels.first, channels.first_plane = (put(np.cumsum([0, *own[:-1]]), wp.int32) for own in (pierced, through))
-    channels.apart = put(_apart(prepared), wp.float64)
-    each, kept = slots * count * layers, nodes if prepared.variant.degrades else 0
-    sizes = {"inside": slots * count * sum(pierced), "sections": slots * sum(through), "box": each, "through": each}
-    _empty(channels, stage.Channels, sizes, put.device)
     earlier.count, earlier.nodes, earlier.layers = count, nodes, layers
-    sizes = {"exposure": slots * count * kept, "y": each, "z": each, "open": each}
-    _empty(earlier, stage.Earlier, sizes, put.device)
-    earlier.channels = channels
-    fields.channel_nodes = sum(pierced)
-    fields.channel = wp.full(slots * sum(pierced), CLOSED, dtype=prepared.variant.real, device=put.device)
-    return earlier
-
-
-def _empty(filled: Any, struct: Any, sizes: dict[str, int], device: str) -> None:
-    """Give members of a struct arrays of so many values."""
+    earlier.channel_nodes, earlier.planes = sum(pierced), sum(through)
+    earlier.first, earlier.first_plane = (put(np.cumsum([0, *each[:-1]]), wp.int32) for each in (pierced, through))
+    earlier.apart = put(_apart(prepared), wp.float64)
+    each, kept = slots * count * layers, nodes if prepared.variant.degrades else 0
+    sizes = dict.fromkeys(("y", "z", "open", "box", "through"), each) | {
+        "exposure": slots * count * kept,
+        "inside": slots * count * sum(pierced),
+        "sections": slots * sum(through),
+    }
     for name, size in sizes.items():
-        setattr(filled, name, wp.empty(size, dtype=struct.vars[name].type.dtype, device=device))
+        kind = stage.Earlier.vars[name].type.dtype
+        setattr(earlier, name, wp.empty(size, dtype=kind, device=put.device))
+    fields.channel_nodes = sum(pierced)
+    closed = constants.NO_CHANNEL.value
+    fields.channel = wp.full(slots * sum(pierced), closed, dtype=prepared.variant.real, device=put.device)
+    return earlier

@@ -18,7 +18,7 @@ from warpimpact.records.group import Returned
 from warpimpact.solver import earlier as earlier_hits
 from warpimpact.solver.device import SMALL, free_memory, load
 from warpimpact.solver.prepare import Prepared
-from warpimpact.solver.structs import Put, plate_of, plates_of, surface_of, table_of
+from warpimpact.solver.structs import Put, filled, plate_of, plates_of, surface_of, table_of
 from warpimpact.solver.windows import Cells
 
 if TYPE_CHECKING:
@@ -153,9 +153,7 @@ class Memory:
         everywhere = self.variant.layered or self.variant.deep
         if self.variant.window and self.device.is_cuda and not everywhere:  # the others are in shared memory
             return ["filtered"]
-        members, real = self.stage.Fields.vars.items(), self.variant.real
-        names = [name for name, member in members if getattr(member.type, "dtype", None) is real]
-        return [name for name in names if name != "channel"]
+        return ["share", "touched"] if self.variant.nodal else ["exposure", "gain", "filtered"]
 
     @property
     def _patches(self) -> int:
@@ -207,8 +205,8 @@ class Memory:
         patches = self._patches * (8 * size + 3 * 4)
         return int(len(self.fields) * nodes * size + earlier + patches + self.rings * per_ring)
 
-    def scratch(self, slots: int, cells: Cells) -> tuple[Any, ...]:
-        """Fields, touches, layers and earlier hits of some slots."""
+    def scratch(self, slots: int, cells: Cells) -> Any:
+        """The Scratch of some slots."""
         stage, put, nodes = self.stage, self.put, self.prepared.nodes(cells)
         empty = partial(wp.empty, dtype=self.variant.real, device=self.device)
         fields, touches = stage.Fields(), stage.Touches()
@@ -233,20 +231,32 @@ class Memory:
             earlier = earlier_hits.scratch(self.prepared, stage, put, fields, slots, fields.nodes, windows)
         stack = self.empty(stage.Stack, (slots * len(nodes) if self.variant.layered else 0,), (0, 0))
         if self.variant.layered:
-            stack.own_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
-        return fields, touches, stack, earlier
+            stack.first_cells = put(self.prepared.windows_behind(self.prepared.first_cells), wp.int32)
+        return filled(stage.Scratch, fields=fields, touches=touches, stack=stack, earlier=earlier)
 
-    def launch(self, order: Any, outcomes: Any, scratch: tuple[Any, ...], slots: int, first: int, count: int) -> int:
+    def launch(self, order: Any, outcomes: Any, scratch: Any, slots: int, first: int, count: int) -> int:
         """March `count` shots from order[first] on; returns `count`."""
-        bodies = [self.surfaces[0], self.sections[0], *self.tables]
-        inputs = [*bodies, self.target, self.law, self.shots, self.prepared.rows, *scratch]
+        inputs = filled(
+            self.stage.Inputs,
+            surface=self.surfaces[0],
+            sections=self.sections[0],
+            surfaces=self.tables[0],
+            all_sections=self.tables[1],
+            target=self.target,
+            law=self.law,
+            shots=self.shots,
+            rows=self.prepared.rows,
+        )
+        results = filled(
+            self.stage.Results, outcomes=outcomes, passage=self.passage, bending=self.bending, trace=self.history
+        )
         launch = partial(wp.launch, dim=count, block_dim=lanes.THREADS if self.device.is_cuda else 1)
         if self.variant.window:
             launch = partial(wp.launch_tiled, dim=[count], block_dim=lanes.LANES)
         launch(
             self.stage.kernel,
-            inputs=[first, slots, order, *inputs],
-            outputs=[outcomes, self.passage, self.bending, self.history],
+            inputs=[first, slots, order, inputs, scratch],
+            outputs=[results],
             device=self.device,
         )
         return count
@@ -255,7 +265,7 @@ class Memory:
         """Compute the free flight to the stand-offs; return all that the device knows of the shots."""
         scene, count = self.prepared.scene, len(self.prepared.shots)
         flight, standoffs = self.flight, np.array(scene.record.standoffs, dtype=np.float64)
-        report = self.empty(flight.Report, (count,), (count, len(standoffs)))
+        report = self.empty(self.stage.Report, (count,), (count, len(standoffs)))
         load(flight.kernel, self.device)
         ahead = scene.record.ahead(scene.core)
         inputs = [self.shots, self.target, contact, self.put(standoffs, wp.float64), ahead]

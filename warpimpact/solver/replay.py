@@ -12,11 +12,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpimpact.kernels import constants
 from warpimpact.kernels.trace import WIDTH
 from warpimpact.records.outcomes import Outcomes
 from warpimpact.scene import MassProperties, Numerics, Scene, Shots
 from warpimpact.solver.device import find_device, free_memory
-from warpimpact.solver.earlier import CLOSED, channel_nodes, planes_of
+from warpimpact.solver.earlier import channel_nodes, planes_of
 from warpimpact.solver.grid import WHOLE
 from warpimpact.solver.history import History
 from warpimpact.solver.marching import March, apart
@@ -112,9 +113,9 @@ def replay(scene: Scene, shots: Shots, *, numerics: Numerics, snapshots: int = 6
     home, spacing = _hit(memory.prepared), memory.prepared.grid.spacing
     cell_y, cell_z = nodes_about(home, march.cells, spacing)
     material = material_about(scene.target.layers[0], cell_y, cell_z, spacing) if len(steps) else np.empty((0, 0))
-    scratch = memory.scratch(1, march.cells) if len(steps) else ()
+    scratch = memory.scratch(1, march.cells) if len(steps) else None
     if scratch and memory.variant.layered and memory.variant.degrades:  # the window of a layer opens with a step
-        scratch[0].exposure.zero_()
+        scratch.fields.exposure.zero_()
     history = History.from_trace(trace, _body(memory.prepared))
     left = [_left_after(memory, march.cells, scratch, count, time_step, material) for count in steps]
     return Replay(
@@ -191,7 +192,7 @@ def _body(prepared: Prepared) -> MassProperties:
 
 
 def _left_after(
-    memory: Memory, cells: Cells, scratch: tuple[Any, ...], steps: int, time_step: float, material: Array
+    memory: Memory, cells: Cells, scratch: Any, steps: int, time_step: float, material: Array
 ) -> tuple[Array, dict[int, Weakened]]:
     """Share of the plate's resistance that is left after some steps of the last shot on the CPU, in the window of its
     march, and what is left of the layers behind it by their numbers. All shots hit one plate.
@@ -210,15 +211,15 @@ def _left_after(
     if before:
         apart(memory.launch, order, outcomes, scratch, 1, 0, before)
     if variant.burst:  # a shot that meets no channel leaves what the one before knew of channels
-        scratch[0].channel.fill_(CLOSED)
+        scratch.fields.channel.fill_(constants.NO_CHANNEL.value)
     apart(memory.launch, order, outcomes, scratch, 1, before, 1)
     if variant.nodal:
-        return np.array(scratch[0].share.numpy().reshape(cells), dtype=np.float64), {}
+        return np.array(scratch.fields.share.numpy().reshape(cells), dtype=np.float64), {}
     behind = _behind(memory, scratch, cells) if variant.layered and (variant.degrades or variant.burst) else {}
-    return np.asarray(material * _share_left(memory, 0, scratch[0], cells)), behind
+    return np.asarray(material * _share_left(memory, 0, scratch.fields, cells)), behind
 
 
-def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int, Weakened]:
+def _behind(memory: Memory, scratch: Any, plate: Cells) -> dict[int, Weakened]:
     """The layers behind the plate that the last shot reached, of those that weaken or that earlier hits pierce, after a
     march of one slot.
 
@@ -226,8 +227,8 @@ def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int,
         scratch: of the slot.
         plate: cells of the plate's window.
     """
-    prepared, (fields, _, stack, _), hit = memory.prepared, scratch, _hit(memory.prepared)
-    is_open, homes = stack.open.numpy(), stack.home.numpy()
+    prepared, hit = memory.prepared, _hit(memory.prepared)
+    is_open, homes = scratch.stack.open.numpy(), scratch.stack.home.numpy()
     found = {}
     for k, (cells, material) in enumerate(zip(memory.prepared.windows(plate), prepared.materials, strict=True)):
         if k > 0 and cells != (0, 0) and is_open[k]:
@@ -235,7 +236,7 @@ def _behind(memory: Memory, scratch: tuple[Any, ...], plate: Cells) -> dict[int,
             y, z = nodes_about((hit[0] + place[0], hit[1] + place[1]), cells, spacing)
             offset = float(material.offset_y[-1]), float(material.offset_z[-1])
             solid = material_about(prepared.scene.target.layers[k], y - offset[0], z - offset[1], spacing)
-            found[k] = Weakened(y, z, solid, solid * _share_left(memory, k, fields, plate))
+            found[k] = Weakened(y, z, solid, solid * _share_left(memory, k, scratch.fields, plate))
     return found
 
 

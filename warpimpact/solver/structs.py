@@ -39,6 +39,14 @@ class Put:
         return wp.array(np.ascontiguousarray(values), dtype=dtype or self.real, device=self.device, copy=aligned)
 
 
+def filled(struct: Any, **members: Any) -> Any:
+    """A struct with these members."""
+    instance = struct()
+    for name, value in members.items():
+        setattr(instance, name, value)
+    return instance
+
+
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
     """The Surface (kernels/core_surface.py) of a core in rings of patches."""
     return _surface(struct, Key(core), rings, azimuths.tobytes(), put)

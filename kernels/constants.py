@@ -1,0 +1,192 @@
+"""The constants of the device code: value, unit, reason, section of docs/model.md, and the test that binds the value.
+
+A binding test fails where the value is much larger or much smaller. The stages read their constants from here, and
+docs/reference/device.md shows them. Not here are numbers of a formula, such as ½, which stand where it is, and settings
+that the host chooses (solver/).
+"""
+
+from typing import NamedTuple
+
+
+class Constant(NamedTuple):
+    """A number that somebody chose.
+
+    Attributes:
+        value: in the unit.
+        unit: what the number counts or is a share of.
+        reason: what it is for, and why it is not larger or smaller.
+        section: of docs/model.md; empty where the number belongs to the computation alone.
+        test: file and function in tests/ of the test that binds it; empty where any value of its order serves.
+    """
+
+    value: float
+    unit: str
+    reason: str
+    section: str = ""
+    test: str = ""
+
+
+# How a shot ends (kernels/march.py)
+STILL = Constant(
+    1.0e-4,
+    "impact energy",
+    "A core with less, at 1 % of its impact velocity, rests: it cannot do more than this share of the work.",
+    "8",
+    "verification/test_outcomes.py::test_core_is_arrested_where_the_work_takes_all_its_energy",
+)
+SPENT = Constant(
+    2.5e-3,
+    "impact energy",
+    "A core that turned back behind the plate with less, at 5 % of its impact velocity, does not come back through it.",
+    "8",
+    "verification/test_layers.py::test_a_core_that_turns_back_from_the_base_with_little_speed_rests_there",
+)
+WEAK = Constant(
+    2.25e-2,
+    "impact energy",
+    "Nor does a core that touches nothing and has less across the layers, at 15 %, however fast it goes along them.",
+    "8",
+    "verification/test_layers.py::test_a_core_that_a_base_throws_aside_stays_between_the_layers",
+)
+BARRIER_SHARE = Constant(
+    0.1,
+    "work of the layers that it left, if they were solid",
+    "WEAK holds only for a core that has less than this share too, since layers with holes take less work.",
+    "8",
+    "verification/test_layers.py::test_a_core_that_a_base_throws_aside_stays_between_the_layers",
+)
+GAINED = Constant(
+    1.01,
+    "impact energy",
+    "No law adds energy, and rounding errors add less than 1 % in many thousand steps. More is a failure.",
+    "5",
+    "kernels/test_march.py::test_energy_that_rises_is_told",
+)
+
+# Contact (kernels/interaction.py, march.py)
+STEADIED = Constant(
+    8.0,
+    "onset speeds",
+    "A core that swings between two walls is damped by the chord up to here: a step carries it so far beyond the ramp.",
+    "4.2",
+    "verification/test_stored_outcomes.py::test_results_are_those_stored",
+)
+AT_REST = Constant(
+    1.0e-5,
+    "speed of the core",
+    "A wall that slides along itself has v·n = 0 up to rounding, some 1e-7. Below this share it does not touch.",
+    "4.2",
+    "kernels/test_interaction.py::test_wall_that_slides_along_itself_does_not_touch",
+)
+SMALLEST_ONSET = Constant(
+    1.0e-4,
+    "impact velocity",
+    "The onset speed follows the core, and is never narrower: the slope of the ramp stays finite at rest.",
+    "4.2",
+    "kernels/test_interaction.py::test_onset_follows_the_step_and_a_core_that_slows_down",
+)
+
+# Patches in the slab (kernels/core_surface.py)
+NARROWEST = Constant(
+    0.02,
+    "larger one of extent and motion",
+    "Floor of the smaller one in the convolution: its quotient stays finite, and corners are rounded by 1 %.",
+    "4.1",
+    "kernels/test_core_surface.py::test_share_of_a_box_alone_has_its_corners_rounded_only",
+)
+FLATTEST = Constant(
+    1.0e-3,
+    "half of the ring's extent",
+    "Floor of a patch's extent across the face, for a patch that lies along it.",
+    "4.1",
+    "kernels/test_core_surface.py::test_patch_along_the_face_is_in_or_out_at_once",
+)
+
+# Motion (kernels/rigid_body.py)
+ITERATIONS = Constant(
+    64,
+    "iterations",
+    "Of the time of flight to a stand-off: enough for a point that swings at half of the speed of flight.",
+    "1.3",
+    "verification/test_torque_free.py::test_attitude_at_the_standoffs_is_that_of_precession",
+)
+SMALL_ANGLE = Constant(
+    0.02,
+    "rad, half of the angle of a turn",
+    "Up to here the series of sine and cosine are exact in float64, and ten times as fast.",
+    "5",
+    "kernels/test_rigid_body.py::test_drift_is_the_closed_form_of_the_symmetric_top",
+)
+FAINT = Constant(
+    1.0e-8,
+    "square of the change of velocity along the axis",
+    "Changes across the axis that are smaller than 1e-4 of it are rounding, and no swing of the core.",
+    "4.2",
+    "kernels/test_rigid_body.py::test_a_core_swings_when_a_step_turns_back_the_last_one",
+)
+
+# Channels of earlier hits (kernels/channel.py)
+NO_CHANNEL = Constant(
+    -1.0,
+    "m",
+    "Depth in a channel where none is near: outside by more than any core is wide.",
+    "8",
+    "verification/test_bursts.py::test_far_apart_shots_are_independent_to_the_bit",
+)
+WALL = Constant(
+    20.0,
+    "1/cell",
+    "The share of material goes from 0 to 1 over a twentieth of a cell outside the wall of a channel.",
+    "8",
+    "verification/test_bursts.py::test_a_core_leaves_its_cross_section_open",
+)
+STEEPEST = Constant(
+    0.5,
+    "cosine of the core's angle with the normal",
+    "A core that lies flatter is drawn node by node: its sections are too long to be compared.",
+    "8",
+    "verification/test_bursts.py::test_a_core_leaves_its_cross_section_open",
+)
+SPARED = Constant(
+    0.1,
+    "cells",
+    "What a section adds to the last one by no more is not drawn. So few sections are drawn.",
+    "8",
+    "verification/test_bursts.py::test_a_core_leaves_its_cross_section_open",
+)
+
+# The computation
+VECTOR = Constant(
+    16,
+    "numbers of float32",
+    "Of a vector register of a CPU (AVX-512): the columns of a filtered strip are whole vectors.",
+    test="kernels/test_constants.py::test_a_strip_of_the_filter_is_whole_vectors",
+)
+LANES = Constant(
+    32,
+    "threads",
+    "Of a block on CUDA: one warp, so that a barrier stops nothing else.",
+    test="kernels/test_cuda_source.py::test_block_keeps_its_front_window_in_shared_memory",
+)
+THREADS = Constant(256, "threads", "Of a block in the simple layout on CUDA, each of which computes a shot by itself.")
+BLOCKS = Constant(
+    12,
+    "blocks",
+    "That a multiprocessor is to hold at least. More hide more of each other's latency, but leave fewer registers.",
+)
+SHEET = Constant(
+    2.0**24,
+    "units",
+    "Of exposure that one sheet gives to a node, in whole numbers: rounds as float32 does, and 128 sheets fit.",
+    test="kernels/test_block.py::test_one_step_by_lanes_has_the_same_load_and_exposure",
+)
+TINY = Constant(
+    1.0e-30,
+    "m/s, or a pure number",
+    "Keeps quotients finite; far below anything that matters, and no subnormal number of float32.",
+    test="kernels/test_interaction.py::test_small_variation_leaves_the_ramp_as_it_is",
+)
+SMALL = Constant(1.0e-9, "m or m/s", "Keeps quotients of ways and speeds finite between layers.")
+SLOWEST = Constant(1.0, "m/s", "Keeps times of flight finite where a core hardly moves along x.")
+FAR_AWAY = Constant(1.0e9, "m", "Beyond any place of a core: the start of a search for the nearest.")
+FAR_NODES = Constant(2**20, "nodes", "Beyond any window: the start of a search for the nearest node.")

@@ -1,0 +1,105 @@
+"""What a scheme and a kind of target offer to the march: their functions, with arguments, shapes and units.
+
+A contract annotates each function with its arguments, as `name: type`: a struct (kernels/structs.py) or a scalar.
+`checked` compares a build with its contract. So a function that is missing, or that takes other arguments, is named
+when a variant is built, and not by a compiler's message about the march.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, TypeVar, get_type_hints
+
+import warp as wp
+
+from . import structs
+from .variant import Variant
+
+Contract = TypeVar("Contract")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """How one layer loads a core in one step: the consistent law by one thread (contact.py) or by the lanes of a block
+    (block.py), or the paper's literal scheme (nodal.py).
+
+    Attributes:
+        fields_of_slot: Fields of all slots → those of one slot, from its first node on.
+        fields_of_window: Fields of a slot → those of the window that begins at its node `first`. They differ where the
+            window lies in shared memory.
+        open_window: plate, its thickness [m], the fields of a slot, the number of the layer, the hit in the layer's
+            frame [m] → Window about the hit, of a plate that nothing has touched.
+        load_on: → Load of the plate in a step of `dt` [s] at the pose at mid-step. The fields then have the exposure of
+            the step, too. `touches` are those of all slots; the footprint is that of the step.
+    """
+
+    fields_of_slot: Annotated[wp.Function, "fields: Fields, slot: int32"]
+    fields_of_window: Annotated[wp.Function, "fields: Fields, first: int32"]
+    open_window: Annotated[
+        wp.Function, "plate: Plate, thickness: real, fields: Fields, layer: int32, hit_y: float64, hit_z: float64"
+    ]
+    load_on: Annotated[
+        wp.Function,
+        "surface: Surface, plate: Plate, law: Law, fields: Fields, window: Window, touches: Touches, slot: int32, "
+        "footprint: Footprint, pose: Pose, dt: real",
+    ]
+
+
+@dataclass(frozen=True)
+class TargetKind:
+    """What a step can touch of a target, and its load: a target of one plate (one_plate.py), or of several layers
+    (layers.py). All of it belongs to the shot of the context.
+
+    Attributes:
+        first_step: → length of the first step [s], of the length of the `shortest`.
+        begin: state at the first mid-step → Reach before the first step, and the shot's status: it may have ended.
+        find_reach: Reach of the step before → that of this step, which is at the pose, at the time `now` and `dt` long
+            [s]. `last` is the change of the velocities in the step before.
+        law_at: law of the plate → the law with the onset of contact of all that the step can touch.
+        load_on: → Load of all that the step touches.
+        follow: keeps, for later shots at this target, where the core is.
+        free_time: of a core that touches nothing → time [s] that it flies on after this step without a contact, and
+            whether it is lost between layers.
+        next_step: → length of the step after this one and the `free` time [s].
+        given_up: of a core that has not ended after the last step → its status.
+        conclude: keeps what the results and later shots need of a shot that ended.
+    """
+
+    first_step: Annotated[wp.Function, "context: Context, shortest: real"]
+    begin: Annotated[wp.Function, "context: Context, state: State"]
+    find_reach: Annotated[
+        wp.Function, "context: Context, before: Reach, state: State, pose: Pose, last: Change, now: real, dt: real"
+    ]
+    law_at: Annotated[wp.Function, "context: Context, law: Law, reach: Reach"]
+    load_on: Annotated[wp.Function, "context: Context, law: Law, reach: Reach, pose: Pose, dt: real"]
+    follow: Annotated[wp.Function, "context: Context, reach: Reach, pose: Pose"]
+    free_time: Annotated[wp.Function, "context: Context, reach: Reach, state: State, pose: Pose, dt: real"]
+    next_step: Annotated[
+        wp.Function, "context: Context, reach: Reach, pose: Pose, last: Change, clock: Clock, free: real"
+    ]
+    given_up: Annotated[wp.Function, "context: Context, reach: Reach, state: State, touched: bool"]
+    conclude: Annotated[wp.Function, "context: Context, reach: Reach, status: int32"]
+
+
+def checked(contract: type[Contract], variant: Variant, build: Any) -> Contract:
+    """The functions of a build that a contract names.
+
+    Raises:
+        TypeError: the build lacks a function, or one takes other arguments.
+    """
+    struct = structs.build(variant)
+    scalars = {"real": variant.real, "int32": wp.int32, "float64": wp.float64, "bool": wp.bool}
+
+    def type_of(name: str) -> Any:
+        return scalars[name] if name in scalars else getattr(struct, name)
+
+    offered = {}
+    for name, hint in get_type_hints(contract, include_extras=True).items():
+        (arguments,) = hint.__metadata__
+        expected = [argument.split(": ") for argument in arguments.split(", ")]
+        offered[name] = function = getattr(build, name, None)
+        if not isinstance(function, wp.Function):
+            raise TypeError(f"a {contract.__name__} needs the device function {name}({arguments})")
+        taken = list(function.input_types.items())
+        if taken != [(argument, type_of(kind)) for argument, kind in expected]:
+            given = ", ".join(f"{argument}: {getattr(kind, 'key', kind.__name__)}" for argument, kind in taken)
+            raise TypeError(f"{name} of a {contract.__name__} takes ({given}), but it must take ({arguments})")
+    return contract(**offered)
