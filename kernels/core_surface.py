@@ -33,6 +33,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def pose_of(surface: struct.Surface, position: vec3, attitude: quat, velocity: vec3, omega: vec3):
+        """The pose of a core with a velocity [m/s] and an angular velocity [rad/s] in the plate frame."""
         pose = struct.Pose()
         pose.position = position
         pose.axis = wp.quat_rotate(attitude, vec3(one, zero, zero))
@@ -45,6 +46,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def ring_at(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
+        """The ring of a number, from the nose on."""
         ring = struct.Ring()
         ring.station = read(surface.station, index)
         ring.radius = read(surface.radius, index)
@@ -112,6 +114,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def patch_at(pose: struct.Pose, ring: struct.Ring, cosine: real, sine: real):
+        """The patch of a ring at an azimuth, of which cosine and sine are given."""
         patch = struct.Patch()
         patch.outward_x = cosine * pose.right[0] + sine * pose.up[0]
         patch.around_x = cosine * pose.up[0] - sine * pose.right[0]

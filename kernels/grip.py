@@ -49,6 +49,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def normal_along_x(pose: struct.Pose, patch: struct.Patch, face: struct.Face):
+        """Component along x of the normal of the part in contact."""
         return face.axial * pose.axis[0] + face.outward * patch.outward_x + face.around * patch.around_x
 
     return SimpleNamespace(**locals())

@@ -121,10 +121,12 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def total_pair(x: vec2):
+        """Sum of each component over the lanes."""
         return vec2(total(x[0]), total(x[1]))
 
     @wp.func
     def total_triple(x: vec3):
+        """Sum of each component over the lanes."""
         return vec3(total(x[0]), total(x[1]), total(x[2]))
 
     @wp.func

@@ -25,6 +25,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def outward_of(surface: struct.Surface, pose: struct.Pose, index: wp.int32):
+        """Unit vector outwards at an azimuth."""
         return surface.cosine[index] * pose.right + surface.sine[index] * pose.up
 
     @wp.func

@@ -24,6 +24,7 @@ def build(variant: Variant) -> SimpleNamespace:
 
     @wp.func
     def body_of(shots: struct.Shots, shot: wp.int32):
+        """The mass properties of a shot's core."""
         body = struct.Body()
         body.mass = shot_value(shots.mass, shot)
         body.inertia_axial = shot_value(shots.inertia_axial, shot)

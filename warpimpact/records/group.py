@@ -24,7 +24,7 @@ class Returned(NamedTuple):
 
     Attributes:
         status: codes of `Status`, shape [shots].
-        contact: the end of contact, the struct `Outcomes` of kernels/march.py.
+        contact: the end of contact, the struct `Outcomes` of kernels/structs.py.
         flight: the flight behind the target, the struct `Report` of kernels/free_flight.py.
         bending: the struct `Bending` of kernels/bending.py, shape [shots] on the host; [0] where it is not recorded.
         passage: through the layers, the struct `Passage` of kernels/passage.py; empty if the plate stands alone.

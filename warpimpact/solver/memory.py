@@ -75,7 +75,7 @@ class Memory:
         self.passage = self.empty(self.stage.Passage, *sizes)
 
     def _target(self, prepared: Prepared) -> Any:
-        """The Target (kernels/target.py)."""
+        """The Target (kernels/structs.py)."""
         target, materials = self.stage.Target(), prepared.materials
         target.count = len(materials)
         # Kept, as an array of structs does not keep what its members point to.

@@ -26,7 +26,7 @@ nose, and beam theory does not hold within a diameter of a load."""
 
 @dataclass(frozen=True, eq=False)
 class Rings:
-    """Rings of patches from nose to base; arrays of shape [rings], SI (see kernels/core_surface.py). A core has one
+    """Rings of patches from nose to base; arrays of shape [rings], SI (kernels/structs.py, Surface). A core has one
     such object for the same patches."""
 
     station: Array

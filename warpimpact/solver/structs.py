@@ -48,7 +48,7 @@ def filled(struct: Any, **members: Any) -> Any:
 
 
 def surface_of(struct: Any, core: Core, rings: Rings, azimuths: Array, put: Put) -> Any:
-    """The Surface (kernels/core_surface.py) of a core in rings of patches."""
+    """The Surface (kernels/structs.py) of a core in rings of patches."""
     return _surface(struct, Key(core), rings, azimuths.tobytes(), put)
 
 
@@ -127,7 +127,7 @@ def plates_of(struct: Any, grids: Sequence[Grid], put: Put) -> tuple[Any, Any]:
 
 
 def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
-    """The Plate (kernels/plate_grid.py) of a grid."""
+    """The Plate (kernels/structs.py) of a grid."""
     plate = struct()
     plate.tile, plate.clear = _on_device(grid.tile, put)
     plate.tile_y, plate.tile_z = grid.tile.material.shape
