@@ -111,7 +111,7 @@ LAY, LOOK_UP, CELLS, GAIN, SPREAD, SETTLE = (
 def beneath_kernel(variant: Variant) -> Any:
     """Kernel of the material under points, and of the share of a grid cell about them that lies on the plate."""
     part, real = plate_grid.build(variant), variant.real
-    Plate = part.Plate
+    Plate = structs.build(variant).Plate
 
     def beneath(
         plate: Plate,
@@ -169,10 +169,9 @@ def lay_windows(device: str, *, length: float = 0.5e-3) -> Laid:
 
 def beneath(variant: Variant, hit: Array, y: Array, z: Array, device: str, **plate: Any) -> tuple[Array, Array]:
     """Material under points relative to a hit [m], and shares of the grid cells about them on the plate."""
-    part = plate_grid.build(variant)
     outputs = [poisoned(len(y), variant.real, device) for _ in range(2)]
     inputs = [
-        plate_of(part.Plate, TILE, PERIOD, CELL, device, real=variant.real, **plate),
+        plate_of(structs.build(variant).Plate, TILE, PERIOD, CELL, device, real=variant.real, **plate),
         *hit,
         *(wp.array(a, dtype=variant.real, device=device) for a in (y, z)),
     ]
