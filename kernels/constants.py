@@ -1,8 +1,8 @@
 """The constants of the device code: value, unit, reason, section of docs/model.md, and the test that binds the value.
 
-The test that is named with a constant computes what the constant decides. The stages read their constants from here, and
-docs/reference/device.md shows them. Not here are numbers of a formula, such as ½, which stand where it is, and settings
-that the host chooses (solver/).
+The test that is named with a constant computes what the constant decides. The stages read their constants from here,
+and docs/reference/device.md shows them. Not here are numbers of a formula, such as ½, which stand where it is, and
+settings that the host chooses (solver/).
 """
 
 from typing import NamedTuple
