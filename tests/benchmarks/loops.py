@@ -42,11 +42,11 @@ from warpimpact.cli.identify import PROCESSES
 from warpimpact.identification.identify import identify_to_file
 from warpimpact.identification.reading import read_fit
 from warpimpact.results import posterior_file
-from warpimpact.solver import grid
 from warpimpact.solver.device import cores
 from warpimpact.solver.limit import limits, pilot_of_limits
 from warpimpact.solver.many import simulate_many
 from warpimpact.solver.pilot import limits_pilot_size
+from warpimpact.solver.tile import forget_tiles
 from warpimpact.solver.worker import Worker
 from warpimpact.studies.limit import LimitMap
 
@@ -110,7 +110,7 @@ def draws(each: int, rounds: int) -> dict[str, Any]:
     times: dict[str, list[float]] = {name: [] for name in kinds}
     for number in range(rounds + 1):  # the first one builds the kernels
         for name, scenes in kinds.items():
-            grid._tile.cache_clear()
+            forget_tiles()
             _, seconds = spent(lambda scenes=scenes: simulate_many(scenes, LEVEL, ONE))
             times[name] += [seconds / (DRAWS * each)] if number else []
     least = {name: min(of) for name, of in times.items()}

@@ -20,8 +20,8 @@ from bench import machine, store
 from roads import NORMAL, P80, SLOTTED, Scenes, scene_and_shots
 
 from warpimpact import Numerics, Shots
-from warpimpact.solver import grid
 from warpimpact.solver.many import simulate_many
+from warpimpact.solver.tile import forget_tiles
 from warpimpact.solver.worker import Worker
 
 LEVEL, ROUNDS = Numerics(level=2), 5
@@ -64,7 +64,7 @@ def contenders() -> dict[str, tuple[Scenes, bool]]:
 def seconds(scenes: Scenes, anew: bool, threads: int | None, clock: Callable[[], float]) -> float:
     """Time per hit of one call [s]."""
     if anew:
-        grid._tile.cache_clear()
+        forget_tiles()
     begin = clock()
     simulate_many(scenes, LEVEL, Worker("cpu", threads))
     return (clock() - begin) / sum(len(shots) for _, shots in scenes)

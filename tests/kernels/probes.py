@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from warpimpact.scene import Core
 from warpimpact.solver import structs
-from warpimpact.solver.grid import Grid, Tile, half_taps
+from warpimpact.solver.grid import Grid, half_taps
 from warpimpact.solver.rings import azimuths_of, rings_of
+from warpimpact.solver.tile import Tile
 
 
 def records(struct: Any, device: str, **columns: Any) -> wp.array:
@@ -74,7 +75,7 @@ def plate_of(
     """The Plate of a tile of material fractions, with the filter of a degradation length on a grid of some spacing."""
     rows, columns = tile.shape
     grid = Grid(
-        tile=Tile(tile, period[0] / rows, period[1] / columns),
+        tile=Tile(tile.shape, period[0] / rows, period[1] / columns, lambda _: tile),
         period=period,
         half_size=(size[0] / 2, size[1] / 2),
         spacing=spacing,

@@ -43,6 +43,7 @@ class HitMap:
     """How every hit of a campaign ends, as a `Computation`."""
 
     most_solid: ClassVar[int] = 2**12
+    passages: ClassVar[int] = 1
     content: ClassVar[Mapping[str, str]] = {}
     measures: ClassVar[Sequence[str]] = ()
 
@@ -190,7 +191,7 @@ def _outcomes(
 ) -> tuple[Outcomes, float]:
     """Outcomes of shots, and the time [s] that it took to prepare and to compute them, but not to build kernels."""
     begin = time.perf_counter()
-    memory = Memory(prepare(scene, shots, numerics), find_device(worker.device))
+    memory = Memory(prepare(scene, shots, numerics), find_device(worker.device), worker.cancel)
     building = memory.build()
     outcomes = marched(memory, worker, progress)
     return outcomes, time.perf_counter() - begin - building

@@ -55,7 +55,7 @@ def simulate_many(
                 if progress is not None:
                     progress(sum(done), total)
 
-        memory = Memory(prepare(*scenes[number], numerics), device)
+        memory = Memory(prepare(*scenes[number], numerics), device, own.cancel)
         march = March(memory, 1, helpers)
         contact = march.march(told, own.cancel)
         return outcomes_of(march.memory, contact)

@@ -20,6 +20,7 @@ from warpimpact.solver.device import SMALL, free_memory, load
 from warpimpact.solver.prepare import Prepared
 from warpimpact.solver.structs import Put, filled, plate_of, plates_of, surface_of, table_of
 from warpimpact.solver.windows import Cells
+from warpimpact.solver.worker import NEVER, Cancel
 
 if TYPE_CHECKING:
     from warpimpact.kernels.variant import Variant
@@ -47,7 +48,10 @@ class Memory:
         bending, passage, history: what the march fills beside the outcomes.
     """
 
-    def __init__(self, prepared: Prepared, device: Any) -> None:
+    def __init__(self, prepared: Prepared, device: Any, cancel: Cancel = NEVER) -> None:
+        """Build the tiles of the plates, unless `cancel` ends that, and put all on the device."""
+        for tile in prepared.tiles:
+            tile.build(cancel.check)
         variant, scene, count = prepared.variant, prepared.scene, len(prepared.shots)
         self.prepared, self.device, self.variant = prepared, device, variant
         self.stage, self.flight = built(variant)

@@ -17,10 +17,12 @@ from warpimpact.solver.grid import Grid, Lengths, grids_of
 from warpimpact.solver.materials import OWN_LENGTHS, Materials, materials_of
 from warpimpact.solver.resolution import Resolution, conditions_of, layer_steps, resolve, steps_of
 from warpimpact.solver.rings import Rings, Sections, azimuths_of, rings_of, sections_of
+from warpimpact.solver.tile import check_tiles
 from warpimpact.solver.windows import Cells, block_window, first_windows, windows_behind
 
 if TYPE_CHECKING:
     from warpimpact.scene import Numerics, Plate, Scene, Shots
+    from warpimpact.solver.tile import Tile
 
 Array = NDArray[np.float64]
 
@@ -84,6 +86,11 @@ class Prepared:
     def grid(self) -> Grid:
         """The plate."""
         return self.grids[0]
+
+    @property
+    def tiles(self) -> set[Tile]:
+        """Those of all plates."""
+        return {grid.tile for grids in self.plates for grid in grids}
 
     @property
     def cells(self) -> int:
@@ -150,7 +157,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         ValueError: the numerics fix no resolution; they cannot compute the bending moment that the scene records,
             several shots at one plate or layers; or the block layout does not compute the scene.
         TooManySteps: a shot would take months.
-        MemoryError: the plate's period does not fit at the grid spacing.
+        MemoryError: the tiles of the plates take more memory or time than they may.
     """
     core, target, record, interaction = scene.core, scene.target, scene.record, scene.interaction
     if numerics.explicit is None:
@@ -186,6 +193,7 @@ def prepare(scene: Scene, shots: Shots, numerics: Numerics) -> Prepared:
         grids_of(target.layers, materials, one, own, deep=deep, shared=shared)
         for own, one in zip(lengths, resolutions, strict=True)
     ]
+    check_tiles({grid.tile: place for of in grids for grid, (place, _) in zip(of, target.named, strict=True)})
     first_cells = first_windows(core, shots, materials[0], grids, which, nodal=resolution.nodal)
     variant = Variant(
         double=resolution.double,

@@ -58,7 +58,7 @@ def simulate(
 
 def computed(prepared: Prepared, worker: Worker, progress: Progress | None = None) -> Outcomes:
     """Compute what was prepared; see `simulate`."""
-    return marched(Memory(prepared, find_device(worker.device)), worker, progress)
+    return marched(Memory(prepared, find_device(worker.device), worker.cancel), worker, progress)
 
 
 def marched(memory: Memory, worker: Worker, progress: Progress | None = None) -> Outcomes:
@@ -97,7 +97,7 @@ def pilot_of(
     def outcomes_at(at: Numerics, some: Shots) -> Outcomes:
         assert at.level is not None
         trying(at.level)
-        memory = Memory(prepare(scene, some, at), find_device(worker.device))
+        memory = Memory(prepare(scene, some, at), find_device(worker.device), worker.cancel)
         memory.build()
         begin = time.perf_counter()
         outcomes = marched(memory, worker)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import warp as wp
@@ -15,8 +16,9 @@ from warpimpact.solver.keys import Key
 
 if TYPE_CHECKING:
     from warpimpact.scene import Core
-    from warpimpact.solver.grid import Grid, Tile
+    from warpimpact.solver.grid import Grid
     from warpimpact.solver.rings import Rings
+    from warpimpact.solver.tile import Tile
 
 Array = NDArray[np.float64]
 
@@ -130,7 +132,7 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     """The Plate (kernels/structs.py) of a grid."""
     plate = struct()
     plate.tile, plate.clear = _on_device(grid.tile, put)
-    plate.tile_y, plate.tile_z = grid.tile.material.shape
+    plate.tile_y, plate.tile_z = grid.tile.shape
     plate.period_y, plate.period_z = grid.period
     plate.half_y, plate.half_z = grid.half_size
     plate.spacing = grid.spacing
@@ -139,7 +141,12 @@ def plate_of(struct: Any, grid: Grid, put: Put) -> Any:
     return plate
 
 
-@lru_cache(maxsize=16)
+_ON_DEVICE: WeakKeyDictionary[Tile, dict[Put, tuple[Any, Any]]] = WeakKeyDictionary()
+
+
 def _on_device(tile: Tile, put: Put) -> tuple[Any, Any]:
-    """Material and clearance of a tile. No kernel changes them, so they are kept for later shots at the same plate."""
-    return put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))
+    """Material and clearance of a tile. No kernel changes them, so they are kept as long as the tile is."""
+    kept = _ON_DEVICE.setdefault(tile, {})
+    if put not in kept:
+        kept[put] = put(tile.material.reshape(-1)), put(tile.clearance.reshape(-1))
+    return kept[put]

@@ -29,7 +29,7 @@ from warpimpact.runs.parts import folder_of
 from warpimpact.runs.run import run_to_file
 from warpimpact.scene.patterns.mask_files import read_mask
 from warpimpact.scene.units import Length, quantity, quoted
-from warpimpact.solver.grid import tile_of
+from warpimpact.solver.tile import check_tiles, tile_of
 
 SHIPPED = Path(__file__).parents[3] / "campaigns"
 BASE = (SHIPPED / "slotted_plate.toml").read_text(encoding="utf-8")
@@ -268,10 +268,10 @@ def test_a_title_is_no_formula(make_result: Callable[..., xarray.Dataset], tmp_p
 
 
 def test_memory_is_what_the_process_may_take(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("warpimpact.solver.grid.free_memory", lambda: 2**20)
+    monkeypatch.setattr("warpimpact.solver.tile.free_memory", lambda: 2**20)
     plate = Campaign.from_text(BASE, name="a", folder=Path()).plate
-    with pytest.raises(MemoryError, match=r"numerics.grid_spacing or plate.degradation_length, .* is too small"):
-        tile_of(plate, 1e-6)
+    with pytest.raises(MemoryError, match=r"the target takes .* GiB .*, but 0.000977 GiB and 20 s are allowed; give"):
+        check_tiles({tile_of(plate, 2e-6): "plate"})
 
 
 @pytest.mark.parametrize(

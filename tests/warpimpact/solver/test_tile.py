@@ -8,15 +8,25 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from warpimpact import Campaign
+from warpimpact.runs.foreseen import cost_of
 from warpimpact.scene import (
     CirclePattern,
+    LevelSetPattern,
     MaskPattern,
+    Numerics,
     Plate,
     SlotPattern,
+    Target,
     TrianglePattern,
 )
+from warpimpact.scene.patterns.free_form import Wave
 from warpimpact.solver import replay
-from warpimpact.solver.grid import BLUR, FINER, nearest_wall, tent_taps, tile_of
+from warpimpact.solver.grid import FINER, tent_taps
+from warpimpact.solver.prepare import prepare
+from warpimpact.solver.simulate import computed
+from warpimpact.solver.tile import BLUR, check_tiles, forget_tiles, nearest_wall, tile_of
+from warpimpact.solver.worker import Cancel, Cancelled, Worker
 
 PLATE = Plate(thickness=4e-3, resistance=2.6e9, degradation_length=0.6e-3)
 PATTERNS = [
@@ -153,3 +163,79 @@ def test_a_window_full_of_edges_takes_a_bounded_number_of_points(
     share = replay.material_about(cast(Any, plate), np.arange(nodes) + 0.5, np.arange(nodes) + 0.5, 1.0)
     np.testing.assert_array_equal(share, 0.5)
     assert sum(points) == nodes**2 * (1 + samples**2)
+
+
+SLOTTED_PLATE = Path(__file__).parents[3] / "campaigns" / "slotted_plate.toml"
+FREE_FORM = LevelSetPattern(
+    spacing=(8e-3, 9e-3), waves=(Wave(along_y=1, along_z=0), Wave(along_y=0, along_z=1)), share=0.3
+)
+WIDE = PLATE.model_copy(update={"pattern": SlotPattern(length=12e-3, width=4e-3, spacing=(1.0, 1.0))})
+
+
+def test_the_holes_of_a_plate_are_not_built_before_somebody_computes_and_not_at_all_where_that_is_cancelled() -> None:
+    campaign = Campaign.from_toml(SLOTTED_PLATE)
+    scene = campaign.scene.model_copy(update={"target": Target(layers=(WIDE,))})
+    forget_tiles()
+    shots = campaign.sampler().shots(0, 2)
+    prepared = prepare(campaign.scene, shots, Numerics(level=0))
+    assert cost_of(campaign, Numerics(level=0)) is None
+    with pytest.raises(MemoryError, match=r"plate.pattern: got a period of 1 m x 1 m, .* 2 GiB"):
+        prepare(scene, shots, Numerics(level=0))
+    (own,) = prepared.tiles
+    cancel = Cancel()
+    cancel.cancel()
+    with pytest.raises(Cancelled):
+        computed(prepared, Worker("cpu", 1, cancel))
+    assert not own.built
+    computed(prepared, Worker("cpu", 1))
+    assert own.built
+
+
+@pytest.mark.parametrize("pattern", [*PATTERNS, FREE_FORM], ids=lambda pattern: pattern.shape)
+@pytest.mark.parametrize("sharp", [False, True])
+def test_a_tile_is_built_in_small_parts_that_may_end_it(
+    pattern: Any, sharp: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plate = PLATE.model_copy(update={"pattern": pattern})
+    whole = tile_of(plate, 0.1e-3, sharp=sharp).material
+    forget_tiles()
+    monkeypatch.setattr("warpimpact.solver.tile.AT_ONCE", 500)
+    monkeypatch.setattr("warpimpact.scene.patterns.cells._AT_ONCE", 700)
+    part, looks = tile_of(plate, 0.1e-3, sharp=sharp), 0
+
+    def look() -> None:
+        nonlocal looks
+        looks += 1
+        if looks == 12:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        part.build(look)
+    assert not part.built
+    part.build(look)
+    assert looks > 24
+    np.testing.assert_array_equal(part.material, whole)
+
+
+def test_tiles_of_a_target_have_a_budget_of_memory_and_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    one, other = (tile_of(PLATE.model_copy(update={"pattern": pattern}), 2e-6) for pattern in PATTERNS[:2])
+    check_tiles({one: "plate", other: "layer[0]"})
+    monkeypatch.setattr("warpimpact.solver.tile.MOST_SECONDS", one.seconds + other.seconds - 1e-6)
+    with pytest.raises(MemoryError, match=r"^plate.pattern: got a period of 0.016 m x 0.016 m, .* s are allowed; give"):
+        check_tiles({one: "plate", other: "layer[0]"})
+    check_tiles({one: "plate"})
+    monkeypatch.undo()
+    monkeypatch.setattr("warpimpact.solver.tile.MOST_BYTES", one.bytes + other.bytes - 1)
+    with pytest.raises(MemoryError, match=r"but .* GiB and 20 s are allowed"):
+        check_tiles({one: "plate", other: "layer[0]"})
+
+
+def test_tiles_are_kept_as_far_as_they_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+    plates = [PLATE.model_copy(update={"pattern": pattern}) for pattern in PATTERNS]
+    forget_tiles()
+    tiles = [tile_of(plate, 0.1e-3) for plate in plates]
+    monkeypatch.setattr("warpimpact.solver.tile.MOST_BYTES", tiles[0].bytes + tiles[2].bytes)
+    for own in tiles:
+        own.build(lambda: None)
+    kept = [tile_of(plate, 0.1e-3) is own for plate, own in zip(plates, tiles, strict=True)]
+    assert kept == [False, tiles[1].bytes <= tiles[0].bytes, True]

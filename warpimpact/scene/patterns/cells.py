@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from ..exclusions import CELLS, MARGIN, check_together
 from ..model import Array
-from .pattern import WHOLE_CELL, BoolArray, Counts, Pattern, Range, half_sides, rounded
+from .pattern import WHOLE_CELL, BoolArray, Check, Counts, Pattern, Range, half_sides, no_end, rounded
 from .roundings import smallest_gap
 
 Numbers = NDArray[np.int64]
+_AT_ONCE = 2**20
+"""Cells that are computed together, about."""
 
 
 class CellsPattern(Pattern):
@@ -51,9 +53,14 @@ class CellsPattern(Pattern):
         )
         return i, j
 
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         along_y = _means(~self.material, counts[0], sides[0] / self.side)
-        return rounded(_means(along_y.T, counts[1], sides[1] / self.side).T, WHOLE_CELL)
+        shares = np.empty(counts, dtype=np.int16)
+        for first in range(0, counts[0], some := max(1, _AT_ONCE // counts[1])):
+            check()
+            means = _means(along_y[first : first + some].T, counts[1], sides[1] / self.side)
+            shares[first : first + some] = rounded(means.T, WHOLE_CELL)
+        return shares
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:
         """Closed outlines, each of shape [points, 2] [m], of holes; the rectangle cuts them."""

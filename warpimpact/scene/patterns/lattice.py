@@ -14,10 +14,12 @@ from ..exclusions import HOLES, STAGGERED, check_together
 from ..model import Array
 from ..units import Angle, Length, PositiveLength, quantity
 from .lines import Chords, Numbers, half_shares
-from .pattern import BoolArray, Counts, Pattern, Range, half_sides
+from .pattern import BoolArray, Check, Counts, Pattern, Range, half_sides, no_end
 from .roundings import area, chords, distance, geometries, neighbours, outline, placed
 
 _MOST_HOLES = 20_000
+_ROWS = 64
+"""Of cells that are computed between two looks at who may end it."""
 _SAME = 1e-9
 """Two lengths are equal if they differ by less than this share of the period."""
 
@@ -159,13 +161,16 @@ class LatticePattern(Pattern):
         deepest = self._deepest(y, z)
         return np.asarray(~(np.abs(deepest) > reach) if reach <= self._sight else np.ones(deepest.shape, dtype=bool))
 
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         ranges = [(-side, side * (count + 1)) for side, count in zip(sides, counts, strict=True)]
         places = self._repeated(self._places, self.period, ranges[0], ranges[1])
         extents = self._boxes(places)
-        along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides)
-        along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1])
-        return along_y + along_z.T
+        along_y = half_shares(self._chords(places, exchanged=False), extents[:, :, 1], counts, sides, check)
+        along_z = half_shares(self._chords(places, exchanged=True), extents[:, :, 0], counts[::-1], sides[::-1], check)
+        for first in range(0, counts[0], _ROWS):
+            check()
+            along_y[first : first + _ROWS] += along_z[:, first : first + _ROWS].T
+        return along_y
 
     def _chords(self, places: Array, *, exchanged: bool) -> Chords:
         """Those of the holes at some places; `exchanged`, with y and z in each other's place."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
-from .pattern import WHOLE_CELL, Counts, rounded
+from .pattern import WHOLE_CELL, Check, Counts, rounded
 
 LINES = 3
 """In each direction through what a cell has of a hole, evenly. Along a line its share is exact."""
@@ -23,7 +23,9 @@ ends are of the shape of z, whose last axis is that of the holes."""
 _PER_LINE = WHOLE_CELL // (2 * LINES)
 
 
-def half_shares(chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+def half_shares(
+    chords: Chords, extents: Array, counts: tuple[int, int], sides: tuple[float, float], check: Check
+) -> Counts:
     """Half the shares of cells that lie in holes, by lines along y, in parts of WHOLE_CELL, shape `counts`. The other
     half has lines along z, so that a plate that is turned by a right angle has the same shares.
 
@@ -33,11 +35,13 @@ def half_shares(chords: Chords, extents: Array, counts: tuple[int, int], sides: 
     Args:
         extents: lowest and highest z of every hole, shape [holes, 2] [m].
         counts, sides: of the cells along y and z, from the origin on; of a cell [m].
+        check: as in `Pattern.shares_in_holes`.
     """
     inside = np.zeros((counts[0] + 2, counts[1]), dtype=np.int16)
     ends = extents / sides[1]
     columns = np.clip(np.stack([np.floor(ends[:, 0]), np.ceil(ends[:, 1])], axis=1), 0, counts[1]).astype(np.int64)
     for some in _in_lots(LINES * (columns[:, 1] - columns[:, 0])):
+        check()
         each = columns[some, 1] - columns[some, 0]
         hole = np.repeat(some, each)
         column = np.arange(each.sum()) + np.repeat(columns[some, 1] - np.cumsum(each), each)
@@ -50,6 +54,7 @@ def half_shares(chords: Chords, extents: Array, counts: tuple[int, int], sides: 
         for end, sign in ((low, 1), (high, -1)):
             _add(inside, np.clip(end[met] / sides[0], 0, counts[0]), column, weight, sign)
     for before, row in pairwise(inside):  # half the time of numpy.cumsum along the first axis
+        check()
         row += before
     return inside[: counts[0]]
 

@@ -2,6 +2,7 @@
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, Literal, Self
 
@@ -14,10 +15,15 @@ from .roundings import distance_to, pieces
 BoolArray = NDArray[np.bool_]
 Counts = NDArray[np.int16]
 Range = tuple[float, float]
+Check = Callable[[], object]
 
 
 WHOLE_CELL = 24576
 """Parts of a cell in which its share in holes is counted: integers, of which a cell inside a hole has exactly all."""
+
+
+def no_end() -> None:
+    """Nobody ends the work."""
 
 
 def rounded(share: Array, whole: Any) -> Counts:
@@ -68,12 +74,13 @@ class Pattern(Model, ABC):
         return np.ones(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
     @abstractmethod
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         """Share of every cell that lies in holes, in parts of WHOLE_CELL, shape `counts`.
 
         Args:
             counts: cells of a period along y and z, from the origin on.
             sides: of a cell [m].
+            check: called all the time; it raises to end the work.
         """
 
     def edge_distance(self, y: Array, z: Array) -> Array:
@@ -148,7 +155,7 @@ class NoPattern(Pattern):
     def is_hole(self, y: Array, z: Array) -> BoolArray:
         return np.zeros(np.broadcast_shapes(np.shape(y), np.shape(z)), dtype=bool)
 
-    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float]) -> Counts:
+    def shares_in_holes(self, counts: tuple[int, int], sides: tuple[float, float], check: Check = no_end) -> Counts:
         return np.zeros(counts, dtype=np.int16)
 
     def outlines(self, y_range: Range, z_range: Range) -> list[Array]:

@@ -1,0 +1,240 @@
+"""The tile: one period of the pristine plate in cells, planned at once, and built where somebody may end it."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from threading import Lock
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpimpact.scene.patterns import WHOLE_CELL
+from warpimpact.scene.patterns.pattern import Check, no_end
+from warpimpact.solver.device import SMALL, free_memory
+from warpimpact.solver.keys import Key
+
+if TYPE_CHECKING:
+    from warpimpact.scene import Pattern, Plate
+
+Array = NDArray[np.float64]
+Floats = NDArray[np.floating[Any]]
+Counts = NDArray[np.int16]
+Real = type[np.floating[Any]]
+
+BLUR = 3
+"""Cells of the tile over which its material is averaged, in each direction: a patch then crosses an edge gradually.
+Odd."""
+BLOCKS = 96
+"""Largest number of blocks of a period, in each direction, in the search for the clearance."""
+AT_ONCE = 2**22
+"""Cells that are computed between two looks at who may end it, about."""
+
+MOST_BYTES, MOST_SECONDS = 2**31, 20.0
+"""What all tiles of a target may take: memory, and time of a core as it is foreseen. A plate of 0.5 m in cells of 1/15
+of the usual degradation length fits."""
+PER_CELL, PER_SHARP_CELL = 5.0e-8, 1.0e-7
+"""Seconds of a core (tests/benchmarks/NOTES.md)."""
+MOST_KEPT = 16
+"""Tiles, built or not, for later shots at the same plate."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """One period of the pristine plate: cells of dy × dz [m], `shape` along y and z. `material` has their fractions and
+    `clearance` is a lower bound of every cell's distance from the material of the whole lattice [m]; both of `shape`,
+    of the floating-point type of the kernels, and built when they are first read.
+
+    Attributes:
+        make: computes the material.
+        seconds: that it takes a core, roughly.
+        size: of a number [bytes].
+    """
+
+    shape: tuple[int, int]
+    dy: float
+    dz: float
+    make: Callable[[Check], Floats]
+    seconds: float = 0.0
+    size: int = 8
+    _building: Lock = field(default_factory=Lock)
+
+    @property
+    def bytes(self) -> int:
+        """Memory of both arrays."""
+        return 2 * self.size * math.prod(self.shape)
+
+    @property
+    def built(self) -> bool:
+        """Whether the material is there."""
+        return "material" in vars(self)
+
+    def build(self, check: Check) -> None:
+        """Compute the material, once, whichever threads ask for it; `check` ends that."""
+        with self._building:
+            if not self.built:
+                _make_room(self.bytes)
+                vars(self)["material"] = self.make(check)
+
+    @cached_property
+    def material(self) -> Floats:
+        return self.make(no_end)
+
+    @cached_property
+    def clearance(self) -> Floats:
+        # The search runs over blocks of cells. A block with any material is a wall.
+        rows, columns = self.shape
+        block = (math.ceil(rows / BLOCKS), math.ceil(columns / BLOCKS))
+        wall = _any_of(_any_of(self.material > 0.0, block[0]).T, block[1]).T
+        if not wall.any():
+            return np.full_like(self.material, math.inf)
+        widths = (self.dy * rows / len(wall), self.dz * columns / wall.shape[1])
+        own = nearest_wall(wall, widths)
+        # Two blocks are subtracted, as distances are from centre to centre and the last block of a period may be
+        # narrower.
+        kept = np.maximum(0.0, own - 2.0 * math.hypot(self.dy * block[0], self.dz * block[1]))
+        every = kept.astype(self.material.dtype).repeat(block[1], axis=1)[:, :columns].repeat(block[0], axis=0)[:rows]
+        return np.asarray(every)
+
+
+def tile_of(plate: Plate, spacing: float, *, sharp: bool = False, double: bool = False) -> Tile:
+    """Material fraction about every cell of one period; cell (0, 0) has its corner at the origin. Nothing is computed
+    yet.
+
+    Cells are at most `spacing` wide and fit the period; fractions are means over BLUR × BLUR cells. `sharp` takes each
+    cell's centre alone, as the literal scheme does, and `double` has them in float64.
+    """
+    key: Key[Pattern] = Key(plate.pattern)
+    asked = (key, spacing, sharp, np.float64 if double else np.float32)
+    with _KEEPING:
+        tile = _KEPT.pop(asked, None) or _planned(*asked)
+        _KEPT[asked] = tile
+        if len(_KEPT) > MOST_KEPT:
+            _KEPT.popitem(last=False)
+    return tile
+
+
+_KEPT: OrderedDict[Any, Tile] = OrderedDict()
+_KEEPING = Lock()
+
+
+def forget_tiles() -> None:
+    """Keep no tile."""
+    with _KEEPING:
+        _KEPT.clear()
+
+
+def _make_room(needed: int) -> None:
+    """Keep the tiles that were asked for last, as far as they leave room for one of so many bytes."""
+    with _KEEPING:
+        for asked in [asked for asked, tile in _KEPT.items() if tile.built]:
+            if sum(tile.bytes for tile in _KEPT.values() if tile.built) + needed <= MOST_BYTES:
+                break
+            del _KEPT[asked]
+
+
+def check_tiles(tiles: Mapping[Tile, str]) -> None:
+    """Raise a MemoryError, whose message is for the user, if tiles take more memory or time than they may.
+
+    Args:
+        tiles: with the places of their plates in a campaign.
+    """
+    needed, seconds = sum(tile.bytes for tile in tiles), sum(tile.seconds for tile in tiles)
+    if needed <= SMALL:
+        return
+    free = free_memory() + sum(tile.bytes for tile in tiles if tile.built)
+    if needed <= min(MOST_BYTES, free) and seconds <= MOST_SECONDS:
+        return
+    largest = max(tiles, key=lambda tile: tile.bytes)
+    (rows, columns), place = largest.shape, tiles[largest]
+    raise MemoryError(
+        f"{place}.pattern: got a period of {rows * largest.dy:.6g} m x {columns * largest.dz:.6g} m, in cells of "
+        f"{largest.dy:.3g} m x {largest.dz:.3g} m; the target takes {needed / 2**30:.3g} GiB and some {seconds:.2g} s "
+        f"of a core before the first hit, but {min(MOST_BYTES, free) / 2**30:.3g} GiB and {MOST_SECONDS:g} s are "
+        "allowed; give a smaller spacing (of a plate with a margin, a smaller size or no margin), a longer "
+        f"{place}.degradation_length, or a lower level or larger numerics.grid_spacing"
+    )
+
+
+def _planned(key: Key[Pattern], spacing: float, sharp: bool, real: Real) -> Tile:
+    period_y, period_z = key.value.period
+    # An even number, so that a row staggered by half a period sees the same cells.
+    step = 1 if sharp else 2
+    count_y, count_z = (step * max(1, math.ceil(p / (step * spacing) - 1e-9)) for p in (period_y, period_z))
+    dy, dz = period_y / count_y, period_z / count_z
+    make = partial(_sharp if sharp else _blurred, key.value, (count_y, count_z), (dy, dz), real)
+    seconds = (PER_SHARP_CELL if sharp else PER_CELL) * count_y * count_z
+    return Tile((count_y, count_z), dy, dz, make, seconds, np.dtype(real).itemsize)
+
+
+def _sharp(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], real: Real, check: Check) -> Floats:
+    """Whether the centres of so many cells of a period are material."""
+    y, z = (
+        np.float64(side / count) * (np.arange(count) + 0.5) for side, count in zip(pattern.period, counts, strict=True)
+    )
+    material = np.empty(counts, dtype=real)
+    for k in range(counts[0]):
+        check()
+        material[k] = ~pattern.is_hole(y[k : k + 1], z)
+    return material
+
+
+def _blurred(pattern: Pattern, counts: tuple[int, int], sides: tuple[float, float], real: Real, check: Check) -> Floats:
+    """Means of material over BLUR × BLUR cells of a period: sums of whole numbers, which floats of 32 bits hold
+    exactly, and one division."""
+    inside, (rows, columns), beside = pattern.shares_in_holes(counts, sides, check), counts, BLUR // 2
+    material = np.empty(counts, dtype=real)
+    for some in _bands(counts):
+        check()
+        around = inside[np.arange(some.start - beside, some.stop + beside) % rows]
+        wide = (WHOLE_CELL - np.pad(around, ((0, 0), (beside, beside)), mode="wrap")).astype(real)
+        material[some] = _sums(_sums(wide, some.stop - some.start).T, columns).T
+        material[some] /= BLUR**2 * WHOLE_CELL
+    return material
+
+
+def _bands(counts: tuple[int, int]) -> Iterator[slice]:
+    """Rows of a tile of so many cells, AT_ONCE at a time."""
+    rows, some = counts[0], max(1, AT_ONCE // counts[1])
+    return (slice(first, min(first + some, rows)) for first in range(0, rows, some))
+
+
+def _sums(values: Floats, count: int) -> Floats:
+    """Sums over BLUR neighbours along the first axis."""
+    sums: Floats = np.array(values[:count])
+    for k in range(1, BLUR):
+        sums += values[k : k + count]
+    return sums
+
+
+def _any_of(marked: NDArray[np.bool_], size: int) -> NDArray[np.bool_]:
+    """Whether any of so many rows in a row is marked, column by column; the last ones may be fewer."""
+    found = marked[::size].copy()
+    for part in (marked[k::size] for k in range(1, size)):
+        found[: len(part)] |= part
+    return found
+
+
+def nearest_wall(wall: NDArray[np.bool_], widths: tuple[float, float]) -> Array:
+    """Distance [m] of every block of one period from the nearest wall of the lattice, centre to centre, for blocks of
+    these widths: first along z, then over all rows. At least one block is a wall.
+
+    scipy.ndimage has this, too, but a run would wait a quarter of a second for its import.
+    """
+    rows, columns = wall.shape
+    number, walls = np.arange(3 * columns), np.tile(wall, 3)
+    before = np.maximum.accumulate(np.where(walls, number, -math.inf), axis=1)
+    behind = np.minimum.accumulate(np.where(walls, number, math.inf)[:, ::-1], axis=1)[:, ::-1]
+    along = np.minimum(number - before, behind - number)[:, columns : 2 * columns] * widths[1]
+    nearest = np.full((rows, columns), math.inf)
+    square = np.tile(np.square(along), (3, 1))
+    for shift in range(rows // 2 + 1):
+        if (beyond := (shift * widths[0]) ** 2) >= nearest.max():
+            break
+        below, above = (square[rows + way : 2 * rows + way] for way in (-shift, shift))
+        nearest = np.minimum(nearest, beyond + np.minimum(below, above))
+    return np.asarray(np.sqrt(nearest))
