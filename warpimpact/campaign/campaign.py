@@ -43,7 +43,7 @@ from ..scene.symmetry import unsymmetric
 from ..scene.target import MOST_LAYERS
 from ..scene.units import Number, PositiveLength, Title
 from .catalogued import catalogue_of, with_materials, with_threat
-from .plausible import warn_of
+from .plausible import check_plausible, warn_of
 from .posterior import DrawnSampler, Posterior, read_posterior
 from .problems import sentence
 from .published import Published
@@ -91,6 +91,8 @@ class Campaign(Model):
         catalogue: TOML file with threats and materials of your own, tables `[[threat]]` and `[[material]]`.
         stop: when the run ends, instead of a count. Unless told otherwise, its hits are then those of the irreducible
             part of the cell, with their images.
+        allow_implausible: compute also with values that no core or target has, such as a plate of 4 m: they are else
+            refused, as a slip of units.
         published: published limits, which `warpimpact limit` puts beside its own: a table `[[published]]` each.
     """
 
@@ -108,6 +110,7 @@ class Campaign(Model):
     catalogue: InputFile | None = None
     stop: Stop | None = None
     burst: Burst | None = None
+    allow_implausible: Annotated[bool, Field(strict=True)] = False
     published: Annotated[tuple[Published, ...], Field(fail_fast=True, max_length=1000)] = ()
     _source: str = PrivateAttr("")
 
@@ -211,6 +214,15 @@ class Campaign(Model):
     def drawn(self) -> Posterior | None:
         """The draws of its posterior, if it has one."""
         return None if self.posterior is None else read_posterior(self.posterior)
+
+    @model_validator(mode="after")
+    def _is_plausible(self) -> Self:  # first, as a slip of units breaks other rules, too
+        if not self.allow_implausible:
+            try:
+                check_plausible(self.core, self.target, self.output, self.impact, self.hits)
+            except ValueError as error:
+                raise ValueError(f"{error}; allow_implausible = true has it computed as it is") from None
+        return self
 
     @model_validator(mode="after")
     def _posterior_fits(self) -> Self:

@@ -1,14 +1,16 @@
-"""What of a campaign is probably not what was meant: a warning with the value as it was read, and the likely slip."""
+"""What of a campaign is probably not what was meant: a warning with the value as it was read, and the likely slip; and
+what cannot be meant: an error."""
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterator
 
 import numpy as np
 
-from ..scene import Hits, Impact, Scene
-from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible
+from ..scene import Core, Hits, Impact, Record, Scene, Target
+from ..scene.plausible import USUAL, Implausible, hit_bounds, implausible, impossible
 from ..scene.quantities import SCATTERED
 
 _OF_A_PLATE = (
@@ -28,21 +30,30 @@ def warn_of(scene: Scene, impact: Impact, hits: Hits) -> None:
         warnings.warn(sentence, Implausible, stacklevel=2)
 
 
+def check_plausible(core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None = None) -> None:
+    """Raise a ValueError if a value is beyond what any core or target has."""
+    if (sentence := impossible(_values(core, target, record, impact, hits))) is not None:
+        raise ValueError(sentence)
+
+
 def doubted(scene: Scene, impact: Impact, hits: Hits) -> Iterator[str]:
     """The sentences of `warn_of`."""
     plate = scene.target.layers[0]
     usual = USUAL | {"hits": hit_bounds(plate.sampled_cell, plate.size)}
-    yield from implausible(_values(scene, impact, hits), usual)
+    yield from implausible(_values(scene.core, scene.target, scene.record, impact, hits), usual)
 
 
-def _values(scene: Scene, impact: Impact, hits: Hits) -> Iterator[tuple[str, str, float]]:
+def _values(
+    core: Core, target: Target, record: Record, impact: Impact, hits: Hits | None
+) -> Iterator[tuple[str, str, float]]:
     """Place, kind and value of all that has bounds."""
-    core, target = scene.core, scene.target
     yield "core: length", "core.length", core.length
     yield "core: largest diameter", "core.diameter", 2.0 * core.max_radius
     if core.density is not None:
         yield "core.density", "core.density", core.density
     yield "core: mass", "core.mass", core.mass_properties.mass
+    cylinder = math.pi * core.max_radius**2 * core.length
+    yield "core: mass over a cylinder about it", "core.mean_density", core.mass_properties.mass / cylinder
     for place, plate in target.named:
         for name in _OF_A_PLATE:
             if getattr(plate, name) is not None:
@@ -57,9 +68,9 @@ def _values(scene: Scene, impact: Impact, hits: Hits) -> Iterator[tuple[str, str
     for name, value in impact:
         yield f"impact.{name}", f"impact.{name}", value
     for name in ("standoffs", "layer_standoffs"):
-        for standoff in getattr(scene.record, name):
+        for standoff in getattr(record, name):
             yield f"output.{name}", "output.standoffs", standoff
-    for name, column in (hits.listed or {}).items():
+    for name, column in ((hits and hits.listed) or {}).items():
         kind = f"{SCATTERED[name].table}.{name}" if name in SCATTERED else "hits"
         ends = [float(column[np.abs(column).argmax()])]
         if kind != "hits":  # which may be as small as it likes

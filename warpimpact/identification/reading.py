@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationError
 
 from warpimpact.campaign.catalogued import catalogue_of, with_cores, with_materials
+from warpimpact.campaign.plausible import check_plausible
 from warpimpact.campaign.problems import sentence
 from warpimpact.campaign.text import parsed, read_text
 from warpimpact.catalogue.catalogue import Catalogue
@@ -269,6 +270,7 @@ def _check_scenes(fit: Fit, name: str) -> None:
             exclusions.check_together(
                 {exclusions.BENDING: fit.record.bending, exclusions.NODAL: fit.numerics.scheme == "nodal"}
             )
+            check_plausible(scene.core, scene.target, scene.record, shot.impact)
         except ValueError as error:
             raise FitError(f"{where}: {_reason(error, shot)}") from None
         _check_hit(shot, scene, where)

@@ -1,4 +1,4 @@
-"""What a value is likely to be: bounds that no campaign has to keep, but that a slip of units leaves."""
+"""What a value is likely to be, and what it cannot be: bounds that a slip of units leaves."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -12,32 +12,52 @@ class Implausible(UserWarning):
 
 
 class Bounds(NamedTuple):
-    """Usual values of a quantity in SI or radians.
+    """Usual values of a quantity in SI or radians, about which a person is warned, and what no target or core has.
 
     Attributes:
+        low, high: of usual values.
         unit: SI unit.
         meant: units that may have been left out, with the factor from what was read to what was meant.
+        least, most: beyond which a value is refused.
+        why: what these bounds follow from.
     """
 
     low: float
     high: float
     unit: str
     meant: tuple[tuple[str, float], ...] = ()
+    least: float = 0.0
+    most: float = math.inf
+    why: str = ""
 
     def warning(self, place: str, value: float) -> str | None:
-        """A sentence about a value beyond the bounds, None for a usual one; zero is usual."""
+        """A sentence about a value beyond the usual bounds, None for a usual one; zero is usual."""
         if value == 0.0 or self.low <= abs(value) <= self.high:
             return None
-        usual = f"up to {self._shown(self.high)}"
-        if self.low > 0.0:
-            usual = f"{self.low * UNITS[self.unit].factor:g} to {self._shown(self.high)}"
-        read = self._shown(value) if self.unit == "rad" else f"{value:g} {self.unit}".rstrip()
-        sentence = f"{place}: read as {read}, but {usual} is usual"
+        return f"{self._read(place, value)}, but {self._range(self.low, self.high)} is usual{self._slip(place, value)}"
+
+    def refusal(self, place: str, value: float) -> str | None:
+        """A sentence about a value that nothing has, None for any other one; zero is possible."""
+        if value == 0.0 or self.least <= abs(value) <= self.most:
+            return None
+        allowed = self._range(self.least, self.most)
+        return f"{self._read(place, value)}, but {allowed} is allowed: {self.why}{self._slip(place, value)}"
+
+    def _read(self, place: str, value: float) -> str:
+        return f"{place}: read as {self._shown(value) if self.unit == 'rad' else f'{value:g} {self.unit}'.rstrip()}"
+
+    def _range(self, low: float, high: float) -> str:
+        if low == 0.0:
+            return f"up to {self._shown(high)}"
+        return f"{low * UNITS[self.unit].factor:g} to {self._shown(high)}"
+
+    def _slip(self, place: str, value: float) -> str:
+        """What was probably meant."""
         advice = "but a hit list is in SI" if place.startswith("hits.file") else "which needs its unit"
         for unit, factor in self.meant:
             if self.low <= abs(value) * factor <= self.high:
-                return f'{sentence}; "{value:g} {unit}" was probably meant, {advice}'
-        return sentence
+                return f'; "{value:g} {unit}" was probably meant, {advice}'
+        return ""
 
     def _shown(self, value: float) -> str:
         return UNITS[self.unit].text(math.degrees(value) if self.unit == "rad" else value)
@@ -45,36 +65,47 @@ class Bounds(NamedTuple):
 
 _MM, _DEG = 1e-3, math.radians(1.0)
 _LENGTHS = (("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6))
+_STRESSES, _DENSITIES = (("MPa", 1e6), ("GPa", 1e9)), (("g/cm^3", 1e3),)
+_OF_MATTER = "metals have up to 22,600 kg/m^3, and foams from 10 on"
 
 
-def _length(low: float, high: float) -> Bounds:
+def _length(low: float, high: float, most: float = math.inf, why: str = "") -> Bounds:
     """Bounds given in millimetres."""
-    return Bounds(low * _MM, high * _MM, "m", _LENGTHS)
+    return Bounds(low * _MM, high * _MM, "m", _LENGTHS, 0.0, most * _MM, why)
 
 
 USUAL = {
-    "core.length": _length(2.0, 300.0),
-    "core.diameter": _length(1.0, 60.0),
+    "core.length": _length(2.0, 300.0, 1_000.0, "the longest rods that guns fire are shorter"),
+    "core.diameter": _length(1.0, 60.0, 1_000.0, "no gun has a larger bore"),
     "core.mass": Bounds(5e-5, 1.0, "kg", (("g", 1e-3), ("mg", 1e-6))),
-    "core.density": Bounds(500.0, 25_000.0, "kg/m^3", (("g/cm^3", 1e3),)),
-    "plate.thickness": _length(0.1, 200.0),
-    "plate.size": _length(5.0, 20_000.0),
-    "plate.resistance": Bounds(1e7, 2e10, "Pa", (("MPa", 1e6), ("GPa", 1e9))),
+    "core.density": Bounds(500.0, 25_000.0, "kg/m^3", _DENSITIES, 10.0, 25_000.0, _OF_MATTER),
+    "core.mean_density": Bounds(0.0, 25_000.0, "kg/m^3", most=25_000.0, why=_OF_MATTER),
+    "plate.thickness": _length(0.1, 200.0, 1_000.0, "no bullet goes through a metre of anything"),
+    "plate.size": _length(5.0, 20_000.0, 50_000.0, "no plate is larger; an unbounded one has no size"),
+    "plate.resistance": Bounds(
+        1e7, 2e10, "Pa", _STRESSES, 2e4, 2e11, "gelatine resists more than the least, and diamond less than the most"
+    ),
     "plate.shear_coefficient": Bounds(0.0, 1.0, ""),
-    "plate.degradation_interval": Bounds(1e-9, 1e-3, "s", (("us", 1e-6), ("ns", 1e-9))),
-    "plate.degradation_length": _length(0.01, 20.0),
-    "plate.degradation_depth": _length(0.1, 200.0),
-    "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", (("g/cm^3", 1e3),)),
-    "plate.pattern.cell": _length(0.5, 500.0),
+    "plate.degradation_interval": Bounds(
+        1e-9, 1e-3, "s", (("us", 1e-6), ("ns", 1e-9)), most=0.1, why="any passage is over by then"
+    ),
+    "plate.degradation_length": _length(0.01, 20.0, 100.0, "a core weakens a plate about itself"),
+    "plate.degradation_depth": _length(0.1, 200.0, 1_000.0, "no plate is thicker"),
+    "plate.density": Bounds(500.0, 25_000.0, "kg/m^3", _DENSITIES, 10.0, 25_000.0, _OF_MATTER),
+    "plate.pattern.cell": _length(0.5, 500.0, 2_000.0, "a plate with its holes as far apart is a solid one to a core"),
     "layer.gap": _length(0.05, 3_000.0),
-    "impact.velocity": Bounds(20.0, 3000.0, "m/s", (("km/s", 1e3),)),
+    "impact.velocity": Bounds(
+        20.0, 3000.0, "m/s", (("km/s", 1e3),), 1.0, 10_000.0, "a fall from 5 cm is faster, and no gun is as fast"
+    ),
     "impact.azimuth": Bounds(0.0, 360.0 * _DEG, "rad"),
     "impact.pitch": Bounds(0.0, 60.0 * _DEG, "rad"),
     "impact.yaw": Bounds(0.0, 60.0 * _DEG, "rad"),
-    "impact.spin": Bounds(0.0, 1e5, "rad/s"),
-    "output.standoffs": _length(5.0, 100_000.0),
+    "impact.spin": Bounds(0.0, 1e5, "rad/s", most=1e6, why="a core would burst"),
+    "output.standoffs": _length(5.0, 100_000.0, 1_000_000.0, "nothing behind a target is as far"),
 }
-"""By the place in a campaign."""
+"""By the place in a campaign: of what a person is warned, and what is refused. Foils, slow cores, shallow depths and
+wide scatter may be studied, so most quantities have no least value; and listed hits may lie anywhere, as a pattern
+repeats."""
 
 
 def hit_bounds(period: tuple[float, float], size: tuple[float, float] | None) -> Bounds:
@@ -91,3 +122,9 @@ def implausible(values: Iterable[tuple[str, str, float]], usual: Mapping[str, Bo
     """
     warnings = (usual[kind].warning(place, value) for place, kind, value in values if kind in usual)
     return [warning for warning in warnings if warning is not None]
+
+
+def impossible(values: Iterable[tuple[str, str, float]]) -> str | None:
+    """A sentence for the first value, as `implausible` takes them, that nothing has."""
+    refusals = (USUAL[kind].refusal(place, value) for place, kind, value in values if kind in USUAL)
+    return next((refusal for refusal in refusals if refusal is not None), None)

@@ -25,6 +25,11 @@ def test_priors_are_read_in_si(make_fit: FitMaker) -> None:
     assert fit.scene_of(fit.shots[0]).target.layers[0].resistance == pytest.approx(2.5e9)
 
 
+def test_what_no_target_has_is_refused(make_fit: FitMaker) -> None:
+    with pytest.raises(FitError, match=r"shot\[0\]: plate.thickness: read as 6 m, but up to 1000 mm is allowed"):
+        make_fit(('thickness = "3 mm"', "thickness = 6"))
+
+
 def test_observations_are_in_si_and_have_their_standoff(make_fit: FitMaker) -> None:
     velocity, tilt = make_fit().shots[0].observations
     assert (velocity.name, velocity.value, velocity.std, velocity.label) == (
