@@ -8,8 +8,11 @@ from warpimpact.campaign.campaign import Campaign
 from warpimpact.scene import Numerics
 from warpimpact.solver.prepare import prepare
 
-SLOW = 1.0
-"""Seconds of a core that a hit takes, from which on that is told."""
+SLOW, SLOW_BEFORE = 1.0, 5.0
+"""Seconds of a core that a hit takes, or all hits of a burst, and what comes before the first one, from which on that
+is told."""
+LARGE = 2**30
+"""Bytes of the windows of a hit, from which on they are told: each thread has its own."""
 
 
 class Costly(UserWarning):
@@ -17,14 +20,16 @@ class Costly(UserWarning):
 
 
 class Cost:
-    """Warns (`Costly`) of hits that take more than SLOW on a CPU, once at each resolution.
+    """Warns (`Costly`) of hits, or bursts, that take more than SLOW on a CPU, once at each resolution.
 
     Args:
         device: kind of it.
+        passages: as in `Computation`.
     """
 
-    def __init__(self, campaign: Campaign, device: str) -> None:
+    def __init__(self, campaign: Campaign, device: str, passages: int = 1) -> None:
         self._campaign, self._told, self._by_cpu = campaign, list[Numerics](), device == "cpu"
+        self._passages = passages
 
     def tell(self, numerics: Numerics) -> None:
         """Warn of what hits take with numerics that fix the resolution: the first hit of the campaign, if nothing
@@ -36,20 +41,26 @@ class Cost:
         if not self._by_cpu or numerics in self._told:
             return
         self._told.append(numerics)
-        sentence = cost_of(self._campaign, numerics)
+        sentence = cost_of(self._campaign, numerics, self._passages)
         if sentence is not None:
             warnings.warn(sentence, Costly, stacklevel=2)
 
 
-def cost_of(campaign: Campaign, numerics: Numerics) -> str | None:
+def cost_of(campaign: Campaign, numerics: Numerics, passages: int = 1) -> str | None:
     """A sentence about what hits take; None where that is little."""
     sampler, images = campaign.sampler(), len(campaign.symmetries)
     shots = sampler.shots(0, images * campaign.at_a_plate)[::images]
     prepared = prepare(campaign.scene, shots, numerics)
-    seconds, hits = prepared.seconds, len(sampler) // images
-    if seconds < SLOW:
-        return None
+    seconds, hits = passages * prepared.seconds, len(sampler) // images
     level = "" if numerics.level is None else f"at level {numerics.level} "
+    if seconds * campaign.at_a_plate < SLOW and prepared.window_bytes < LARGE:
+        before, size = (sum(getattr(tile, name) for tile in prepared.tiles) for name in ("seconds", "bytes"))
+        return (
+            f"{level}the holes of the plates take about {before:.2g} s of a core and {size / 2**30:.2g} GiB before the "
+            "first hit; a smaller period of the pattern, and a longer degradation_length, take less"
+            if before >= SLOW_BEFORE
+            else None
+        )
     return (
         f"{level}a hit takes about {seconds:.2g} s of a core, and {hits} hits {_long(seconds * hits)}: at "
         f"least {prepared.steps} steps, and windows of {prepared.window_nodes:.2g} nodes, "

@@ -131,7 +131,7 @@ def _fill(campaign: Campaign, shards: Shards, team: Team, follow: Follow) -> _En
     there = sorted(shards.there())
     for index in there:
         watch.add(index, shards.shard(index))
-    watch.resumed, cost = watch.done, Cost(campaign, team.made_by[attr.DEVICE])
+    watch.resumed, cost = watch.done, Cost(campaign, team.made_by[attr.DEVICE], computation.passages)
     if 0 in there:  # it holds what the pilot found, and its hits at a finer level
         watch.found = computation.found_in(shards.shard(0))
     else:

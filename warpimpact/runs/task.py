@@ -40,6 +40,10 @@ class Computation(Protocol):
         """Shots at most at the solid plate of equal areal density."""
 
     @property
+    def passages(self) -> int:
+        """How many times as long as a passage that nothing hinders a hit takes, roughly."""
+
+    @property
     def content(self) -> Mapping[str, str]:
         """What decides the bits of a result, beside the campaign, the versions and the device."""
 

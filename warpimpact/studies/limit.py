@@ -67,6 +67,7 @@ class LimitMap:
 
     sought: Sought
     most_solid: ClassVar[int] = 256
+    passages: ClassVar[int] = 35  # 34 to 65 of campaigns/limit_velocity.toml: some five shots, slow near the limit
 
     @classmethod
     def of(

@@ -1,12 +1,14 @@
 """What is told of a campaign that takes long, before it is computed."""
 
+import math
 import warnings
 from pathlib import Path
 
 import pytest
 
-from warpimpact import Campaign, Numerics
-from warpimpact.runs.foreseen import Cost, Costly, cost_of
+from warpimpact import Campaign, Numerics, SlotPattern
+from warpimpact.runs.foreseen import SLOW, Cost, Costly, cost_of
+from warpimpact.scene import Burst
 from warpimpact.solver.prepare import prepare
 from warpimpact.solver.resolution import MOST_STEPS, TooManySteps
 
@@ -30,6 +32,38 @@ def test_hits_that_take_long_are_told_once_at_each_level() -> None:
         warnings.simplefilter("error")
         cost.tell(LEVEL)
     assert cost_of(Campaign.from_toml(SLOTTED_PLATE), LEVEL) is None
+
+
+def test_bursts_that_take_long_are_told() -> None:
+    hit = slow().model_copy(update={"numerics": Numerics(level=0)})
+    plate = hit.plate.model_copy(update={"thickness": 6e-3})
+    few, many = (
+        hit.model_copy(update={"plate": plate, "burst": Burst(count=count, spacing="20 mm")}) for count in (2, 50)
+    )
+    assert cost_of(few, Numerics(level=0)) is None
+    assert str(cost_of(many, Numerics(level=0))).startswith("at level 0 a hit takes about 0.")
+
+
+def test_limits_and_large_windows_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    campaign = Campaign.from_toml(SLOTTED_PLATE)
+    prepared = prepare(campaign.scene, campaign.sampler().shots(0, 1), LEVEL)
+    assert cost_of(campaign, LEVEL) is None
+    assert str(cost_of(campaign, LEVEL, math.ceil(SLOW / prepared.seconds))).startswith(
+        "at level 2 a hit takes about 1 s"
+    )
+    assert prepared.window_bytes > 0
+    monkeypatch.setattr("warpimpact.runs.foreseen.LARGE", prepared.window_bytes)
+    assert str(cost_of(campaign, LEVEL)).startswith("at level 2 a hit takes about ")
+
+
+def test_holes_that_take_long_are_told_before_they_are_built() -> None:
+    campaign = Campaign.from_toml(SLOTTED_PLATE)
+    pattern = SlotPattern(length="12 mm", width="4 mm", spacing=("0.45 m", "0.45 m"))
+    wide = campaign.model_copy(update={"plate": campaign.plate.model_copy(update={"pattern": pattern})})
+    assert cost_of(wide, LEVEL) == (
+        "at level 2 the holes of the plates take about 9.1 s of a core and 1.4 GiB before the first hit; a smaller "
+        "period of the pattern, and a longer degradation_length, take less"
+    )
 
 
 @pytest.mark.filterwarnings("error")

@@ -181,14 +181,14 @@ def test_the_holes_of_a_plate_are_not_built_before_somebody_computes_and_not_at_
     assert cost_of(campaign, Numerics(level=0)) is None
     with pytest.raises(MemoryError, match=r"plate.pattern: got a period of 1 m x 1 m, .* 2 GiB"):
         prepare(scene, shots, Numerics(level=0))
-    (own,) = prepared.tiles
+    (tile,) = prepared.tiles
     cancel = Cancel()
     cancel.cancel()
     with pytest.raises(Cancelled):
         computed(prepared, Worker("cpu", 1, cancel))
-    assert not own.built
+    assert not tile.built
     computed(prepared, Worker("cpu", 1))
-    assert own.built
+    assert tile.built
 
 
 @pytest.mark.parametrize("pattern", [*PATTERNS, FREE_FORM], ids=lambda pattern: pattern.shape)
@@ -213,7 +213,7 @@ def test_a_tile_is_built_in_small_parts_that_may_end_it(
         part.build(look)
     assert not part.built
     part.build(look)
-    assert looks > 24
+    assert looks > (24 if pattern is FREE_FORM else 11 + part.shape[0] if sharp else 12 + sum(part.shape))
     np.testing.assert_array_equal(part.material, whole)
 
 
@@ -235,7 +235,7 @@ def test_tiles_are_kept_as_far_as_they_fit(monkeypatch: pytest.MonkeyPatch) -> N
     forget_tiles()
     tiles = [tile_of(plate, 0.1e-3) for plate in plates]
     monkeypatch.setattr("warpimpact.solver.tile.MOST_BYTES", tiles[0].bytes + tiles[2].bytes)
-    for own in tiles:
-        own.build(lambda: None)
-    kept = [tile_of(plate, 0.1e-3) is own for plate, own in zip(plates, tiles, strict=True)]
+    for tile in tiles:
+        tile.build(lambda: None)
+    kept = [tile_of(plate, 0.1e-3) is tile for plate, tile in zip(plates, tiles, strict=True)]
     assert kept == [False, tiles[1].bytes <= tiles[0].bytes, True]
